@@ -18,7 +18,7 @@ from chipglow.report import result_rows, write_report
 from chipglow.scene import Raster
 from chipglow.study import Study, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
-from chipglow.study.camera_presets import CAMERAS
+from chipglow.study.camera_section import CAMERAS
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.text import DescriptionError
 
@@ -248,10 +248,10 @@ def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand(
     assert "integration_time 10 us" in said
     assert "band" not in said.split("camera")[-1]
     for name, preset in CAMERAS.items():
-        assert preset.source
+        assert preset["source"]
         built = Study(camera={"preset": name, "magnification": 1.0}).camera
-        assert f"{built.array[0]} x {built.array[1]}" in preset.source
-        assert f"{1e6 * built.build().pitch:g} um" in preset.source
+        assert f"{built.array[0]} x {built.array[1]}" in preset["source"]
+        assert f"{1e6 * built.build().pitch:g} um" in preset["source"]
 
 
 def test_the_insb_camera_with_a_1_x_lens():

@@ -12,24 +12,11 @@ from chipglow.quantities.part import Family, Part, PartType, adapter, first_sent
 
 @dataclass(frozen=True)
 class Setting:
-    """A field of a part.
+    """A field of a part, with its value.
 
-    Parameters
-    ----------
-    path : str
-        Its keys, joined by dots: ``camera.psf.fwhm``.
-    parameter : Parameter
-        Meaning, unit and limits.
-    kind : type
-        Type of its value.
-    value : object
-        What it is, in SI units; a part where it has settings itself.
-    plain : object
-        The same as YAML has it: text with a unit, a number, a list or a mapping.
-    default : object
-        Value that it has if nothing is said; None if it must be given.
-    examples : str
-        A line for each kind of part that it may be, if a description chooses one.
+    `path` holds its keys, joined by dots: ``camera.psf.fwhm``. `value` is in SI units, or a part;
+    `plain` is the same as YAML has it. `default` is None if it must be given. `examples` has a line
+    for each kind of part that a description may choose for it.
     """
 
     path: str

@@ -17,17 +17,7 @@ FOLDER_VARIABLE: Final = "CHIPGLOW_CACHE"
 
 @dataclass(frozen=True)
 class CachedScene:
-    """A scene in the cache.
-
-    Parameters
-    ----------
-    path : Path
-        Its file.
-    size : int
-        In bytes.
-    modified : float
-        When it was computed, in seconds since 1970.
-    """
+    """A scene in the cache: its file, its size in bytes, and its time in seconds since 1970."""
 
     path: Path
     size: int

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from chipglow.camera import (
@@ -24,8 +25,12 @@ from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
-from chipglow.study.camera_presets import CAMERAS, with_preset
 from chipglow.study.scaling import with_pitch
+from chipglow.text import read_yaml
+
+_FILE: Final = Path(__file__).with_name("cameras.yaml")
+CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)
+"""Fields of the section by the names of cameras, each with its source."""
 
 FROM_DETECTOR: Final = "detector"
 """A lower range limit that follows from the detector."""
@@ -122,7 +127,14 @@ class CameraSection(Part):
         """The data with what preset, detector and lens make."""
         if not isinstance(data, Mapping):
             return data
-        camera = with_pitch(with_preset(data), from_file)
+        name = data.get("preset")
+        if name not in (None, "none"):
+            if name not in CAMERAS:
+                known = ", ".join(CAMERAS)
+                raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
+            preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
+            data = {**preset, **data}
+        camera = with_pitch(data, from_file)
         if camera.get("detector") not in (None, "none"):
             return {"lower_limit": "detector", **camera}
         return camera

@@ -32,17 +32,7 @@ _MEMORY, _MEMORY_A_SAMPLE = 0.3e9, 1100.0
 
 @dataclass(frozen=True)
 class Cost:
-    """What a study costs that has not been cut before.
-
-    Parameters
-    ----------
-    seconds : float
-        Time.
-    disk : float
-        Bytes of the cache.
-    memory : float
-        Bytes of memory.
-    """
+    """Seconds, bytes of the cache and bytes of memory of a study that has not been cut before."""
 
     seconds: float
     disk: float
@@ -56,7 +46,6 @@ def expected_cost(study: Study) -> Cost:
     samples = view.rows * view.columns
     cell = cutting.numerics.cell
     down, across = (n * view.spacing / cell + _NODES_BEYOND for n in (view.rows, view.columns))
-    nodes = down * across
     kept = window.later_bands * ceil(window.band_duration / window.interval)
     frames = ceil(cutting.duration / window.interval) + kept
     solver = cutting.simulation().point_steps / (_POINT_STEPS * get_num_threads())
@@ -67,6 +56,6 @@ def expected_cost(study: Study) -> Cost:
         + solver
         + _SECONDS_A_SAMPLE * frames * samples
         + _ANALYSIS_SECONDS * exposures * exposed * samples,
-        disk=_BYTES_A_NODE * frames * nodes,
+        disk=_BYTES_A_NODE * frames * down * across,
         memory=_MEMORY + _MEMORY_A_SAMPLE * samples,
     )

@@ -24,17 +24,7 @@ _FEW_CELLS: Final = 10
 
 @dataclass(frozen=True)
 class Fitted:
-    """A scene with a tool, and surfaces that can follow it.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene, with the study's tool if it has none and the study does.
-    surfaces : mapping
-        The study's surfaces by name.
-    notes : Notes
-        Assumptions of the fit.
-    """
+    """A scene with the study's tool if it lacks one, the study's surfaces, and the assumptions."""
 
     scene: Scene
     surfaces: Mapping[str, Surface]
@@ -104,16 +94,12 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
             elif isinstance(layer, FeatureTrends):
                 trends.extend(layer.trends.values())
         for low, high in dict.fromkeys(trend.measured for trend in trends):
+            text = f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C"
             if low == high:
-                yield (
-                    f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C: it is "
-                    "taken to be the same at all temperatures."
-                )
+                yield f"{text}: it is taken to be the same at all temperatures."
             else:
-                yield (
-                    f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C to "
-                    f"{high - 273.15:.0f} °C: its straight line is taken to go on beyond."
-                )
+                beyond = "its straight line is taken to go on beyond."
+                yield f"{text} to {high - 273.15:.0f} °C: {beyond}"
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:

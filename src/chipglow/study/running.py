@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
+from functools import partial
 from json import dumps
 from pathlib import Path
 from time import monotonic
@@ -23,8 +24,6 @@ from chipglow.cutting import (
     SOLVER_VERSION,
     Checkpoint,
     SolverError,
-    ToolMaterial,
-    WorkpieceMaterial,
 )
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.digest import is_intact
@@ -83,10 +82,17 @@ def cut(
     path = scene_path(_inputs(study))
     if not _is_whole(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _compute(study, path, progress, resume, on_preview)
+        _compute(study, path, progress or _silent, resume, on_preview)
     elif on_preview:
-        _show(study, path, progress, on_preview)
+        tell = partial(progress or _silent, PREVIEW_STEP)
+        scene = open_scene(path)
+        show_scene(scene, preview_of(study, on_preview), tell)
+        scene.data.close()
     return path
+
+
+def _silent(step: str, fraction: float) -> None:
+    """Tell nobody."""
 
 
 def is_cut(study: Study) -> bool:
@@ -238,45 +244,31 @@ def _inputs(study: Study) -> dict[str, Any]:
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)
     del cutting["tool"]["outline"]
+    workpiece, tool_material = map(asdict, (simulation.workpiece, simulation.tool_material))
+    del workpiece["name"], tool_material["name"]  # all else of a material's file counts
     return {
         "cutting": cutting,
         "outline": tool.points if isinstance(tool, ToolOutline) else None,
-        "workpiece": _numbers(simulation.workpiece),
+        "workpiece": workpiece,
         "law": type(simulation.workpiece.flow_stress).__qualname__,
-        "tool": _numbers(simulation.tool_material),
+        "tool": tool_material,
         "solver": SOLVER_VERSION,
         "format": SCENE_FORMAT,
     }
-
-
-def _numbers(material: WorkpieceMaterial | ToolMaterial) -> dict[str, Any]:
-    """All that a material's file may change but its name."""
-    return {key: value for key, value in asdict(material).items() if key != "name"}
 
 
 def _is_whole(path: Path) -> bool:
     return path.is_file() and bool(is_intact(path))
 
 
-def _show(
-    study: Study, path: Path, progress: Progress | None, on_preview: Callable[[Frame], None]
-) -> None:
-    report = progress or (lambda step, fraction: None)
-    scene = open_scene(path)
-    preview = preview_of(study, on_preview)
-    show_scene(scene, preview, lambda fraction: report(PREVIEW_STEP, fraction))
-    scene.data.close()
-
-
 def _compute(
     study: Study,
     path: Path,
-    progress: Progress | None,
+    progress: Progress,
     resume: bool,
     on_preview: Callable[[Frame], None] | None,
 ) -> None:
-    if progress:
-        progress(CUTTING_STEP, 0.0)
+    progress(CUTTING_STEP, 0.0)
     cutting = study.cutting
     raster = cutting.field_of_view.build()
     simulation = cutting.simulation()
@@ -290,18 +282,18 @@ def _compute(
     left = unfinished_scenes(path) if resume else []
     start = left[0] if left and left[0].progress > 0 else None
     state = Checkpoint(start.state(), start.progress) if start else None
-    tool = cutting.tool.build()
     lattice = simulation.lattice(raster)
-    with SceneWriter(path, raster, tool, attributes, lattice=lattice, resume=start) as writer:
+    writer = SceneWriter(path, raster, simulation.tool, attributes, lattice=lattice, resume=start)
+    with writer:
         keeper = _Keeper(writer)
         if start and state:
-            keeper.note_kept(state, start.checkpoint)
+            keeper.note = _kept(state, start.checkpoint)
         try:
             history = simulation.run(
                 cutting.window,
                 raster,
                 writer.append,
-                (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,
+                partial(progress, CUTTING_STEP),
                 state,
                 keeper.keep,
                 preview_of(study, on_preview) if on_preview else None,
@@ -315,6 +307,10 @@ def _compute(
         unfinished.remove()
 
 
+def _kept(checkpoint: Checkpoint, file: Path) -> str:
+    return f"the state at {checkpoint.time * 1e6:.2f} us is kept in {file}"
+
+
 class _Keeper:
     """Makes checkpoints now and then; `note` tells of the last one."""
 
@@ -323,10 +319,6 @@ class _Keeper:
         self._due = monotonic() + CHECKPOINT_INTERVAL
         self.note = ""
 
-    def note_kept(self, checkpoint: Checkpoint, file: Path) -> None:
-        """Note which state is kept, and where."""
-        self.note = f"the state at {checkpoint.time * 1e6:.2f} us is kept in {file}"
-
     @uninterrupted()
     def keep(self, checkpoint: Checkpoint) -> None:
         """Make a checkpoint if it is time, and delete what other runs left that got no further."""
@@ -334,7 +326,7 @@ class _Keeper:
         if begin < self._due:
             return
         file = self._writer.checkpoint(checkpoint.arrays, checkpoint.progress)
-        self.note_kept(checkpoint, file)
+        self.note = _kept(checkpoint, file)
         for left in unfinished_scenes(self._writer.path):
             if left.progress <= checkpoint.progress:
                 left.remove()

@@ -131,18 +131,17 @@ class Study(Part):
                 )
 
     def _check_camera(self) -> None:
-        camera, cutting = self.camera, self.cutting
+        camera, cutting, window = self.camera, self.cutting, self.cutting.window
         if camera.integration_time > cutting.duration:
             raise ValueError(
                 f"camera.integration_time: {camera.integration_time * 1e6:g} us is longer than the "
                 f"scene, expected up to the {cutting.duration * 1e6:.4g} us of cutting.window"
             )
-        if cutting.window.interval > camera.integration_time:
+        if window.interval > camera.integration_time:
             raise ValueError(
-                f"cutting.window.interval: {cutting.window.interval * 1e6:g} us is longer than the "
+                f"cutting.window.interval: {window.interval * 1e6:g} us is longer than the "
                 f"exposure, expected up to {camera.integration_time * 1e6:g} us"
             )
-        window = cutting.window
         if window.later_bands and window.band_duration < camera.integration_time * (1 - 1e-9):
             raise ValueError(
                 f"cutting.window.band_duration: {window.band_duration * 1e6:g} us is shorter than "

@@ -39,10 +39,6 @@ CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2
 """Chips of the paper's Table 1 by the names of a study."""
 
 
-_FEATURE: Final = {"body": "chip"}
-"""Features whose name in a study is another than that of the surface."""
-
-
 _declared = FeatureSurface.parameter
 
 
@@ -148,14 +144,12 @@ class FeaturesSection(Part):
             raise ValueError(
                 "chips: {} is empty, expected one chip or more, such as chip 1: chip-1"
             )
-        for name in self.maps:
-            if name in self.chips:
-                raise ValueError(f"maps: {name!r} is the name of a chip too, expected another")
-        for name in self.measured:
-            if name in self.chips or name in self.maps:
-                raise ValueError(
-                    f"measured: {name!r} is the name of another chip too, expected its own"
-                )
+        taken = set(self.chips)
+        for kind in ("maps", "measured"):
+            for name in getattr(self, kind):
+                if name in taken:
+                    raise ValueError(f"{kind}: {name!r} is the name of another chip too")
+            taken |= getattr(self, kind).keys()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -170,22 +164,20 @@ class FeaturesSection(Part):
         }
         maps = {name: read_emissivity_map(file) for name, file in self.maps.items()}
         measured = {name: self._measured(file, seed) for name, file in self.measured.items()}
-        surfaces: dict[str, Surface] = {**chips, **maps, **measured}
+        bare: dict[str, Surface] = {**chips, **maps, **measured}
+        return {name: self._wrapped(surface) for name, surface in bare.items()}
+
+    def _wrapped(self, surface: Surface) -> Surface:
+        """A surface with what is over it, the spectrum first."""
         if self.spectral is not None:
-            spectrum, band = self.spectral, Band(*self.measured_in)
-            surfaces = {
-                name: DispersiveSurface(bare, spectrum, band) for name, bare in surfaces.items()
-            }
+            surface = DispersiveSurface(surface, self.spectral, Band(*self.measured_in))
         if self.oxide is not None:
-            oxide = self.oxide
-            surfaces = {name: OxidisedSurface(bare, oxide) for name, bare in surfaces.items()}
+            surface = OxidisedSurface(surface, self.oxide)
         if self.directional is not None:
-            law = self.directional
-            surfaces = {name: DirectionalSurface(bare, law) for name, bare in surfaces.items()}
-        if self.reflections is None:
-            return surfaces
-        shape = self.reflections
-        return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
+            surface = DirectionalSurface(surface, self.directional)
+        if self.reflections is not None:
+            surface = ReflectingSurface(surface, self.reflections)
+        return surface
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
         shared = FeatureSurface.declared().keys() & self.declared().keys()
@@ -202,14 +194,9 @@ class FeaturesSection(Part):
         except ValueError as error:
             raise ValueError(f"surface.measured: {file}: {error}") from None
         bare = self._features(means["body"], means["shear_band"], seed)
-        bare = replace(
-            bare,
-            workpiece=means.get("workpiece", bare.workpiece),
-            tool=means.get("tool", bare.tool),
-        )
-        return FeatureTrends(
-            bare, {_FEATURE.get(name, name): area.trend for name, area in areas.items()}
-        )
+        beside = {name: means[name] for name in ("workpiece", "tool") if name in means}
+        trends = {"chip" if name == "body" else name: one.trend for name, one in areas.items()}
+        return FeatureTrends(replace(bare, **beside), trends)
 
 
 SurfaceSection = Annotated[FeaturesSection | SurfaceChoice, SURFACES]
