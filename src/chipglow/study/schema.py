@@ -110,8 +110,8 @@ class Study(Part):
         """The data with the surface's usual kind, and with what follows from feed and camera."""
         if not isinstance(data, Mapping):
             return data
-        surface = data.get("surface", {})
-        if surface is None or isinstance(surface, Mapping):
+        surface = data.get("surface")
+        if isinstance(surface, Mapping) or (surface is None and "surface" in data):
             data = {**data, "surface": {"kind": "features", **(surface or {})}}
         return scaled(data, from_file)
 
