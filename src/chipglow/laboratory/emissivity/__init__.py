@@ -19,7 +19,6 @@ from chipglow.laboratory.emissivity.file import (
     read_region_emissivity,
     write_emissivity,
 )
-from chipglow.laboratory.emissivity.heated import HeatedObject, HeatedRow
 from chipglow.laboratory.emissivity.region_emissivities import (
     RegionEmissivities,
     determine_emissivities,
@@ -44,8 +43,6 @@ __all__ = [
     "EmissivityLine",
     "EmissivityMap",
     "EmissivityMapFile",
-    "HeatedObject",
-    "HeatedRow",
     "Heating",
     "KnownEmissivity",
     "MeasuredArea",
