@@ -22,6 +22,7 @@ from chipglow.laboratory.emissivity.observations import (
     observed_radiance,
     stated_calibration,
 )
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
 from chipglow.uncertainty import Estimate, propagate
@@ -36,7 +37,6 @@ LABORATORY: Final = 293.0
 """Temperature in K of the paper's laboratory, which surfaces reflect."""
 
 _CLEARLY: Final = 5.0
-_ZERO_CELSIUS: Final = 273.15
 
 
 @dataclass(frozen=True)
@@ -99,37 +99,26 @@ class Heating:
 
 @dataclass(frozen=True, eq=False)
 class EmissivityMap:
-    """Emissivity of every pixel; made by `determine_emissivity`.
-
-    Parameters
-    ----------
-    heating : Heating
-        How the object was heated.
-    band : Band
-        The camera's band.
-    raster : Raster
-        The pixels.
-    radiance : ndarray
-        Radiance in W/(m² sr) of every observation, shape (observation, y, x): the frames of one
-        image, or the means of several images. NaN where a frame is flagged.
-    flags : ndarray
-        All `Flag` that a pixel has in any frame, uint8, shape (y, x).
-    calibration : ndarray, optional
-        Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x).
-    lower_limit : float
-        Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
-    recordings : int
-        From how many recordings the observations are.
-    """
+    """Emissivity of every pixel; made by `determine_emissivity`."""
 
     heating: Heating
+    """How the object was heated."""
     band: Band
+    """The camera's band."""
     raster: Raster
-    radiance: NDArray[np.float64]
+    radiance: Array
+    """Radiance in W/(m² sr) of every observation, shape (observation, y, x): the frames of one
+    image, or the means of several images. NaN where a frame is flagged.
+    """
     flags: NDArray[np.uint8]
-    calibration: NDArray[np.float64] | None
+    """All `Flag` that a pixel has in any frame, uint8, shape (y, x)."""
+    calibration: Array | None
+    """Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x)."""
     lower_limit: float = 0.0
+    """Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
+    """
     recordings: int = 1
+    """From how many recordings the observations are."""
 
     @property
     def hidden(self) -> float:
@@ -150,17 +139,17 @@ class EmissivityMap:
         return hashlib.sha256(self.radiance.tobytes()).hexdigest()[:16]
 
     @cached_property
-    def emissivity(self) -> NDArray[np.float64]:
+    def emissivity(self) -> Array:
         """Emissivity, shape (y, x); NaN where flagged. Noise can take it out of 0 to 1."""
         return emissivity_of_radiance(self.mean_radiance, self.heating, self.band)
 
     @cached_property
-    def mean_radiance(self) -> NDArray[np.float64]:
+    def mean_radiance(self) -> Array:
         """Mean radiance over the observations in W/(m² sr), shape (y, x); NaN where flagged."""
         return np.asarray(self.radiance.mean(axis=0))
 
     @cached_property
-    def radiance_temperature(self) -> NDArray[np.float64]:
+    def radiance_temperature(self) -> Array:
         """Radiance temperature of the mean radiance in K, shape (y, x); NaN where flagged."""
         return np.asarray(self.band.temperature(self.mean_radiance), np.float64)
 
@@ -191,18 +180,7 @@ class EmissivityMap:
         )
 
     def of(self, area: Area) -> "RegionEmissivity":
-        """Mean emissivity of an area, and what makes it uncertain.
-
-        Parameters
-        ----------
-        area : Area
-            Pixels on this map's raster.
-
-        Raises
-        ------
-        ValueError
-            If fewer than two of its pixels can be used.
-        """
+        """Mean emissivity of an area, and what makes it uncertain."""
         usable = area.mask & np.isfinite(self.mean_radiance)
         flagged = count_flags(self.flags[area.mask])
         count = int(usable.sum())
@@ -245,7 +223,7 @@ class EmissivityMap:
         )
         return replace(found, estimate=found.estimate.with_warnings(*found._warnings()))
 
-    def _systematic(self, values: NDArray[np.float64], radiance: Any, calibration: Any) -> Estimate:
+    def _systematic(self, values: Array, radiance: Any, calibration: Any) -> Estimate:
         """Emissivities with what is common to all pixels, frames and images."""
 
         def found(reference: Any, reflected: Any) -> Any:
@@ -280,49 +258,35 @@ class EmissivityMap:
 
 @dataclass(frozen=True, eq=False)
 class RegionEmissivity:
-    """Emissivity of an area: a row of the table; made by `EmissivityMap.of`.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    whole : bool
-        Whether the area is all that there is of the feature.
-    heating : Heating
-        How the object was heated.
-    pixels : int
-        Number of pixels that count.
-    left_out : int
-        How many more there are that do not count, because they are flagged.
-    flagged : dict
-        How many have each `Flag`.
-    hidden : float
-        Lowest emissivity that the camera's range measures; 0 without a lower limit.
-    standard_deviation : float
-        Standard deviation over the pixels: how much the surface varies from place to place, with
-        the pixels' noise. It is no uncertainty of the mean.
-    outside : tuple of int
-        How many pixels have an emissivity under 0, and over 1.
-    observed : ndarray
-        Mean emissivity of each observation, shape (observation,).
-    estimate : Estimate
-        Mean emissivity, with the components of `COMMON`, the same in all areas and images;
-        ``drift`` from recording to recording over the repeatability, the same in all areas of a
-        map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
-    """
+    """Emissivity of an area: a row of the table; made by `EmissivityMap.of`."""
 
     name: str
     feature: str
+    """The area's name, and the feature that it belongs to."""
     whole: bool
+    """Whether the area is all that there is of the feature."""
     heating: Heating
+    """How the object was heated."""
     pixels: int
     left_out: int
+    """How many more there are that do not count, because they are flagged."""
     flagged: dict[Flag, int]
+    """How many have each `Flag`."""
     hidden: float
+    """Lowest emissivity that the camera's range measures; 0 without a lower limit."""
     standard_deviation: float
+    """Standard deviation over the pixels: how much the surface varies from place to place, with
+    the pixels' noise. It is no uncertainty of the mean.
+    """
     outside: tuple[int, int]
-    observed: NDArray[np.float64]
+    """How many pixels have an emissivity under 0, and over 1."""
+    observed: Array
+    """Mean emissivity of each observation, shape (observation,)."""
     estimate: Estimate
+    """Mean emissivity, with the components of `COMMON`, the same in all areas and images;
+    ``drift`` from recording to recording over the repeatability, the same in all areas of a
+    map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """
 
     @property
     def mean(self) -> float:
@@ -357,49 +321,34 @@ class RegionEmissivity:
 
 @dataclass(frozen=True)
 class AreaEmissivity:
-    """An area's emissivity at one true temperature: of a file, or of a line.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    heating : Heating
-        How the object was heated; of a line, with the temperature at which it is taken.
-    estimate : Estimate
-        Mean emissivity, as `RegionEmissivity` has it.
-    """
+    """An area's emissivity at one true temperature: of a file, or of a line."""
 
     name: str
     feature: str
+    """The area's name, and the feature that it belongs to."""
     heating: Heating
+    """How the object was heated; of a line, with the temperature at which it is taken."""
     estimate: Estimate
+    """Mean emissivity, as `RegionEmissivity` has it."""
 
 
 @dataclass(frozen=True)
 class EmissivityLine:
-    """Emissivity of an area over the temperature, as a straight line; by `emissivity_line`.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    heatings : tuple of Heating
-        How the object was heated, one for each true temperature.
-    means, uncertainties : tuple of float
-        Mean emissivities, and their standard uncertainties.
-    estimate : Estimate
-        Emissivity of the line at its `middle`, and its change with temperature in 1/K; shape (2,).
-    residual : float
-        Standard deviation about the line; NaN of two temperatures.
-    """
+    """Emissivity of an area over the temperature, as a straight line; by `emissivity_line`."""
 
     name: str
     feature: str
+    """The area's name, and the feature that it belongs to."""
     heatings: tuple[Heating, ...]
+    """How the object was heated, one for each true temperature."""
     means: tuple[float, ...]
     uncertainties: tuple[float, ...]
+    """Mean emissivities, and their standard uncertainties."""
     estimate: Estimate
+    """Emissivity of the line at its `middle`, and its change with temperature in 1/K; shape (2,).
+    """
     residual: float
+    """Standard deviation about the line; NaN of two temperatures."""
 
     @property
     def temperatures(self) -> tuple[float, ...]:
@@ -422,37 +371,27 @@ class EmissivityLine:
         design = np.stack([np.ones(away.size), away.ravel()], axis=1)
         return self.estimate.linear(design).reshape(*away.shape)
 
-    def weights(self, temperature: float) -> NDArray[np.float64]:
+    def weights(self, temperature: float) -> Array:
         """Weight of every mean in the emissivity at a temperature in K; their sum is 1."""
         away = np.array([1.0, temperature - self.middle])
-        found: NDArray[np.float64] = away @ np.linalg.pinv(_design(self.temperatures))
+        found: Array = away @ np.linalg.pinv(_design(self.temperatures))
         return found
 
     def area(self, temperature: float) -> AreaEmissivity:
-        """Emissivity of the area at a temperature in K.
-
-        Raises
-        ------
-        ValueError
-            If it is no temperature that a heated object has.
-        """
+        """Emissivity of the area at a temperature in K."""
         heating = replace(self.heatings[0], reference=temperature)
         return AreaEmissivity(self.name, self.feature, heating, self.at(temperature))
 
 
-def _design(temperatures: Sequence[float]) -> NDArray[np.float64]:
+def _design(temperatures: Sequence[float]) -> Array:
     """Design matrix of a line about the middle of the temperatures, shape (n, 2)."""
     kelvins = np.array(temperatures)
     return np.stack([np.ones_like(kelvins), kelvins - kelvins.mean()], axis=1)
 
 
-def emissivity_of_radiance(
-    radiance: NDArray[np.float64], heating: Heating, band: Band
-) -> NDArray[np.float64]:
+def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
     """Emissivity from in-band radiance in W/(m² sr), of any shape.
 
-    Notes
-    -----
     ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
     """
     ends = band.radiance(np.array([heating.reference, heating.reflected]))
@@ -496,20 +435,8 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
     )
 
 
-def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float64]:
-    """Covariance of the mean emissivities of several areas of one map.
-
-    Parameters
-    ----------
-    rows : sequence of RegionEmissivity
-        Areas of one map.
-
-    Returns
-    -------
-    ndarray
-        Shape (areas, areas). The errors of `COMMON` are the same in all areas, so a difference or
-        a ratio of two areas is known better than either.
-    """
+def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
+    """Covariance of the mean emissivities of several areas of one map."""
     observed = np.stack([row.observed for row in rows])
     chance = np.zeros((len(rows), len(rows)))
     if observed.shape[1] > 1:
@@ -522,18 +449,6 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float6
 def emissivity_line(rows: Sequence[RegionEmissivity | AreaEmissivity]) -> EmissivityLine:
     """Straight line through an area's emissivity at several temperatures, by least squares.
 
-    Parameters
-    ----------
-    rows : sequence of RegionEmissivity or AreaEmissivity
-        The same area at two temperatures or more.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two temperatures.
-
-    Notes
-    -----
     The line is that of ordinary least squares, a linear function of the means, through which
     their covariance is propagated (JCGM 100:2008, Equation 13). The errors of `COMMON` are the
     same at all temperatures. Chance is that of the rows, or the scatter about the line where that
@@ -593,8 +508,8 @@ def _floor(measurement: Measurement) -> float:
 
 
 def _calibration(
-    measurements: Sequence[Measurement], radiance: NDArray[np.float64], heating: Heating
-) -> NDArray[np.float64] | None:
+    measurements: Sequence[Measurement], radiance: Array, heating: Heating
+) -> Array | None:
     """Standard uncertainty of the mean radiance from the calibration, shape (y, x)."""
     if heating.camera_uncertainty is not None:
         band, spread = measurements[0].band, heating.camera_uncertainty
@@ -604,10 +519,10 @@ def _calibration(
     return stated_calibration(measurements)
 
 
-def _residual(about_line: NDArray[np.float64]) -> float:
+def _residual(about_line: Array) -> float:
     freedom = about_line.size - 2
     return sqrt(float((about_line**2).sum()) / freedom) if freedom else nan
 
 
 def _celsius(temperature: float) -> str:
-    return f"{temperature - _ZERO_CELSIUS:.6g} °C"
+    return f"{temperature - ZERO_CELSIUS:.6g} °C"

@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chipglow.io import write_dataset
 from chipglow.io.measurement_file import Made, read_dataset
@@ -23,7 +22,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.observations import RANDOM
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
-from chipglow.quantities import FileBeside, Parameter
+from chipglow.quantities import Array, FileBeside, Parameter
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import (
@@ -40,15 +39,7 @@ _HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty"
 
 
 def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) -> None:
-    """Write emissivity maps and their regions to a NetCDF-4 file.
-
-    Parameters
-    ----------
-    found : RegionEmissivities
-        Of one object, at one true temperature or several.
-    path : path-like
-        The file to write; one that is there is replaced at the end.
-    """
+    """Write emissivity maps and their regions to a NetCDF-4 file."""
     maps, rows = found.maps, found.rows
     raster = maps[0].raster
     images: dict[str, Any] = {
@@ -129,25 +120,7 @@ def _say_correlations(data: xr.Dataset) -> None:
 def read_region_emissivity(
     path: str | os.PathLike[str],
 ) -> dict[str, AreaEmissivity] | dict[str, EmissivityLine]:
-    """Read the emissivity of areas.
-
-    Parameters
-    ----------
-    path : path-like
-        A file of `write_emissivity`.
-
-    Returns
-    -------
-    dict
-        By the areas' names: of several true temperatures the line over the temperature.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file is cut short or no emissivity map; the message names the file.
-    """
+    """Read the emissivity of areas."""
     return _read(Path(path), _regions)
 
 
@@ -239,44 +212,19 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
 
 @dataclass(frozen=True)
 class MeasuredArea:
-    """An area's emissivity as a surface takes it.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    trend : EmissivityTrend
-        The line over the temperature; measured at one temperature, the same at all.
-    standard_deviation : float
-        Over the pixels; the mean of that at several temperatures.
-    """
+    """An area's emissivity as a surface takes it."""
 
     name: str
     feature: str
+    """The area's name, and the feature that it belongs to."""
     trend: EmissivityTrend
+    """The line over the temperature; measured at one temperature, the same at all."""
     standard_deviation: float
+    """Over the pixels; the mean of that at several temperatures."""
 
 
 def read_measured_areas(path: str | os.PathLike[str]) -> dict[str, MeasuredArea]:
-    """Read the emissivity of areas for surfaces.
-
-    Parameters
-    ----------
-    path : path-like
-        A file of `write_emissivity`.
-
-    Returns
-    -------
-    dict
-        By the areas' names.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file is cut short or no emissivity map; the message names the file.
-    """
+    """Read the emissivity of areas for surfaces."""
 
     def found(data: xr.Dataset) -> dict[str, MeasuredArea]:
         spreads = data["region_standard_deviation"].mean("reference").values.tolist()
@@ -310,7 +258,7 @@ def _trend(area: AreaEmissivity | EmissivityLine) -> EmissivityTrend:
     )
 
 
-def _pairs(effects: Sequence[NDArray[np.float64]]) -> tuple[tuple[float, float], ...]:
+def _pairs(effects: Sequence[Array]) -> tuple[tuple[float, float], ...]:
     return tuple((float(one), float(other)) for one, other in effects)
 
 

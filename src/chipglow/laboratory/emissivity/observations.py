@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
+from chipglow.quantities import Array
 from chipglow.uncertainty import Cause, Component, Estimate
 
 RANDOM: Final = "random"
@@ -17,26 +18,8 @@ _MANY_LEFT_OUT: Final = 0.05
 """Fraction of an area's pixels from which on it is a warning that they are left out."""
 
 
-def area_estimate(mean: float, values: NDArray[np.float64], identity: str) -> Estimate:
-    """The mean of an area with its random component: an analysis of variance.
-
-    Parameters
-    ----------
-    mean : float
-        The mean.
-    values : ndarray
-        What it is the mean of, shape (observation, pixel).
-    identity : str
-        Tells this area's observations from others.
-
-    Returns
-    -------
-    Estimate
-        With the component ``random``. Its parts are ``repeatability``, which changes from one
-        observation to the next in the whole area, over what noise explains; and the ``noise`` of
-        the pixels. Of one observation repeatability is unevaluated, and noise an upper limit: the
-        standard deviation over the pixels, of which noise is a part, by the root of their number.
-    """
+def area_estimate(mean: float, values: Array, identity: str) -> Estimate:
+    """The mean of an area with its random component: an analysis of variance."""
     observations, pixels = values.shape
     if observations == 1:
         noise = float(values[0].std(ddof=1)) / sqrt(pixels)
@@ -93,7 +76,7 @@ def check_same_pixels(
             )
 
 
-def observed_radiance(measurements: Sequence[Measurement]) -> NDArray[np.float64]:
+def observed_radiance(measurements: Sequence[Measurement]) -> Array:
     """Radiance of every observation in W/(m² sr), shape (observation, y, x).
 
     The frames of one image, or the means of several; NaN where a frame is flagged.
@@ -108,7 +91,7 @@ def observed_flags(measurements: Sequence[Measurement]) -> NDArray[np.uint8]:
     return np.asarray(np.bitwise_or.reduce(flags, axis=0), np.uint8)
 
 
-def stated_calibration(measurements: Sequence[Measurement]) -> NDArray[np.float64] | None:
+def stated_calibration(measurements: Sequence[Measurement]) -> Array | None:
     """Standard uncertainty of the mean radiance from the calibration, shape (y, x).
 
     In W/(m² sr); None unless all measurements state it.
@@ -137,5 +120,5 @@ def flag_text(flagged: dict[Flag, int]) -> str:
     return ", ".join(texts) or "none flagged"
 
 
-def _usable_radiance(measurement: Measurement) -> NDArray[np.float64]:
+def _usable_radiance(measurement: Measurement) -> Array:
     return np.where(measurement.usable.all(axis=0), measurement.radiance, np.nan)

@@ -25,21 +25,7 @@ _GREATEST_DEVIATION: Final = 0.5
 
 
 def surface_text(rows: Iterable[RegionEmissivity]) -> str:
-    """Sections of a study with the emissivities of its features, as YAML.
-
-    Parameters
-    ----------
-    rows : iterable of RegionEmissivity
-        Determined emissivities. What they are of is known by the name of their feature: chip body,
-        shear band, workpiece, tool.
-
-    Returns
-    -------
-    str
-        The sections ``surface`` and, with a chip, ``analysis``; empty if no feature is known or a
-        chip's body comes without its shear bands. A mean or standard deviation that no study takes
-        is left out.
-    """
+    """Sections of a study with the emissivities of its features, as YAML."""
     found = {
         _FIELDS[row.feature.lower()]: {
             "mean": round(row.mean, _DIGITS),
@@ -60,13 +46,7 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
 
 
 def measured_text(file: str | os.PathLike[str]) -> str:
-    """Sections of a study with the chip of a file of `write_emissivity`, as YAML.
-
-    Parameters
-    ----------
-    file : path-like
-        The file, which has the chip's body and its shear bands.
-    """
+    """Sections of a study with the chip of a file of `write_emissivity`, as YAML."""
     sections = {
         "surface": {"measured": {_CHIP: os.fspath(file)}},
         "analysis": {"rake_chip": _CHIP, "band_chip": _CHIP},
@@ -75,19 +55,7 @@ def measured_text(file: str | os.PathLike[str]) -> str:
 
 
 def measured_features(areas: Mapping[str, MeasuredArea]) -> dict[str, MeasuredArea]:
-    """Measured areas by the features of a study: body, shear_band, workpiece, tool.
-
-    Parameters
-    ----------
-    areas : mapping
-        As `read_measured_areas` gives them. Of several areas of a feature that counts which is
-        all of it: the one that is called as it is.
-
-    Raises
-    ------
-    ValueError
-        If the chip's body or its shear bands are not among them.
-    """
+    """Measured areas by the features of a study: body, shear_band, workpiece, tool."""
     number = Counter(area.feature for area in areas.values())
     found = {
         _FIELDS[area.feature.lower()]: area

@@ -11,7 +11,6 @@ from uuid import uuid4
 import numpy as np
 import pandas as pd
 import scipy
-from numpy.typing import NDArray
 
 from chipglow.camera import FittedCalibration, Flag, Measurement
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine, Heating
@@ -27,6 +26,7 @@ from chipglow.laboratory.emissivity.observations import (
     stated_calibration,
     uncertainty_columns,
 )
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_HOTTEST
 from chipglow.scene import Area, Region, areas
@@ -66,22 +66,10 @@ Emissivity: TypeAlias = DeterminedEmissivity | EmissivityLine
 
 @dataclass(frozen=True)
 class KnownEmissivity:
-    """An emissivity from elsewhere, whose errors have nothing to do with the measurement's.
-
-    Parameters
-    ----------
-    mean : float
-        Emissivity, over 0 to 1.
-    standard_uncertainty : float
-        Its standard uncertainty.
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
-    """
+    """An emissivity from elsewhere, whose errors have nothing to do with the measurement's."""
 
     mean: float
+    """Emissivity, over 0 to 1."""
     standard_uncertainty: float = 0.0
 
     def __post_init__(self) -> None:
@@ -101,23 +89,12 @@ class KnownEmissivity:
 
 @dataclass(frozen=True)
 class ReflectedTemperature:
-    """What an object reflects.
-
-    Parameters
-    ----------
-    temperature : float
-        In K; the paper's 293 K by default.
-    standard_uncertainty : float
-        In K.
-
-    Raises
-    ------
-    ValueError
-        If the temperature is not over 0 K or the uncertainty is negative.
-    """
+    """What an object reflects."""
 
     temperature: float = LABORATORY
+    """In K; the paper's 293 K by default."""
     standard_uncertainty: float = 0.0
+    """In K."""
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < inf:
@@ -138,45 +115,34 @@ class ReflectedTemperature:
 
 @dataclass(frozen=True, eq=False)
 class TrueTemperature:
-    """True temperature of an area; made by `true_temperature`.
-
-    Parameters
-    ----------
-    name : str
-        The area's name.
-    pixels, left_out : int
-        Number of pixels that count, and of those that do not, because they are flagged.
-    flagged : dict
-        How many have each `Flag`.
-    radiance_temperature : float
-        That of the area's mean radiance in K.
-    standard_deviation : float
-        Standard deviation over the pixels of the temperatures in K that each would have by
-        itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
-    mean_of_pixels : float
-        Mean of these temperatures in K: under the estimate where the area is uneven.
-    emissivity : float
-        Emissivity that was taken.
-    estimate : Estimate
-        True temperature in K, with the components ``reference`` (of the heating with which the
-        emissivity was determined), ``reflected``, ``calibration``, ``emissivity`` (by chance, or
-        as it is known), ``drift`` between recordings, that of the emissivity included, and
-        ``random``, of which ``repeatability`` and ``noise`` are parts.
-    correlation : float or None
-        Correlation of the calibration's errors at the radiances of area and emissivity; None if it
-        plays no part or is not known.
-    """
+    """True temperature of an area; made by `true_temperature`."""
 
     name: str
+    """The area's name."""
     pixels: int
     left_out: int
+    """Number of pixels that count, and of those that do not, because they are flagged."""
     flagged: dict[Flag, int]
+    """How many have each `Flag`."""
     radiance_temperature: float
+    """That of the area's mean radiance in K."""
     standard_deviation: float
+    """Standard deviation over the pixels of the temperatures in K that each would have by
+    itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
+    """
     mean_of_pixels: float
+    """Mean of these temperatures in K: under the estimate where the area is uneven."""
     emissivity: float
     estimate: Estimate
+    """True temperature in K, with the components ``reference`` (of the heating with which the
+    emissivity was determined), ``reflected``, ``calibration``, ``emissivity`` (by chance, or
+    as it is known), ``drift`` between recordings, that of the emissivity included, and
+    ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """
     correlation: float | None
+    """Correlation of the calibration's errors at the radiances of area and emissivity; None if it
+    plays no part or is not known.
+    """
 
 
 def true_temperature(
@@ -280,31 +246,13 @@ def true_temperature(
 
 @dataclass(frozen=True, eq=False)
 class RegionTemperatures:
-    """True temperatures of regions; made by `true_temperatures`.
-
-    Parameters
-    ----------
-    rows : tuple of TrueTemperature
-        One for each region of known emissivity.
-    notes : Notes
-        Assumptions and warnings.
-    """
+    """True temperatures of regions; made by `true_temperatures`."""
 
     rows: tuple[TrueTemperature, ...]
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            In K: columns ``region``, ``pixels``, ``left_out``, ``emissivity``,
-            ``radiance_temperature``, ``true_temperature``, ``standard_deviation`` over the pixels,
-            ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
-            ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
-            NaN where nothing is known.
-        """
+        """Every region, a row each."""
         return pd.DataFrame(
             {
                 "region": row.name,
@@ -329,27 +277,7 @@ def true_temperatures(
     drift: float | None = None,
     names: Sequence[str] = (),
 ) -> RegionTemperatures:
-    """True temperatures of the regions of an image.
-
-    Parameters
-    ----------
-    measurements : sequence of Measurement
-        Images of the object; several of them are repetitions.
-    regions : sequence of Region
-        Regions of uniform temperature.
-    emissivities : mapping or KnownEmissivity
-        By the regions' names, as `read_region_emissivity` gives them; a region without one is left
-        out. Or one for all.
-    surroundings, calibration, drift
-        As for `true_temperature`.
-    names : sequence of str
-        Names of the images, for errors; their numbers by default.
-
-    Raises
-    ------
-    ValueError
-        If the emissivity of no region is known, or as `true_temperature`.
-    """
+    """True temperatures of the regions of an image."""
     check_same_pixels(measurements, "temperature", names)
     found = areas(regions, measurements[0].raster)
     if isinstance(emissivities, KnownEmissivity):
@@ -394,7 +322,7 @@ def _far_from_the_heating(
         difference = abs(float(row.estimate.values) - heated)
         if difference > FAR:
             yield (
-                f"{row.name}: is {difference:.0f} K from the {heated - 273.15:.0f} °C "
+                f"{row.name}: is {difference:.0f} K from the {heated - ZERO_CELSIUS:.0f} °C "
                 "at which its emissivity was determined; what the temperature changes in the "
                 "emissivity is not in u."
             )
@@ -406,9 +334,9 @@ def _beyond_the_line(row: TrueTemperature, line: EmissivityLine) -> Iterator[str
     difference = max(low - found, found - high)
     if difference > FAR:
         yield (
-            f"{row.name}: is {difference:.0f} K beyond the {low - 273.15:.0f} °C to "
-            f"{high - 273.15:.0f} °C at which its emissivity was determined; that the line goes "
-            "on straight is not in u."
+            f"{row.name}: is {difference:.0f} K beyond the {low - ZERO_CELSIUS:.0f} °C to "
+            f"{high - ZERO_CELSIUS:.0f} °C at which its emissivity was determined; that the line "
+            "goes on straight is not in u."
         )
 
 
@@ -447,7 +375,7 @@ def _assumptions(
 
 
 def _seen(
-    values: NDArray[np.float64],
+    values: Array,
     calibration: float,
     shared: float,
     drift: float | None,
@@ -538,7 +466,7 @@ class _Equation:
         """Radiance in W/(m² sr) of a blackbody at the object's temperature."""
         return (radiance - (1 - self.emissivity) * self.reflected_radiance) / self.emissivity
 
-    def temperature(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def temperature(self, radiance: Array) -> Array:
         """True temperature in K of apparent radiance in W/(m² sr), of the same shape."""
         return np.asarray(self.band.temperature(self.own(radiance)), np.float64)
 
@@ -553,8 +481,8 @@ class _Equation:
         if not rise > 0:
             raise ValueError(
                 f"region {name}: by the line of its emissivity the radiance does not rise with "
-                f"the temperature at {value - 273.15:.6g} °C, expected an emissivity that falls "
-                "less"
+                f"the temperature at {value - ZERO_CELSIUS:.6g} °C, expected an emissivity that "
+                "falls less"
             )
         by_radiance = 1 / rise
         by_environment = -(1 - self.emissivity) * self._slope(self.reflected) * by_radiance
@@ -570,8 +498,8 @@ class _Equation:
 
 def _too_dark(name: str, reflected: float) -> ValueError:
     return ValueError(
-        f"region {name}: is darker than what it reflects at {reflected - 273.15:.6g} °C, expected "
-        "a hotter object"
+        f"region {name}: is darker than what it reflects at {reflected - ZERO_CELSIUS:.6g} °C, "
+        "expected a hotter object"
     )
 
 
@@ -599,8 +527,8 @@ def _taken(
             found = float(scipy.optimize.brentq(excess, colder, hotter, xtol=1e-6))
             return emissivity.area(found), emissivity.slope
     raise ValueError(
-        f"region {name}: no temperature up to {TABLE_HOTTEST - 273.15:.0f} °C has its radiance by "
-        "the line of its emissivity, expected an emissivity that falls less with the temperature"
+        f"region {name}: no temperature up to {TABLE_HOTTEST - ZERO_CELSIUS:.0f} °C has its radiance "
+        "by the line of its emissivity, expected an emissivity that falls less with the temperature"
     )
 
 

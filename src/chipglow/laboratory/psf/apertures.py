@@ -23,25 +23,6 @@ class ApertureList(Section):
 
 
 def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
-    """Read a list of images of apertures from a YAML file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file: ``apertures: [{file: small.nc, diameter: 50 um}, ...]``. Images are looked up
-        beside it.
-
-    Returns
-    -------
-    list of tuple
-        Each image's file and the aperture's diameter in m.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or no such list.
-    OSError
-        If the file cannot be read.
-    """
+    """Read a list of images of apertures from a YAML file."""
     found = load_described(ApertureList, path)
     return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]

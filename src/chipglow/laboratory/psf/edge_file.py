@@ -26,20 +26,6 @@ def load_edge(
 
     Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
     calibration holds beyond its range, as the edge needs no temperature.
-
-    Parameters
-    ----------
-    source, settings
-        As `load_measurement` takes them.
-    region : tuple of slice, optional
-        Rows and columns that show the edge; all by default.
-
-    Raises
-    ------
-    ValueError
-        If it is no image of an edge; the message names the file.
-    OSError
-        If a file cannot be read.
     """
     settings, name = list(settings), Path(source).name
     if is_measurement(source) or is_scene(source):

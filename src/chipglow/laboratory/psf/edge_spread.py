@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit
 from chipglow.laboratory.psf.psf_models import footprint_transfer
+from chipglow.quantities import Array
 
 BINS_PER_PITCH: Final = 4
 _WINDOW_PITCHES: Final = 10.0
@@ -17,82 +18,47 @@ _FREQUENCIES: Final = 65
 
 @dataclass(frozen=True, eq=False)
 class EdgeSpread:
-    """Edge-spread function: the mean of the pixels at each distance from the edge.
+    """Edge-spread function: the mean of the pixels at each distance from the edge."""
 
-    Parameters
-    ----------
-    distance : ndarray
-        Mean distance of a bin's pixels from the edge in m, shape (n,).
-    value, uncertainty : ndarray
-        Their mean, 0 for the dark and 1 for the bright side, and its standard uncertainty.
-    residual : ndarray
-        What the fitted model leaves of the value.
-    count : ndarray
-        Number of pixels.
-    width : float
-        Width of a bin in m.
-    """
-
-    distance: NDArray[np.float64]
-    value: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
-    residual: NDArray[np.float64]
+    distance: Array
+    """Mean distance of a bin's pixels from the edge in m, shape (n,)."""
+    value: Array
+    uncertainty: Array
+    """Their mean, 0 for the dark and 1 for the bright side, and its standard uncertainty."""
+    residual: Array
+    """What the fitted model leaves of the value."""
     count: NDArray[np.int64]
     width: float
+    """Width of a bin in m."""
 
 
 @dataclass(frozen=True, eq=False)
 class LineSpread:
-    """Line-spread function: the derivative of the edge-spread function.
+    """Line-spread function: the derivative of the edge-spread function."""
 
-    Parameters
-    ----------
-    distance : ndarray
-        Distance from the edge in m, shape (n,).
-    value, uncertainty : ndarray
-        In 1/m, and its standard uncertainty.
-    """
-
-    distance: NDArray[np.float64]
-    value: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
+    distance: Array
+    """Distance from the edge in m, shape (n,)."""
+    value: Array
+    uncertainty: Array
+    """In 1/m, and its standard uncertainty."""
 
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """Modulation transfer function of optics and pixel along the edge's normal.
+    """Modulation transfer function of optics and pixel along the edge's normal."""
 
-    Parameters
-    ----------
-    frequency : ndarray
-        Spatial frequency in 1/m, shape (n,), up to twice the pixels' Nyquist frequency.
-    value, uncertainty : ndarray
-        Measured, and its standard uncertainty.
-    model, optics : ndarray
-        That of the fitted model with the pixel, and of its optics alone.
-    """
-
-    frequency: NDArray[np.float64]
-    value: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
-    model: NDArray[np.float64]
-    optics: NDArray[np.float64]
+    frequency: Array
+    """Spatial frequency in 1/m, shape (n,), up to twice the pixels' Nyquist frequency."""
+    value: Array
+    uncertainty: Array
+    model: Array
+    optics: Array
+    """That of the fitted model with the pixel, and of its optics alone."""
 
 
 def edge_spread(fit: ModelFit, index: int, pixels: EdgePixels) -> EdgeSpread:
     """Bins of a quarter of the pitch along the fitted edge's normal.
 
-    Parameters
-    ----------
-    fit : ModelFit
-        Where the edge is, its background and its step.
-    index : int
-        Which of the fit's edges.
-    pixels : EdgePixels
-        The edge's pixels.
-
-    Notes
-    -----
     The uncertainty is that of a mean: from the scatter of the bin's pixels about the model where
     there are enough of them, but not less than the noise of all pixels as bright would give.
     """
@@ -107,7 +73,7 @@ def edge_spread(fit: ModelFit, index: int, pixels: EdgePixels) -> EdgeSpread:
     there = count > 0
     number = count[there]
 
-    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean(values: Array) -> Array:
         return np.asarray(np.bincount(bins, values)[there] / number)
 
     left = mean(residual)
@@ -137,17 +103,6 @@ def transfer_function(
     bins would end at the window, and what tails are beyond would be missing at low frequencies;
     here the model stands for them. The mean over a bin is made up for by its sinc; differences,
     for which ISO 12233 has a factor, are not taken.
-
-    Parameters
-    ----------
-    fit : ModelFit
-        The fit.
-    index : int
-        Which of its edges.
-    pixels : EdgePixels
-        The edge's pixels.
-    spread : EdgeSpread
-        Its edge-spread function.
     """
     edge = fit.edges[index]
     frequency = np.linspace(0.0, 1 / pixels.pitch, _FREQUENCIES)

@@ -20,13 +20,7 @@ _SHOWN_WIDTHS: Final = 5.0
 
 
 def draw_knife_edge(found: KnifeEdge) -> Figure:
-    """Draw each image with its edge, edge-spread function with the fit and what it leaves, and MTF.
-
-    Parameters
-    ----------
-    found : KnifeEdge
-        What was found.
-    """
+    """Draw each image, the edge-spread function with fit and residuals, and the MTF."""
     heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
     with drawing.style():
         figure = drawing.new_figure(sum(heights) + 0.4)

@@ -68,59 +68,35 @@ _SUBSAMPLES: Final = 9
 
 @dataclass(frozen=True, eq=False)
 class EdgeResult:
-    """What one image of an edge showed.
-
-    Parameters
-    ----------
-    image : EdgeImage
-        The image.
-    pixels : EdgePixels
-        Those of its pixels that were used; x and y from the image's middle.
-    spread : EdgeSpread
-        Oversampled edge-spread function.
-    line : LineSpread
-        Line-spread function.
-    transfer : TransferFunction
-        Modulation transfer function.
-    noise : float
-        Standard deviation of a pixel on the dark side in W/(m² sr).
-    fwhm, fwhm_uncertainty : float
-        Full width at half maximum in m by this edge alone, and its standard uncertainty.
-    line_fwhm : float
-        Full width at half maximum of the line-spread function in m: optics and pixel.
-    """
+    """What one image of an edge showed."""
 
     image: EdgeImage
     pixels: EdgePixels
+    """Those of its pixels that were used; x and y from the image's middle."""
     spread: EdgeSpread
+    """Oversampled edge-spread function."""
     line: LineSpread
     transfer: TransferFunction
     noise: float
+    """Standard deviation of a pixel on the dark side in W/(m² sr)."""
     fwhm: float
     fwhm_uncertainty: float
+    """Full width at half maximum in m by this edge alone, and its standard uncertainty."""
     line_fwhm: float
+    """Full width at half maximum of the line-spread function in m: optics and pixel."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnifeEdge:
-    """A camera's point spread function by the knife-edge method.
-
-    Parameters
-    ----------
-    edges : tuple of EdgeResult
-        What each image showed.
-    fits : tuple of ModelFit
-        Models of the optics fitted to all images at once, the best by the Bayesian information
-        criterion first.
-    apertures : ApertureSignals or None
-        Signals of apertures that were fitted with the edges.
-    notes : Notes
-        Assumptions and warnings.
-    """
+    """A camera's point spread function by the knife-edge method."""
 
     edges: tuple[EdgeResult, ...]
     fits: tuple[ModelFit, ...]
+    """Models of the optics fitted to all images at once, the best by the Bayesian information
+    criterion first.
+    """
     apertures: ApertureSignals | None
+    """Signals of apertures that were fitted with the edges."""
     notes: Notes
 
     @cached_property
@@ -171,15 +147,7 @@ class KnifeEdge:
         return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
 
     def to_frame(self) -> pd.DataFrame:
-        """The models, a row each, the best first.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``model``, ``fwhm_um`` of the optics with its ``fwhm_uncertainty_um``, Akaike's
-            and the Bayesian information criterion less those of the best, ``aicc`` and ``bic``, the
-            ``weight``, and the ``reduced_chi_squared``.
-        """
+        """The models, a row each, the best first."""
         return pd.DataFrame(
             {
                 "model": fit.model.name,
@@ -194,25 +162,11 @@ class KnifeEdge:
         )
 
     def edge_frame(self) -> pd.DataFrame:
-        """The images, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``image``, ``normal_deg`` of the edge, ``fwhm_um`` of the optics by it alone,
-            ``mtf_at_nyquist``, each with its uncertainty; ``line_fwhm_um`` of the line-spread
-            function, and ``step_over_noise``.
-        """
+        """The images, a row each."""
         return pd.DataFrame(map(_edge_row, self.edges, self.best.edges))
 
     def fit(self, name: str) -> ModelFit:
-        """The fit of a model by its name.
-
-        Raises
-        ------
-        ValueError
-            If there is no such fit.
-        """
+        """The fit of a model by its name."""
         for fit in self.fits:
             if fit.model.name == name:
                 return fit
@@ -222,21 +176,7 @@ class KnifeEdge:
     def psf(
         self, part: Literal["optics", "system"] = "optics", model: str | None = None
     ) -> PointSpreadFunction:
-        """The point spread function, for ``Camera(psf=...)``.
-
-        Parameters
-        ----------
-        part : {"optics", "system"}
-            That of the optics alone, for a camera whose ``psf_order`` is ``optics``; or that of
-            optics and pixel together, as an edge shows it.
-        model : str, optional
-            Name of a model, or ``radial`` for the one without a model; the best by default.
-
-        Raises
-        ------
-        ValueError
-            If there is no such model or part.
-        """
+        """The point spread function, for ``Camera(psf=...)``."""
         if part not in ("optics", "system"):
             raise ValueError(f"part: {part!r}, expected optics or system")
         if model == RADIAL:
