@@ -57,7 +57,11 @@ def determine_emissivities(
     maps = tuple(determine_emissivity(group, heating) for heating, group in groups.items())
     found = areas(regions, maps[0].raster)
     rows = tuple(tuple(one.of(area) for area in found) for one in maps)
-    lines = map(emissivity_line, zip(*rows, strict=True)) if len(maps) > 1 else ()
+    lines = (
+        [emissivity_line([row.line for row in of]) for of in zip(*rows, strict=True)]
+        if len(maps) > 1
+        else ()
+    )
     notes = _notes(maps, rows)
     notes.assumed.extend(
         f"{one} and {other} share {count} pixels, which count in both."
@@ -72,10 +76,10 @@ def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
         "feature": row.feature,
         "reference_K": row.heating.reference,
         "reflected_K": row.heating.reflected,
-        "pixels": row.pixels,
-        "under_range": row.flagged[Flag.UNDER_RANGE],
-        "saturated": row.flagged[Flag.SATURATED],
-        "dead": row.flagged[Flag.DEAD],
+        "pixels": row.used.count,
+        "under_range": row.used.flagged[Flag.UNDER_RANGE],
+        "saturated": row.used.flagged[Flag.SATURATED],
+        "dead": row.used.flagged[Flag.DEAD],
         "under_0": row.outside[0],
         "over_1": row.outside[1],
         "mean": row.mean,

@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import yaml
 
-from chipglow.laboratory.emissivity.emissivity import RegionEmissivity
-from chipglow.laboratory.emissivity.file import MeasuredArea
+from chipglow.laboratory.emissivity.emissivity import EmissivityLine, RegionEmissivity
 
 _FIELDS: Final[Mapping[str, str]] = {
     "chip": "body",
@@ -54,8 +53,11 @@ def measured_text(file: str | os.PathLike[str]) -> str:
     return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
 
 
-def measured_features(areas: Mapping[str, MeasuredArea]) -> dict[str, MeasuredArea]:
-    """Measured areas by the features of a study: body, shear_band, workpiece, tool."""
+def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
+    """Measured areas by the features of a study: body, shear_band, workpiece, tool.
+
+    Of several areas of a feature the one that is called like it counts.
+    """
     number = Counter(area.feature for area in areas.values())
     found = {
         _FIELDS[area.feature.lower()]: area
