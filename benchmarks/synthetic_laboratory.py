@@ -438,12 +438,12 @@ class Evaluation:
         factor = NormalDist().inv_cdf(0.975)
         images = self.images("edge-*")
         result = knife_edge([edge_image(image, f"edge {k}") for k, image in enumerate(images, 1)])
-        transfer = result.edges[0].transfer
-        at = int(np.argmin(np.abs(transfer.frequency - FREQUENCY)))
+        curves = result.edges[0].curves
+        at = int(np.argmin(np.abs(curves["frequency"].values - FREQUENCY)))
         return {
             "PSF, full width": Found(result.fwhm, factor * result.fwhm_uncertainty),
             "MTF at 31 /mm": Found(
-                float(transfer.value[at]), factor * float(transfer.uncertainty[at])
+                float(curves["mtf"][at]), factor * float(curves["mtf_uncertainty"][at])
             ),
         }
 

@@ -12,21 +12,14 @@ from typing import Final, Literal
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
 from scipy.special import chdtri
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
-from chipglow.laboratory.psf.edge_spread import (
-    BINS_PER_PITCH,
-    EdgeSpread,
-    LineSpread,
-    TransferFunction,
-    edge_spread,
-    line_spread,
-    transfer_function,
-)
+from chipglow.laboratory.psf.edge_spread import BINS_PER_PITCH, edge_curves
 from chipglow.laboratory.psf.psf_fit import (
     ApertureSignals,
     EdgePixels,
@@ -73,10 +66,8 @@ class EdgeResult:
     image: EdgeImage
     pixels: EdgePixels
     """Those of its pixels that were used; x and y from the image's middle."""
-    spread: EdgeSpread
-    """Oversampled edge-spread function."""
-    line: LineSpread
-    transfer: TransferFunction
+    curves: xr.Dataset
+    """Edge-spread, line-spread and modulation transfer function; see `edge_curves`."""
     noise: float
     """Standard deviation of a pixel on the dark side in W/(m² sr)."""
     fwhm: float
@@ -105,7 +96,7 @@ class KnifeEdge:
         return radial_psf(
             self.best,
             [edge.pixels for edge in self.edges],
-            [edge.spread for edge in self.edges],
+            [edge.curves for edge in self.edges],
             self.apertures,
             np.random.default_rng(_SEED),
         )
@@ -141,7 +132,7 @@ class KnifeEdge:
     @property
     def unexplained(self) -> bool:
         """Whether the best model leaves what noise does in less than one of a hundred edges."""
-        bins = sum(edge.spread.distance.size for edge in self.edges)
+        bins = sum(edge.curves["distance"].size for edge in self.edges)
         free = max(bins - self.best.free, 1)
         chance = float(chdtri(free, _BY_CHANCE)) / free
         return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
@@ -187,8 +178,7 @@ class KnifeEdge:
 
 
 def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
-    transfer = edge.transfer
-    half = int(np.argmin(np.abs(transfer.frequency - 0.5 / edge.image.pitch)))
+    half = int(np.argmin(np.abs(edge.curves["frequency"].values - 0.5 / edge.image.pitch)))
     return {
         "image": edge.image.name,
         "normal_deg": degrees(fitted.line.normal),
@@ -197,8 +187,8 @@ def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
         "fwhm_uncertainty_um": 1e6 * edge.fwhm_uncertainty,
         "line_fwhm_um": 1e6 * edge.line_fwhm,
         "step_over_noise": fitted.step / edge.noise,
-        "mtf_at_nyquist": float(transfer.value[half]),
-        "mtf_at_nyquist_uncertainty": float(transfer.uncertainty[half]),
+        "mtf_at_nyquist": float(edge.curves["mtf"][half]),
+        "mtf_at_nyquist_uncertainty": float(edge.curves["mtf_uncertainty"][half]),
     }
 
 
@@ -246,10 +236,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     )
     best = fits[0]
     alone = len(edges) == 1 and signals is None
-    spreads = [edge_spread(best, k, edge) for k, edge in enumerate(edges)]
-    results = tuple(
-        _result(best, k, images[k], edges[k], spreads[k], alone) for k in range(len(edges))
-    )
+    results = tuple(_result(best, k, images[k], edges[k], alone) for k in range(len(edges)))
     for k, result in enumerate(results):
         notes.warnings.extend(_edge_warnings(best, k, result))
     notes.warnings.extend(_fit_warnings(best, results))
@@ -302,7 +289,6 @@ def _result(
     k: int,
     image: EdgeImage,
     pixels: EdgePixels,
-    spread: EdgeSpread,
     alone: bool,
 ) -> EdgeResult:
     own = best
@@ -314,9 +300,7 @@ def _result(
     return EdgeResult(
         image,
         pixels,
-        spread,
-        line_spread(spread),
-        transfer_function(best, k, pixels, spread),
+        edge_curves(best, k, pixels),
         float(np.median(pixels.sigma[dark])),
         own.fwhm,
         own.fwhm_uncertainty,
@@ -391,8 +375,8 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
 
 def _left(edge: EdgeResult) -> float:
     """Root of the mean square of what the model leaves near the edge, as a fraction of the step."""
-    near = np.abs(edge.spread.distance) < 2 * edge.line_fwhm
-    return float(np.sqrt(np.mean(edge.spread.residual[near] ** 2)))
+    near = np.abs(edge.curves["distance"].values) < 2 * edge.line_fwhm
+    return float(np.sqrt(np.mean(edge.curves["esf_residual"].values[near] ** 2)))
 
 
 def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:

@@ -27,6 +27,7 @@ which moves the width by a third of its standard uncertainty where noise is 1/20
 _TAIL_ENERGY: Final = 0.9999
 _KERNEL_NODES: Final = 3
 _MOST_SIDE: Final = 1025
+_LARGEST_WIDTH: Final = 1e-3
 _LENGTHS: Final = ("fwhm", "diameter")
 _EVEN_DISC: Final = 30.0
 """A disc of so many deviations of its blur is half as bright at its rim, within its 2000th."""
@@ -40,34 +41,49 @@ class PSFModel(ABC):
 
     name: str
     parameters: tuple[str, ...]
-    """Names of its parameters; `is_length` says which are in m, others are pure numbers."""
+    """Names of its parameters; `is_length` tells which are in m, others are pure numbers."""
 
     @abstractmethod
     def starts(self, fwhm: float) -> list[list[float]]:
-        """Parameters to begin a fit with, for about this full width at half maximum in m."""
+        """Initial parameters of a fit, for about this full width at half maximum in m."""
 
     @abstractmethod
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """Least and greatest parameters, for a pitch and an extent of the image in m."""
+        """Smallest and largest parameters, for a pitch and an extent of the image in m."""
 
     @abstractmethod
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """Optical transfer function."""
+        """Optical transfer function at frequencies in 1/m along an angle in rad."""
 
-    @abstractmethod
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        """Light per area, up to a factor, at positions in m from the middle."""
+        raise NotImplementedError
+
+    def sampling(self, values: Array) -> tuple[float, float]:
+        """Distance up to which the kernel reaches, and its spacing, in m."""
+        raise NotImplementedError
+
     def fwhm(self, values: Array) -> float:
         """Full width at half maximum of the optics' point spread function in m."""
+        zero = np.zeros(())
+        half = float(self.density(values, zero, zero)) / 2
+        reach, _ = self.sampling(values)
+        return 2 * float(
+            brentq(lambda r: float(self.density(values, np.array(r), zero)) - half, 0.0, reach)
+        )
 
-    @abstractmethod
     def psf(self, values: Array) -> PointSpreadFunction:
         """The optics' point spread function, for a camera of order ``optics``."""
+        return MeasuredPSF(
+            *sampled_kernel(lambda x, y: self.density(values, x, y), *self.sampling(values))
+        )
 
     def mean_transfer(self, values: Array, frequency: Array) -> Array:
         """Mean of the transfer function over all directions."""
         return self.transfer(values, frequency, 0.0)
 
     def scales(self, pitch: float) -> Array:
-        """What a step of 1 in a fit means for each parameter."""
+        """Size of a step of 1 in a fit, for each parameter."""
         return np.array([pitch if is_length(name) else 1.0 for name in self.parameters])
 
 
@@ -78,29 +94,24 @@ def is_length(parameter: str) -> bool:
 
 @dataclass(frozen=True)
 class GaussianModel(PSFModel):
-    """A round Gaussian."""
+    """A round Gaussian; its transfer function is exp(−2π²σ²f²)."""
 
     name = "gaussian"
     parameters = ("fwhm",)
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.02 * pitch], [min(extent, 1e-3)]
+        return [0.02 * pitch], [min(extent, _LARGEST_WIDTH)]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """exp(−2π²σ²f²)."""
         return _gaussian_transfer(values[0], frequency)
 
     def fwhm(self, values: Array) -> float:
-        """See `PSFModel.fwhm`."""
         return float(values[0])
 
     def psf(self, values: Array) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
         return GaussianPSF(float(values[0]))
 
 
@@ -117,46 +128,30 @@ class GaussianTailModel(PSFModel):
     parameters = ("core_fwhm", "tail_fraction", "tail_ratio")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[0.9 * fwhm, fraction, ratio] for fraction, ratio in ((0.1, 4.0), (0.25, 1.5))]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.02 * pitch, 0.0, 0.72], [min(extent, 1e-3), 0.95, extent / pitch]
+        return [0.02 * pitch, 0.0, 0.72], [min(extent, _LARGEST_WIDTH), 0.95, extent / pitch]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """Sum of the core's and the tail's."""
-        core, fraction, length = self._numbers(values)
-        tail = (1 + (2 * pi * length * frequency) ** 2) ** -1.5
+        core, fraction, ratio = values
+        tail = (1 + (2 * pi * ratio * core * frequency) ** 2) ** -1.5
         return np.asarray((1 - fraction) * _gaussian_transfer(core, frequency) + fraction * tail)
 
-    def fwhm(self, values: Array) -> float:
-        """See `PSFModel.fwhm`."""
-        half = self._density(values, np.array(0.0)) / 2
-        far = 2.0 * max(1.0, values[2]) * values[0]
-        found = brentq(lambda r: float(self._density(values, np.array(r)) - half), 0.0, far)
-        return 2 * float(found)
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        core, fraction, ratio = values
+        sigma, length, radius = core / FWHM_PER_SIGMA, ratio * core, np.hypot(x, y)
+        gauss = np.exp(-(radius**2) / (2 * sigma**2)) / sigma**2
+        tail = np.exp(-radius / length) / length**2
+        return np.asarray((1 - fraction) * gauss + fraction * tail)
 
-    def psf(self, values: Array) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
-        core, fraction, length = self._numbers(values)
+    def sampling(self, values: Array) -> tuple[float, float]:
+        core, fraction, length = float(values[0]), float(values[1]), float(values[2] * values[0])
         reach = 2.0 * core
         # Of the tail, (1 + r / length) exp(−r / length) is beyond r.
         while fraction * (1 + reach / length) * exp(-reach / length) > 1 - _TAIL_ENERGY:
             reach += 0.5 * length
-        return sampled_psf(lambda x, y: self._density(values, np.hypot(x, y)), reach, core / 8)
-
-    def _numbers(self, values: Array) -> tuple[float, float, float]:
-        """Width of the core in m, fraction of the tail, length of the tail in m."""
-        core, fraction, ratio = values
-        return float(core), float(fraction), float(ratio * core)
-
-    def _density(self, values: Array, radius: Array) -> Array:
-        core, fraction, length = self._numbers(values)
-        sigma = core / FWHM_PER_SIGMA
-        gauss = np.exp(-(radius**2) / (2 * sigma**2)) / sigma**2
-        tail = np.exp(-radius / length) / length**2
-        return np.asarray(((1 - fraction) * gauss + fraction * tail) / (2 * pi))
+        return reach, core / 8
 
 
 @dataclass(frozen=True)
@@ -169,12 +164,10 @@ class AnnularModel(PSFModel):
     parameters = ("numerical_aperture", "obscured_area")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         aperture = min(0.9, 0.49 * self.wavelength / fwhm)
         return [[aperture, area] for area in (0.02, 0.12, 0.35)]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
         return [max(1e-4, 0.4 * self.wavelength / extent), 0.0], [1.0, 0.81]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
@@ -182,17 +175,12 @@ class AnnularModel(PSFModel):
         inner = sqrt(max(values[1], 0.0))
         shift = frequency * self.wavelength / values[0]
         shared = _lens(1.0, 1.0, shift) - 2 * _lens(1.0, inner, shift) + _lens(inner, inner, shift)
-        return np.asarray(shared / (pi * (1 - inner**2)))
+        return shared / (pi * (1 - inner**2))
 
     def fwhm(self, values: Array) -> float:
-        """See `PSFModel.fwhm`."""
-        return self._aperture(values).fwhm
+        return self.psf(values).fwhm
 
     def psf(self, values: Array) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
-        return self._aperture(values)
-
-    def _aperture(self, values: Array) -> AnnularAperturePSF:
         aperture, area = min(float(values[0]), 1.0), float(np.clip(values[1], 0.0, 0.81))
         return AnnularAperturePSF(self.wavelength, aperture, sqrt(area))
 
@@ -209,15 +197,12 @@ class MoffatModel(PSFModel):
     parameters = ("fwhm", "exponent")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm, 1.8], [fwhm, 3.5]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.02 * pitch, 1.2], [min(extent, 1e-3), 20.0]
+        return [0.02 * pitch, 1.2], [min(extent, _LARGEST_WIDTH), 20.0]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """That of the notes."""
         cycles = 2 * pi * self._radius(values) * frequency
         order = float(values[1]) - 1
         bessel = kve(order, _MOFFAT_NODES) * np.exp(-_MOFFAT_NODES)
@@ -227,23 +212,19 @@ class MoffatModel(PSFModel):
         result = np.where(cycles < _MOFFAT_NODES[0], 1.0, 0.0)
         some = (cycles >= _MOFFAT_NODES[0]) & (cycles < _MOFFAT_NODES[-1])
         result[some] = curve(np.log(cycles[some]))
-        return np.asarray(result)
+        return result
+
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        return np.asarray((1 + (x**2 + y**2) / self._radius(values) ** 2) ** -values[1])
+
+    def sampling(self, values: Array) -> tuple[float, float]:
+        fwhm, exponent = values.tolist()
+        # (1 + (r / a)²)^(1 − exponent) of the light is beyond r.
+        reach = self._radius(values) * sqrt((1 - _TAIL_ENERGY) ** (1 / (1 - exponent)) - 1)
+        return max(min(reach, _MOST_WIDTHS * fwhm), 2 * fwhm), fwhm / 8
 
     def fwhm(self, values: Array) -> float:
-        """See `PSFModel.fwhm`."""
         return float(values[0])
-
-    def psf(self, values: Array) -> PointSpreadFunction:
-        """See `PSFModel.psf`; the kernel ends where a ten-thousandth of the light is beyond."""
-        exponent, radius = float(values[1]), self._radius(values)
-        # (1 + (r / a)²)^(1 − exponent) of the light is beyond r.
-        reach = radius * sqrt((1 - _TAIL_ENERGY) ** (1 / (1 - exponent)) - 1)
-        reach = min(reach, _MOST_WIDTHS * float(values[0]))
-
-        def density(x: Array, y: Array) -> Array:
-            return np.asarray((1 + (x**2 + y**2) / radius**2) ** -exponent)
-
-        return sampled_psf(density, max(reach, 2 * float(values[0])), float(values[0]) / 8)
 
     def _radius(self, values: Array) -> float:
         """The length a in m."""
@@ -262,50 +243,24 @@ class DefocusedDiscModel(PSFModel):
     parameters = ("disc_diameter", "blur_fwhm")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm, 0.2 * fwhm], [fwhm, 0.6 * fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.1 * pitch, 0.02 * pitch], [min(extent, 1e-3)] * 2
+        return [0.1 * pitch, 0.02 * pitch], [min(extent, _LARGEST_WIDTH)] * 2
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """Product of the disc's and the Gaussian's."""
-        argument = pi * values[0] * frequency
-        safe = np.where(argument == 0.0, 1.0, argument)
-        disc = np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
-        return np.asarray(disc * _gaussian_transfer(values[1], frequency))
+        return disc_transfer(values[0] / 2 * frequency) * _gaussian_transfer(values[1], frequency)
 
-    def fwhm(self, values: Array) -> float:
-        """See `PSFModel.fwhm`."""
-        radius, sigma = self._lengths(values)
-        if radius > _EVEN_DISC * sigma:
-            return float(values[0])
-        half = self._density(values, np.array(0.0)) / 2
-        far = radius + 3 * sigma
-        found = brentq(lambda r: float(self._density(values, np.array(r)) - half), 0.0, far)
-        return 2 * float(found)
-
-    def psf(self, values: Array) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
-        radius, sigma = self._lengths(values)
-        fine = max(min(radius / 8, sigma), radius / 40)
-
-        def density(x: Array, y: Array) -> Array:
-            return self._density(values, np.hypot(x, y))
-
-        return sampled_psf(density, radius + 5 * sigma, fine)
-
-    def _lengths(self, values: Array) -> tuple[float, float]:
-        """Radius of the disc and standard deviation of the blur in m."""
-        return float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
-
-    def _density(self, values: Array, radius: Array) -> Array:
+    def density(self, values: Array, x: Array, y: Array) -> Array:
         """Light of the disc that the blur puts on a point: the noncentral chi-squared."""
-        disc, sigma = self._lengths(values)
+        disc, sigma, radius = values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y)
         if disc > _EVEN_DISC * sigma:
             return np.asarray(ndtr((disc - radius) / sigma))
         return np.asarray(chndtr((disc / sigma) ** 2, 2.0, (radius / sigma) ** 2))
+
+    def sampling(self, values: Array) -> tuple[float, float]:
+        radius, sigma = float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
+        return radius + 5 * sigma, max(min(radius / 8, sigma), radius / 40)
 
 
 @dataclass(frozen=True)
@@ -324,21 +279,17 @@ class EllipticalModel(PSFModel):
         return ("fwhm_x", "fwhm_y", "correlation") if self.tilted else ("fwhm_x", "fwhm_y")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm, fwhm, 0.0] if self.tilted else [fwhm, fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        low, high = [0.02 * pitch] * 2, [min(extent, 1e-3)] * 2
+        low, high = [0.02 * pitch] * 2, [min(extent, _LARGEST_WIDTH)] * 2
         return ([*low, -0.99], [*high, 0.99]) if self.tilted else (low, high)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """That of a Gaussian with the width along the angle."""
         along = np.array([cos(angle), sin(angle)])
         return _gaussian_transfer(sqrt(float(along @ self._squares(values) @ along)), frequency)
 
     def mean_transfer(self, values: Array, frequency: Array) -> Array:
-        """See `PSFModel.mean_transfer`."""
         angles = np.arange(8) * pi / 8
         return np.asarray(
             np.mean([self.transfer(values, frequency, angle) for angle in angles], axis=0)
@@ -348,22 +299,14 @@ class EllipticalModel(PSFModel):
         """Geometric mean of the two widths along the ellipse's axes in m."""
         return sqrt(sqrt(float(np.linalg.det(self._squares(values)))))
 
-    def axes(self, values: Array) -> tuple[float, float, float]:
-        """Greatest and least width in m, and the direction of the greatest in rad from x."""
-        squares, directions = np.linalg.eigh(self._squares(values))
-        direction = float(np.arctan2(directions[1, 1], directions[0, 1])) % pi
-        return sqrt(float(squares[1])), sqrt(float(squares[0])), direction
-
-    def psf(self, values: Array) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
+    def density(self, values: Array, x: Array, y: Array) -> Array:
         inverse = np.linalg.inv(self._squares(values)) * FWHM_PER_SIGMA**2
-        greatest, least, _ = self.axes(values)
+        form = inverse[0, 0] * x**2 + 2 * inverse[0, 1] * x * y + inverse[1, 1] * y**2
+        return np.asarray(np.exp(-form / 2))
 
-        def density(x: Array, y: Array) -> Array:
-            form = inverse[0, 0] * x**2 + 2 * inverse[0, 1] * x * y + inverse[1, 1] * y**2
-            return np.asarray(np.exp(-form / 2))
-
-        return sampled_psf(density, 2.0 * greatest, least / 8)
+    def sampling(self, values: Array) -> tuple[float, float]:
+        least, greatest = np.sqrt(np.linalg.eigvalsh(self._squares(values))).tolist()
+        return 2.0 * greatest, least / 8
 
     def _squares(self, values: Array) -> Array:
         both = values[2] * values[0] * values[1] if self.tilted else 0.0
@@ -450,15 +393,6 @@ def disc_response(
     return np.asarray(weight)
 
 
-def sampled_psf(
-    density: Callable[[Array, Array], Array],
-    reach: float,
-    spacing: float,
-) -> MeasuredPSF:
-    """Point spread function of a density over the plane; parameters as of `sampled_kernel`."""
-    return MeasuredPSF(*sampled_kernel(density, reach, spacing))
-
-
 def sampled_kernel(
     density: Callable[[Array, Array], Array],
     reach: float,
@@ -475,6 +409,13 @@ def sampled_kernel(
             x, y = line[None, :, j], line[::-1, i, None]
             kernel += weight[i] * weight[j] * density(x, y)
     return kernel, spacing
+
+
+def disc_transfer(cycles: Array) -> Array:
+    """Transfer function of an even disc over frequency times radius."""
+    argument = 2 * pi * cycles
+    safe = np.where(argument == 0.0, 1.0, argument)
+    return np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
 
 
 def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:

@@ -14,13 +14,17 @@ from functools import partial
 from typing import Final, TypeAlias
 
 import numpy as np
+import xarray as xr
 from scipy.optimize import nnls
-from scipy.special import j1
 
 from chipglow.camera import MeasuredPSF
-from chipglow.laboratory.psf.edge_spread import EdgeSpread
 from chipglow.laboratory.psf.psf_fit import ApertureSignals, EdgePixels, ModelFit
-from chipglow.laboratory.psf.psf_models import disc_response, edge_response, sampled_kernel
+from chipglow.laboratory.psf.psf_models import (
+    disc_response,
+    disc_transfer,
+    edge_response,
+    sampled_kernel,
+)
 from chipglow.quantities import Array
 from chipglow.uncertainty import Cause, Component, Estimate
 
@@ -114,7 +118,7 @@ class RadialPSF:
 def radial_psf(
     fit: ModelFit,
     edges: Sequence[EdgePixels],
-    spreads: Sequence[EdgeSpread],
+    curves: Sequence[xr.Dataset],
     apertures: ApertureSignals | None,
     generator: np.random.Generator,
 ) -> RadialPSF:
@@ -125,7 +129,7 @@ def radial_psf(
     estimated by the change with a hundredth of that weight. The repeats draw the model too.
     """
     radii = _radii(fit, edges)
-    design, left = _rows(fit, edges, spreads, apertures, radii)
+    design, left = _rows(fit, edges, curves, apertures, radii)
     penalty = _penalty(radii, _core(fit, edges))
     fractions_by = _shares_by(fit, radii)
     model = fractions_by(fit.values)
@@ -193,24 +197,25 @@ def _core(fit: ModelFit, edges: Sequence[EdgePixels]) -> float:
 def _rows(
     fit: ModelFit,
     edges: Sequence[EdgePixels],
-    spreads: Sequence[EdgeSpread],
+    curves: Sequence[xr.Dataset],
     apertures: ApertureSignals | None,
     radii: Array,
 ) -> tuple[Array, Array]:
     """Design, and what the model leaves of the data, over the noise, of bins and apertures."""
     rows, data = [], []
-    for found, pixels, spread in zip(fit.edges, edges, spreads, strict=True):
+    for found, pixels, one in zip(fit.edges, edges, curves, strict=True):
+        uncertainty = one["esf_uncertainty"].values
         columns = [
             edge_response(
                 partial(_ring_transfer, radii, k),
                 found.line.normal,
                 pixels.footprint,
                 pixels.reach,
-            )(spread.distance)
+            )(one["distance"].values)
             for k in range(radii.size - 1)
         ]
-        rows.append(np.array(columns).T / spread.uncertainty[:, None])
-        data.append(spread.residual / spread.uncertainty)
+        rows.append(np.array(columns).T / uncertainty[:, None])
+        data.append(one["esf_residual"].values / uncertainty)
     if apertures is not None:
         transfers = [_ring_transfer(radii, k, apertures.frequency) for k in range(radii.size - 1)]
         sigma = apertures.sigma / fit.source
@@ -224,15 +229,10 @@ def _rows(
 def _ring_transfer(radii: Array, k: int, frequency: Array) -> Array:
     """Transfer function of an even ring."""
     inner, outer = radii[k], radii[k + 1]
-    whole = outer**2 * _jinc(frequency * outer) - inner**2 * _jinc(frequency * inner)
+    whole = outer**2 * disc_transfer(frequency * outer) - inner**2 * disc_transfer(
+        frequency * inner
+    )
     return np.asarray(whole / (outer**2 - inner**2))
-
-
-def _jinc(cycles: Array) -> Array:
-    """Transfer function of an even disc over frequency times radius."""
-    argument = 2 * np.pi * cycles
-    safe = np.where(argument == 0.0, 1.0, argument)
-    return np.asarray(np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe))
 
 
 def _penalty(radii: Array, width: float) -> Array:
