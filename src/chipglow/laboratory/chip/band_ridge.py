@@ -195,7 +195,7 @@ def _climbed(points: Array, image: ThermalImage, coefficients: Array) -> Array:
     place, inside = highest(profiles, offsets)
     # A parabola of nearly equal values may leave its interval.
     moved = np.where(inside, np.clip(place, -_SEARCH * pitch, _SEARCH * pitch), 0.0)
-    return np.asarray(points + moved[:, None] * normals_of(points))
+    return points + moved[:, None] * normals_of(points)
 
 
 def _profiles(

@@ -248,7 +248,7 @@ class _Strip:
         """What the model leaves of each row, as a fraction of its level, shape (rows, pixels)."""
         steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
         left = _remainder(self.windows, _decays(steps, float(line[2])))
-        return np.asarray(left / self.level[:, None])
+        return left / self.level[:, None]
 
 
 def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:

@@ -284,7 +284,7 @@ def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
     left, right, bottom, top = raster.extent
     x, y, rim = points[..., 0], points[..., 1], raster.spacing
     across = (x > left + rim) & (x < right - rim)
-    return np.asarray(across & (y > bottom + rim) & (y < top - rim))
+    return across & (y > bottom + rim) & (y < top - rim)
 
 
 def _profile(frame: Frame, raster: Raster, tool: Tool, heights: Array) -> Array:

@@ -83,7 +83,7 @@ class ShearBand:
     def middle_half(self) -> NDArray[np.bool_]:
         """Which points are on the middle half of the curve, shape (n,)."""
         fraction = (self.ridge.distance - self.start) / self.length
-        return np.asarray((fraction >= 0.25) & (fraction <= 0.75))
+        return (fraction >= 0.25) & (fraction <= 0.75)
 
     def across(self, half_length: float, step: float) -> Line:
         """Line across the band's middle; the distance grows from the workpiece to the chip."""
@@ -181,7 +181,7 @@ def _climb(points: Array, raster: Raster, rate: Array) -> Array:
     values = gaussian_filter(np.nan_to_num(sample(rate, raster, across)), _CLIMB_BLUR)
     place, inside = highest(values, offsets)
     moved = np.where(inside, place, 0.0)
-    return np.asarray(points + moved[:, None] * normals)
+    return points + moved[:, None] * normals
 
 
 def _beyond_layer(points: Array, tool: Tool) -> Array:
@@ -207,7 +207,7 @@ def _widths(
         places = points[:, None] + sign * offsets[:, None] * normals[:, None]
         values = np.nan_to_num(sample(rate, raster, places))
         sides.append(_half_crossing(values, offsets))
-    return np.asarray(sides[0] + sides[1])
+    return sides[0] + sides[1]
 
 
 def _half_crossing(values: Array, offsets: Array) -> Array:

@@ -51,7 +51,7 @@ def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
     """
     away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.abs(away.values) / (COVERAGE * away.standard_uncertainty))
+        return np.abs(away.values) / (COVERAGE * away.standard_uncertainty)
 
 
 @dataclass(frozen=True)
@@ -533,7 +533,7 @@ def _scatter(frames: Array, known: NDArray[np.bool_]) -> FrameScatter:
 
 def _at(distance: Array, own: Array, values: Array) -> Array:
     """Values at other distances; NaN beside a NaN and beyond the ends."""
-    return np.asarray(np.interp(distance, own, values, left=np.nan, right=np.nan))
+    return np.interp(distance, own, values, left=np.nan, right=np.nan)
 
 
 def _mean(values: Array, known: NDArray[np.bool_]) -> Array:

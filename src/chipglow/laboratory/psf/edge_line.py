@@ -32,7 +32,7 @@ class EdgeLine:
 
     def distance(self, x: Array, y: Array) -> Array:
         """Signed distances of points from the edge in m, positive on the bright side."""
-        return np.asarray(x * cos(self.normal) + y * sin(self.normal) - self.position)
+        return x * cos(self.normal) + y * sin(self.normal) - self.position
 
     @property
     def tilt(self) -> float:

@@ -40,7 +40,7 @@ def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
     number = count[count > 0]
 
     def mean(values: Array) -> Array:
-        return np.asarray(np.bincount(bins, values)[count > 0] / number)
+        return np.bincount(bins, values)[count > 0] / number
 
     departure = (pixels.radiance - fit.predicted(index, pixels)) / edge.step
     distance, residual = mean(every), mean(departure)

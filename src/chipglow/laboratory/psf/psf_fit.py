@@ -152,7 +152,7 @@ class ModelFit:
         """Radiance of an edge's pixels in W/(m² sr)."""
         found = self.edges[edge]
         distance = found.line.distance(pixels.x, pixels.y)
-        return np.asarray(found.background + found.step * self.response(edge, pixels)(distance))
+        return found.background + found.step * self.response(edge, pixels)(distance)
 
 
 def fit_model(
@@ -361,7 +361,7 @@ class _Problem:
         """Signals of the apertures as fractions of an endless source's."""
         assert self.apertures is not None
         transfer = self.model.mean_transfer(values, self.apertures.frequency)
-        return np.asarray(self.apertures.weights @ transfer)
+        return self.apertures.weights @ transfer
 
     def _places(self, vector: Array) -> list[tuple[float, float, EdgeLine]]:
         places = []

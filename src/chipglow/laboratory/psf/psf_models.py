@@ -331,12 +331,12 @@ class EdgeResponse:
         rise = self.edge[k + 1] - self.edge[k]
         first, last = self.spacing * self.line[k], self.spacing * self.line[k + 1]
         bend, twist = 3 * rise - 2 * first - last, first + last - 2 * rise
-        return np.asarray(self.edge[k] + t * (first + t * (bend + t * twist)))
+        return self.edge[k] + t * (first + t * (bend + t * twist))
 
     def slope(self, distance: Array) -> Array:
         """Line-spread function at distances in m, in 1/m, by straight lines."""
         k, t = self._place(distance)
-        return np.asarray(self.line[k] + t * (self.line[k + 1] - self.line[k]))
+        return self.line[k] + t * (self.line[k + 1] - self.line[k])
 
     def _place(self, distance: Array) -> tuple[NDArray[np.int64], Array]:
         """Sample before each distance, and how far on the way to the next one it is."""
@@ -369,7 +369,7 @@ def edge_response(
 def footprint_transfer(frequency: Array, angle: float, footprint: float) -> Array:
     """Transfer function of a square pixel along a direction; shapes and units as above."""
     across, down = footprint * cos(angle), footprint * sin(angle)
-    return np.asarray(np.sinc(frequency * across) * np.sinc(frequency * down))
+    return np.sinc(frequency * across) * np.sinc(frequency * down)
 
 
 def disc_response(
@@ -420,7 +420,7 @@ def disc_transfer(cycles: Array) -> Array:
 
 def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
     sigma = fwhm / FWHM_PER_SIGMA
-    return np.asarray(np.exp(-2 * (pi * sigma * frequency) ** 2))
+    return np.exp(-2 * (pi * sigma * frequency) ** 2)
 
 
 def _lens(large: float, small: float, distance: Array) -> Array:
@@ -435,4 +435,4 @@ def _lens(large: float, small: float, distance: Array) -> Array:
     product = product * (apart - small + large) * (apart + small + large)
     triangle = np.sqrt(np.maximum(product, 0.0)) / 2
     area = large**2 * first + small**2 * second - triangle
-    return np.asarray(np.where(apart <= large - small, pi * small**2, area))
+    return np.where(apart <= large - small, pi * small**2, area)

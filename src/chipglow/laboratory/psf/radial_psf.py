@@ -78,12 +78,12 @@ class RadialPSF:
     @property
     def radius(self) -> Array:
         """Middles of the rings in m."""
-        return np.asarray((self.edges[1:] + self.edges[:-1]) / 2)
+        return (self.edges[1:] + self.edges[:-1]) / 2
 
     @property
     def density(self) -> Array:
         """Light per area in 1/m²."""
-        return np.asarray(self.fractions / (np.pi * np.diff(self.edges**2)))
+        return self.fractions / (np.pi * np.diff(self.edges**2))
 
     @property
     def encircled(self) -> Estimate:
@@ -187,7 +187,7 @@ def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> Array:
     """Limits of the rings: even in the core, in proportion to the radius beyond."""
     core = _core(fit, edges)
     last = 0.8 * min(edge.reach for edge in edges)
-    return np.asarray(core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1)))
+    return core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1))
 
 
 def _core(fit: ModelFit, edges: Sequence[EdgePixels]) -> float:
@@ -244,7 +244,7 @@ def _penalty(radii: Array, width: float) -> Array:
     middles = (radii[1:] + radii[:-1]) / 2
     weighted = np.diag((middles**2 + width**2) / np.diff(radii**2))
     padded = np.concatenate([weighted[:1], weighted, np.zeros((1, middles.size))])
-    return np.asarray(np.diff(padded, n=2, axis=0) * 1e3)
+    return np.diff(padded, n=2, axis=0) * 1e3
 
 
 def _shares_by(fit: ModelFit, radii: Array) -> Callable[[Values], Values]:

@@ -388,7 +388,7 @@ def _settled(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[Arra
     basis = _scaled_basis(level, frame, matrix, "similarity")
 
     def moved(parameters: Array) -> Array:
-        return np.asarray(matrix + (basis @ parameters).reshape(3, 3))
+        return matrix + (basis @ parameters).reshape(3, 3)
 
     def loss(parameters: Array) -> float:
         pixels = _pixels(level, frame, moved(parameters))

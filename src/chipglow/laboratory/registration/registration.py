@@ -94,19 +94,19 @@ class Registration:
     def pixel_covariance(self, positions: ArrayLike) -> Array:
         """Covariance of `pixels` in pixels², shape (..., 2, 2)."""
         slope = element_slopes(self.matrix, np.asarray(positions, np.float64))
-        return np.asarray(slope @ self.covariance @ np.swapaxes(slope, -1, -2))
+        return slope @ self.covariance @ np.swapaxes(slope, -1, -2)
 
     def position_covariance(self, positions: ArrayLike) -> Array:
         """Covariance in m² of the position that is found for the pixel of each position."""
         back = np.linalg.inv(self.jacobian(positions))
-        return np.asarray(back @ self.pixel_covariance(positions) @ np.swapaxes(back, -1, -2))
+        return back @ self.pixel_covariance(positions) @ np.swapaxes(back, -1, -2)
 
     def jacobian(self, positions: ArrayLike) -> Array:
         """Pixels per m at positions: derivative of column and row by x and y, (..., 2, 2)."""
         places = np.asarray(positions, np.float64)
         depth = _depth(self.matrix, places)[..., None, None]
         pixels = self.pixels(places)[..., None]
-        return np.asarray((self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth)
+        return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
         """Standard uncertainty of a mapped position in m: median and greatest over an image.
@@ -263,11 +263,11 @@ class NormalisedFrame:
 
     def unit(self, positions: Array) -> Array:
         """Positions in these coordinates."""
-        return np.asarray((positions - self.centre) / self.scale * [1.0, -1.0])
+        return (positions - self.centre) / self.scale * [1.0, -1.0]
 
     def unit_pixels(self, pixels: Array) -> Array:
         """Columns and rows in these coordinates."""
-        return np.asarray((pixels - self.pixel_centre) / self.pixel_scale)
+        return (pixels - self.pixel_centre) / self.pixel_scale
 
     def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
         """A matrix in these coordinates, and its covariance, for m and pixels."""
@@ -314,10 +314,10 @@ def _least(
         return (basis @ parameters).reshape(3, 3) + np.outer(last, last)
 
     def residual(parameters: Array) -> Array:
-        return np.asarray((mapped_places(matrix_of(parameters), found) - target).ravel())
+        return (mapped_places(matrix_of(parameters), found) - target).ravel()
 
     def slope(parameters: Array) -> Array:
-        return np.asarray((element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k))
+        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k)
 
     k = basis.shape[1]
     begin = _direct(found, target) if model == "homography" else _linear(found, target, basis)
@@ -397,9 +397,7 @@ def _depth(matrix: Array, places: Array) -> Array:
 
 def mapped_places(matrix: Array, places: Array) -> Array:
     """What a matrix makes of places, shape (..., 2)."""
-    return np.asarray(
-        (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
-    )
+    return (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
 
 
 def element_slopes(matrix: Array, places: Array) -> Array:
