@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 from chipglow.laboratory.emissivity import (
+    emissivity_trend,
     measured_features,
+    read_emissivity_lines,
     read_emissivity_map,
-    read_measured_areas,
 )
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import WAVELENGTHS
@@ -186,16 +187,17 @@ class FeaturesSection(Part):
 
     def _measured(self, file: str, seed: int) -> FeatureTrends:
         try:
-            areas = measured_features(read_measured_areas(file))
+            lines = measured_features(read_emissivity_lines(file))
+            trends = {name: emissivity_trend(line) for name, line in lines.items()}
             means = {
-                name: Emissivity(area.trend.emissivity, area.standard_deviation)
-                for name, area in areas.items()
+                name: Emissivity(trends[name].emissivity, line.standard_deviation)
+                for name, line in lines.items()
             }
         except ValueError as error:
             raise ValueError(f"surface.measured: {file}: {error}") from None
         bare = self._features(means["body"], means["shear_band"], seed)
         beside = {name: means[name] for name in ("workpiece", "tool") if name in means}
-        trends = {"chip" if name == "body" else name: one.trend for name, one in areas.items()}
+        trends = {"chip" if name == "body" else name: trend for name, trend in trends.items()}
         return FeatureTrends(replace(bare, **beside), trends)
 
 

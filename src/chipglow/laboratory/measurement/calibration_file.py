@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
 from chipglow.io import atomic_path
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Parameter, Part
 from chipglow.quantities.units import (
     TEMPERATURE,
     TIME,
@@ -89,7 +88,7 @@ class CalibrationDescription(Part):
         band, response = calibration.band, calibration.band.response
         values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
         points: Any = (
-            fit.temperatures - 273.15, fit.counts, fit.residuals, fit.residuals_temperature
+            fit.temperatures - ZERO_CELSIUS, fit.counts, fit.residuals, fit.residuals_temperature
         )  # fmt: skip
         model: Any = calibration.kind
         return cls(
@@ -144,36 +143,18 @@ class CalibrationDescription(Part):
         return TabulatedResponse(tuple(1e-6 * wavelength for wavelength in wavelengths), values)
 
 
-def _rounded(values: NDArray[np.float64]) -> list[float]:
-    return [float(f"{value:.9g}") for value in values]
-
-
 def _pairs(response: TabulatedResponse) -> tuple[tuple[float, ...], ...]:
     microns = (float(f"{1e6 * wavelength:.12g}") for wavelength in response.wavelengths)
     return tuple(zip(microns, response.values, strict=True))
 
 
 def load_calibration(path: str | Path) -> FittedCalibration:
-    """Read a calibration from a YAML file, as ``chipglow calibrate`` writes it.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or no calibration; the message names the file.
-    OSError
-        If the file cannot be read.
-    """
+    """Read a calibration from a YAML file, as ``chipglow calibrate`` writes it."""
     return load_described(CalibrationDescription, path).build()
 
 
 def write_calibration(fit: CalibrationFit[FittedCalibration], path: str | Path) -> None:
-    """Write a calibration to a YAML file, which `load_calibration` reads.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write a calibration to a YAML file, which `load_calibration` reads."""
     text = calibration_text(CalibrationDescription.of(fit))
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -60,13 +60,7 @@ class RegistrationDescription(Part):
 
 
 def write_registration(registration: Registration, path: str | Path) -> None:
-    """Write a registration to a YAML file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write a registration to a YAML file."""
     finite = np.isfinite(registration.degrees_of_freedom)
     data = {
         "model": registration.model,
