@@ -2,8 +2,7 @@
 
 import inspect
 import reprlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import MISSING, fields as dataclass_fields
 from difflib import get_close_matches
@@ -17,7 +16,6 @@ from typing import (
     ClassVar,
     Final,
     Literal,
-    NamedTuple,
     NotRequired,
     Self,
     TypeVar,
@@ -43,14 +41,6 @@ from chipglow.quantities.parameter import Parameter
 
 Class = TypeVar("Class", bound=type)
 PartType = TypeVar("PartType", bound="Part")
-
-
-class Declaration(NamedTuple):
-    """A field of a part that descriptions have: annotation, type and parameter."""
-
-    annotation: Any
-    kind: Any
-    parameter: Parameter
 
 
 class Part:
@@ -79,7 +69,8 @@ class Part:
     kind: ClassVar[str] = ""
     example: ClassVar[str] = ""
     given: frozenset[str]
-    _declared: ClassVar[Mapping[str, Declaration]] = {}
+    _annotations: ClassVar[Mapping[str, Any]] = {}
+    _parameters: ClassVar[Mapping[str, Parameter]] = {}
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -88,20 +79,20 @@ class Part:
         own = inspect.get_annotations(cls)
         if any(isinstance(annotation, str) for annotation in own.values()):
             own = inspect.get_annotations(cls, eval_str=True)
-        inherited = [vars(base).get("_declared", {}) for base in reversed(cls.__mro__[1:])]
-        declared = {name: one for each in inherited for name, one in each.items()}
+        annotations: dict[str, Any] = {}
+        for base in reversed(cls.__mro__[1:]):
+            annotations |= vars(base).get("_annotations", {})
         for name, annotation in own.items():
-            metadata = getattr(annotation, "__metadata__", ())
-            parameter = next((one for one in metadata if isinstance(one, Parameter)), None)
-            if parameter is None:
-                declared.pop(name, None)
+            if _parameter(annotation) is None:
+                annotations.pop(name, None)
                 continue
-            declared[name] = Declaration(annotation, annotation.__origin__, parameter)
+            annotations[name] = annotation
             # The dataclass, `help` and signatures see the plain type.
             cls.__annotations__[name] = annotation.__origin__
-        cls._declared = declared
-        if "__doc__" in vars(cls) and cls.__doc__ and declared:
-            cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), declared)
+        cls._annotations = annotations
+        cls._parameters = {name: _parameter(one) for name, one in annotations.items()}
+        if "__doc__" in vars(cls) and cls.__doc__ and annotations:
+            cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), annotations)
 
     def __new__(cls, *args: Any, **values: Any) -> Self:
         """Note which fields are given."""
@@ -113,7 +104,7 @@ class Part:
     def __post_init__(self) -> None:
         values = {
             name: value.item() if isinstance(value := getattr(self, name), np.generic) else value
-            for name in self._declared
+            for name in self._annotations
         }
         given = {name: value for name, value in values.items() if name in self.given}
         try:
@@ -133,19 +124,19 @@ class Part:
     @classmethod
     def parameter(cls, name: str) -> Parameter:
         """What a field declares, for another part that has it too."""
-        return cls._declared[name].parameter
+        return cls._parameters[name]
 
     @classmethod
-    def declared(cls) -> dict[str, Parameter]:
+    def declared(cls) -> Mapping[str, Parameter]:
         """What the fields declare, by their names."""
-        return {name: one.parameter for name, one in cls._declared.items()}
+        return cls._parameters
 
     @classmethod
     def defaults(cls) -> dict[str, Any]:
         """The defaults of the declared fields that have one."""
         found = {}
         for one in dataclass_fields(cls):
-            if one.name in cls._declared:
+            if one.name in cls._annotations:
                 if one.default_factory is not MISSING:
                     found[one.name] = one.default_factory()
                 elif one.default is not MISSING:
@@ -165,8 +156,12 @@ class Part:
             data = _known_keys(cls.completed({} if data is None else data, from_file), _keys(cls))
             values = _section(cls).validate_python(data, context=info.context)
             values.pop("kind", None)
-            with _naming_file(values):
+            try:
                 return cls(**values)
+            except OSError as error:  # name the field of a file that cannot be read
+                named = [key for key, one in values.items() if str(one) == str(error.filename)]
+                place = ": ".join([*named, str(error.filename)])
+                raise ValueError(f"{place}: {error.strerror}, expected a file") from None
 
         def written(part: Part, info: SerializationInfo) -> Any:
             values = {name: getattr(part, name) for name in _keys(cls)}
@@ -337,8 +332,7 @@ def _fields_of(part: Any) -> TypeAdapter[Any]:
     defaults = part.defaults()
     fields: dict[str, Any] = {"kind": NotRequired[Literal[part.kind]]} if part.kind else {}
     for name in _keys(part):
-        if name in part._declared:
-            annotation = part._declared[name].annotation
+        if annotation := part._annotations.get(name):
             fields[name] = NotRequired[annotation] if name in defaults else annotation
     typed_dict: Any = TypedDict
     section = typed_dict(part.__name__, fields)
@@ -361,7 +355,7 @@ def _mode(info: SerializationInfo) -> Literal["json", "python"]:
 
 def _keys(part: Any) -> list[str]:
     """Keys of a part's section, in the order of its fields."""
-    names = [one.name for one in dataclass_fields(part) if one.name in part._declared]
+    names = [one.name for one in dataclass_fields(part) if one.name in part._annotations]
     return ["kind", *names] if part.kind else names
 
 
@@ -377,29 +371,24 @@ def _known_keys(data: object, names: Iterable[str]) -> Mapping[str, Any]:
     return data
 
 
-@contextmanager
-def _naming_file(values: Mapping[str, Any]) -> Iterator[None]:
-    """Name the field of a file that cannot be read, in a ValueError."""
-    try:
-        yield
-    except OSError as error:
-        named = [name for name, value in values.items() if str(value) == str(error.filename)]
-        place = ": ".join([*named, str(error.filename)])
-        raise ValueError(f"{place}: {error.strerror}, expected a file") from None
+def _parameter(annotation: Any) -> Any:
+    metadata = getattr(annotation, "__metadata__", ())
+    return next((one for one in metadata if isinstance(one, Parameter)), None)
 
 
-def _with_parameters(text: str, declared: Mapping[str, Declaration]) -> str:
+def _with_parameters(text: str, annotations: Mapping[str, Any]) -> str:
     """A class's documentation with the declared parameters, before those that it has already."""
     title = "Parameters\n----------\n"
     before, found, after = text.partition(title)
-    rows = [
-        f"{name} : {_type_text(kind, parameter)}\n    " + parameter.meaning.replace("\n", "\n    ")
-        for name, (_, kind, parameter) in declared.items()
-    ]
+    rows = []
+    for name, annotation in annotations.items():
+        meaning = _parameter(annotation).meaning.replace("\n", "\n    ")
+        rows.append(f"{name} : {_type_text(annotation)}\n    {meaning}")
     before = before if found else before + "\n\n"
     return "\n".join([before + title + "\n".join(rows), after]).rstrip() + "\n"
 
 
-def _type_text(kind: Any, parameter: Parameter) -> str:
+def _type_text(annotation: Any) -> str:
+    kind, quantity = annotation.__origin__, _parameter(annotation).quantity
     name = kind.__name__ if isinstance(kind, type) else str(kind).replace("typing.", "")
-    return f"{name}, in {parameter.quantity.base}" if parameter.quantity else name
+    return f"{name}, in {quantity.base}" if quantity else name

@@ -73,11 +73,10 @@ def own_settings(part: Part) -> Iterator[Setting]:
             kind = Parameter(first_sentence(type(part)))
             yield Setting(name, kind, str, value, value, value)
             continue
-        annotation, type_of_value, parameter = part._declared[name]
+        annotation, default = part._annotations[name], defaults.get(name)
         examples = next((family.examples for family in _families(annotation)), "")
-        yield Setting(
-            name, parameter, type_of_value, value, plain[name], defaults.get(name), examples
-        )
+        of = annotation.__origin__
+        yield Setting(name, part.parameter(name), of, value, plain[name], default, examples)
 
 
 def value_at(part: Any, path: str) -> Any:

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import files_of
-from chipglow.io.sources.source import SourceError, damaged, naming, required
+from chipglow.io.sources.source import SourceError, check_hdf5, damaged, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
-from chipglow.text import check_own_data
 
 MOST_SAMPLES: Final = 100_000_000
 """Most samples that are read at once."""
@@ -295,8 +294,7 @@ def _part(read: Callable[[Key], NDArray[Any]], name: str, key: Key) -> NDArray[A
 def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     import h5py
 
-    with naming(path):
-        check_own_data(path)
+    check_hdf5(path)
     file = stack.enter_context(h5py.File(path, "r"))
     found: list[StoredArray] = []
 
