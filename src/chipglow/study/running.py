@@ -13,7 +13,6 @@ import xarray as xr
 
 from chipglow.analysis import (
     Analysis,
-    Plan,
     analyse,
     cut_spots,
     lacking,
@@ -28,7 +27,7 @@ from chipglow.cutting import (
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.digest import is_intact
 from chipglow.io.interrupts import uninterrupted
-from chipglow.quantities import adapter
+from chipglow.quantities import adapter, unchecked
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
@@ -142,7 +141,9 @@ def run(
     ValueError
         If the scene cannot be analysed as the study wants it; the message names the scene's file.
     """
-    return _analyse(study, study.plan, progress, resume, assume)
+    with _fitted(study, progress, resume, assume) as fitted:
+        camera = study.camera.on(fitted.scene.raster, study.seed)
+        return analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
 
 
 def errors(
@@ -155,7 +156,8 @@ def errors(
 
     The scene needs no more than its temperature; it need not show a cut.
     """
-    return _analyse(study, replace(study.plan, cut=False), progress, resume, assume)
+    any_scene = unchecked(study, analysis=replace(study.analysis, cut=False))
+    return run(any_scene, progress, resume, assume)
 
 
 def wavelengths(
@@ -201,18 +203,6 @@ def wavelengths(
             plan.textures,
             progress,
         )
-
-
-def _analyse(
-    study: Study,
-    plan: Plan,
-    progress: Progress | None,
-    resume: bool,
-    assume: Callable[[str], None] | None,
-) -> Analysis:
-    with _fitted(study, progress, resume, assume) as fitted:
-        camera = study.camera.on(fitted.scene.raster, study.seed)
-        return analyse(fitted.scene, fitted.surfaces, camera, plan, progress)
 
 
 @contextmanager
