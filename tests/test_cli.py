@@ -47,7 +47,7 @@ analysis: {{exposures: 3, psf_widths: [8 um, 12 um]}}
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, undrawn, monkeypatch):
     monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
     work = tmp_path / "work"
     work.mkdir()

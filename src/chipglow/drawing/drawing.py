@@ -75,6 +75,7 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     """Write a figure as PNG at 150 dots an inch and as SVG; images in it stay images."""
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     figure.savefig(png, dpi=150)
+    figure.set_layout_engine("none")  # keeps the layout of the PNG: computing it takes long
     figure.savefig(svg, dpi=150, metadata={"Date": None})
     return png, svg
 
