@@ -62,7 +62,9 @@ CASES = {
 def row(name: str, cell: float, length: float) -> list[str]:
     """Run one cut and return its row of the table."""
     simulation = CuttingSimulation(
-        CuttingConditions(cutting_length=length), CASES[name], numerics=Numerics(cell=cell)
+        CuttingConditions(cutting_length=length),
+        workpiece=CASES[name],
+        numerics=Numerics(cell=cell),
     )
     window = replace(WINDOW, end=min(WINDOW.end, length))
     chip, history, seconds = cut(simulation, window)

@@ -23,9 +23,9 @@ MOST_SECONDS = 1200
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-# The same examples on every machine; --hypothesis-profile=search draws new ones. The first example
-# of a test may compile, so that no example has a time limit.
-settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
+# The same examples on every machine, and so few; --hypothesis-profile=search draws more, and new
+# ones. The first example of a test may compile, so that no example has a time limit.
+settings.register_profile("fixed", max_examples=40, derandomize=True, database=None, deadline=None)
 settings.register_profile("search", derandomize=False, deadline=None, print_blob=True)
 settings.load_profile("fixed")
 
