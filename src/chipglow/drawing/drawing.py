@@ -79,7 +79,6 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
         layout.execute(figure)
         figure.set_layout_engine(None)
     figure.savefig(png, dpi=150)
-    figure.set_layout_engine("none")  # keeps the layout of the PNG: computing it takes long
     figure.savefig(svg, dpi=150, metadata={"Date": None})
     return png, svg
 
