@@ -81,7 +81,7 @@ PROGRAMS = {
         {"| scikit-image, correlation |": 5},
     ),
     "reproduce_cost.py": ("tiny.yaml", {"tiny ": 3}),
-    "softening.py": (f"--cell {COARSEST} --length 1.2 default", {"| default": 9}),
+    "softening.py": (f"--cell {COARSEST} --length 1.96 default", {"| default": 9}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 6}),
     "synthetic_laboratory.py": (
         "--repeats 1",

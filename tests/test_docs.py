@@ -26,7 +26,7 @@ def page_id(page):
 
 
 @pytest.fixture
-def reader(tmp_path, quick_study, own_laws, read_here, monkeypatch):
+def reader(tmp_path, quick_study, own_laws, read_here, undrawn, monkeypatch):
     """A reader who has run the quick study."""
     cache, folder = tmp_path / "cache", tmp_path / "work"
     cache.mkdir()
