@@ -307,7 +307,9 @@ def write_foreign_chip(path, scene):
     np.savez(path, material=material, **fields)
 
 
-def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, chip_scene):
+def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(
+    folder, runs, chip_scene, read_here
+):
     write_foreign_chip(folder / "chip.npz", chip_scene)
     described = {
         "source": "chip.npz",
