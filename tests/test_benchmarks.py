@@ -73,7 +73,7 @@ PROGRAMS = {
         {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
     ),
     "reflections.py": (
-        f"--draws 2 --cell {COARSEST}",
+        f"--draws 2 --angles 45 --cell {COARSEST}",
         {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
     ),
     "registration_libraries.py": (
