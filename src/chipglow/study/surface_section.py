@@ -196,9 +196,9 @@ class FeaturesSection(Part):
         except ValueError as error:
             raise ValueError(f"surface.measured: {file}: {error}") from None
         bare = self._features(means["body"], means["shear_band"], seed)
-        beside = {name: means[name] for name in ("workpiece", "tool") if name in means}
+        workpiece, tool = means.get("workpiece", bare.workpiece), means.get("tool", bare.tool)
         trends = {"chip" if name == "body" else name: trend for name, trend in trends.items()}
-        return FeatureTrends(replace(bare, **beside), trends)
+        return FeatureTrends(replace(bare, workpiece=workpiece, tool=tool), trends)
 
 
 SurfaceSection = Annotated[FeaturesSection | SurfaceChoice, SURFACES]
