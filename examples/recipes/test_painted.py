@@ -27,5 +27,5 @@ def test_a_study_lays_the_paint_and_the_camera_sees_it_by_plancks_law():
 
 
 def test_a_wrong_emissivity_is_one_line_with_its_limits():
-    with pytest.raises(ValueError, match=r"surface\.paint\n.*1\.2, expected 0 to 1"):
+    with pytest.raises(ValueError, match=r"surface.paint: 1\.2, expected 0 to 1"):
         Study(**{"surface": {**SECTION, "paint": 1.2}})
