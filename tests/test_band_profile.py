@@ -24,8 +24,8 @@ from chipglow.laboratory.chip import (
     find_band,
     read_curve,
 )
-from chipglow.laboratory.chip.band_figure import draw_band_profile
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
+from chipglow.laboratory.chip.figures import draw_band_profile
 from chipglow.laboratory.chip.ridge import local_parabolas
 from chipglow.scene import Line, PlacedTool
 from chipglow.uncertainty import Estimate, from_xarray

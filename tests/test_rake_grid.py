@@ -248,7 +248,7 @@ def test_a_file_that_is_no_tool_is_one_error(tmp_path, text, message):
 
 
 def test_a_measurement_without_a_tool_needs_a_file():
-    with pytest.raises(ValueError, match="--tool: the measurement states no tool"):
+    with pytest.raises(ValueError, match="tool: the measurement contains no tool"):
         tool_of(measured(linear_image()), None)
     with pytest.raises(ValueError, match=r"tip: .* finite"):
         PlacedTool(ToolGeometry(), (0.0, np.nan))

@@ -75,7 +75,7 @@ def test_the_tool_of_the_measurement_is_taken_if_none_is_given():
     attributes = {k: v for k, v in told.data.attrs.items() if not k.startswith("tool_")}
     told.data.attrs = attributes
     for analysis in (rake_grid, band_profile):
-        with pytest.raises(ValueError, match="tool: none is given and the measurement has none"):
+        with pytest.raises(ValueError, match="tool: the measurement contains no tool"):
             analysis(told)
 
 

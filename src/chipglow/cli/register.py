@@ -100,7 +100,7 @@ def register(
     """Map each point of an infrared image to a visible image."""
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
-    from chipglow.laboratory.chip import tool_of
+    from chipglow.laboratory.chip import load_tool
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration import (
         align_recordings,
@@ -127,7 +127,7 @@ def register(
     _check_frame("--frame", frame, measured.times.size)
     _check_frame("--visible-frame", visible_frame, seen.times.size)
     picture = seen.signal[visible_frame]
-    outline = measured.tool if tool is None else tool_of(measured, tool)
+    outline = measured.tool if tool is None else load_tool(tool)
     screen = current()
     fit: PointFit | DotFit | ImageFit | None = None
     if known is not None:

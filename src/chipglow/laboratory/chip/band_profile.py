@@ -16,14 +16,13 @@ from scipy.ndimage import map_coordinates
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
-from chipglow.laboratory.chip.budget_columns import budget_columns, celsius
-from chipglow.laboratory.chip.frames import frame_numbers
+from chipglow.laboratory.chip.frames import budget_columns, celsius, frame_numbers
 from chipglow.laboratory.chip.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
     contribution,
-    tool_in,
+    tool_of,
 )
 from chipglow.quantities import Array
 from chipglow.scene import Line, Tool, sample
@@ -246,7 +245,7 @@ def band_profile(
     the curve's first point, contributes half the difference of the temperatures so far up and down
     the curve.
     """
-    tool, pitch = tool_in(measurement, tool), measurement.raster.spacing
+    tool, pitch = tool_of(measurement, tool), measurement.raster.spacing
     width = pitch if width is None else width
     position = pitch / sqrt(12.0) if position is None else position
     for name, value in (("width", width), ("position", position)):

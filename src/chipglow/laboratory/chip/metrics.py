@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.laboratory.chip.contact import contact_length
 from chipglow.laboratory.chip.ridge import NoShearBandError
+from chipglow.laboratory.chip.segment import contact_length
 from chipglow.laboratory.chip.segmentation import Segmentation, segmentation
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
 from chipglow.quantities import Array

@@ -15,18 +15,19 @@ from scipy import sparse
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
-from chipglow.laboratory.chip.budget_columns import (
+from chipglow.laboratory.chip.frames import (
+    FRAMES,
+    FrameScatter,
     budget_columns,
     celsius,
+    frame_numbers,
     known_uncertainty,
 )
-from chipglow.laboratory.chip.frame_scatter import FRAMES, FrameScatter
-from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
     contribution,
-    tool_in,
+    tool_of,
 )
 from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
@@ -272,7 +273,7 @@ def rake_grid(
     standard uncertainty; half the difference of the temperatures there is what it contributes
     (JCGM 100, 5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
     """
-    tool, raster = tool_in(measurement, tool), measurement.raster
+    tool, raster = tool_of(measurement, tool), measurement.raster
     size = _checked_size(pixels, depth, raster)
     numbers = frame_numbers(frames, measurement.times.size)
     rows = int(depth / size + _ROUNDING)
