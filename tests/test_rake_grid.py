@@ -1,6 +1,5 @@
 """The analysis grid on the rake face, and tools that stand where an image has them."""
 
-from dataclasses import replace
 from math import cos, radians, sin
 
 import numpy as np
@@ -254,6 +253,3 @@ def test_a_measurement_without_a_tool_needs_a_file():
         PlacedTool(ToolGeometry(), (0.0, np.nan))
     with pytest.raises(ValueError, match="already"):
         PlacedTool(PlacedTool(ToolGeometry(), (0.0, 0.0)), (0.0, 0.0))
-    grid = rake_grid(measured(linear_image()), ToolGeometry())
-    with pytest.raises(ValueError, match="rake grid: estimate has shape"):
-        replace(grid, along=grid.along[:-1])

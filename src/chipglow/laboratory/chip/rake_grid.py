@@ -76,15 +76,6 @@ class RakeGrid:
     times: Array
     """When each frame's integration began in s, shape (frames,)."""
 
-    def __post_init__(self) -> None:
-        shape = (self.times.size, self.depth.size, self.along.size)
-        for name in ("estimate", "standard_deviation", "count"):
-            found = getattr(self, name).shape
-            if found != shape:
-                raise ValueError(f"rake grid: {name} has shape {found}, expected {shape}")
-        if not self.size > 0:
-            raise ValueError(f"rake grid: size is {self.size!r}, expected over 0 m")
-
     @property
     def mean(self) -> Array:
         """Values of `estimate` in K, shape (frames, m, n)."""

@@ -85,14 +85,11 @@ class FittedEdge:
 
     line: EdgeLine
     normal_uncertainty: float
-    position_uncertainty: float
-    """Standard uncertainties in rad and m."""
+    """Standard uncertainty of its direction in rad."""
     background: float
     step: float
     """Radiance of the dark side, and how much brighter the other is, in W/(m² sr)."""
-    background_uncertainty: float
     step_uncertainty: float
-    """Standard uncertainties in W/(m² sr)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -322,10 +319,8 @@ class _Problem:
         return FittedEdge(
             EdgeLine(float(normal), float(position)),
             float(spread[3]),
-            float(spread[2]),
             float(background),
             float(step),
-            float(spread[0]),
             float(spread[1]),
         )
 
