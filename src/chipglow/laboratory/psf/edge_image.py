@@ -181,8 +181,6 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
 
     Where pixels are saturated or under range, all pixels from there on outward are left
     out: to leave out only those whose noise goes over the limit would shift the mean of the others.
-
-        Warnings of the image and of the choice of pixels, about the image.
     """
     image = replace(image, saturated=image.saturated | _piled_up(image))
     x, y = image.x - image.x.mean(), image.y - image.y.mean()
