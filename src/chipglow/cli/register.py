@@ -111,7 +111,7 @@ def register(
         write_registration,
     )
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
-    from chipglow.laboratory.registration.picture_file import write_blink
+    from chipglow.laboratory.registration.input_files import write_blink
     from chipglow.laboratory.result_file import write_frame
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TIME
@@ -196,7 +196,7 @@ def _check_frame(option: str, number: int, count: int) -> None:
 
 
 def _check_times(path: Path, interval: float | None) -> None:
-    from chipglow.laboratory.registration.picture_file import PICTURE_SUFFIXES
+    from chipglow.laboratory.registration.input_files import PICTURE_SUFFIXES
 
     if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
         raise ValueError(f"--align requires --visible-interval: {path} contains no times")

@@ -18,6 +18,11 @@ from chipglow.quantities.units import Position
 from chipglow.scene import PlacedTool, Tool
 from chipglow.text import Notes, load_described
 
+_FACE: Final = 200e-6
+"""Length of the face in m on which a tool that was given is compared with one that is seen."""
+_CLEARLY: Final = 4.0
+"""Two places of the face differ if they are this many standard uncertainties apart, or more."""
+
 
 class ToolDescription(ToolSection):
     """A cutting tool and where it is."""
@@ -49,13 +54,6 @@ def read_curve(path: str | os.PathLike[str]) -> Array:
     if len(curve) < 2:
         raise ValueError(f"{path}: {len(curve)} points, expected 2 or more")
     return curve
-
-
-_FACE: Final = 200e-6
-"""Length of the face in m on which a tool that was given is compared with one that is seen."""
-
-_CLEARLY: Final = 4.0
-"""Two places of the face differ if they are this many standard uncertainties apart, or more."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Cause, Component, Estimate
 
+FRAMES: Final = "frames"
+"""Name of the component of uncertainty that the scatter of frames makes."""
+_LEAST: Final = 8
+"""Frames from which on it is asked how alike successive ones are."""
+
 
 def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]:
     """Numbers of the chosen frames, shape (n,); of all for None."""
@@ -21,13 +26,6 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
         shown = int(wrong[0]) if wrong.size else "none"
         raise ValueError(f"measurement: frame {shown}, expected 0 to {count - 1}")
     return numbers
-
-
-FRAMES: Final = "frames"
-"""Name of the component of uncertainty that the scatter of frames makes."""
-
-_LEAST: Final = 8
-"""Frames from which on it is asked how alike successive ones are."""
 
 
 @dataclass(frozen=True, eq=False)
