@@ -10,10 +10,9 @@ from matplotlib.image import AxesImage
 
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage
 from chipglow.laboratory.chip.rake_grid import RakeGrid
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Tool
 
 _HEIGHT: Final = 3.8
@@ -48,7 +47,7 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
 
 
 def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeGrid) -> None:
-    image = _mean_image(measurement, grid) - KELVIN
+    image = _mean_image(measurement, grid) - ZERO_CELSIUS
     picture = _show(axes, image, measurement, grid.tool)
     corners = 1e6 * grid.corners()
     for line in (*corners, *corners.transpose(1, 0, 2)):
@@ -71,7 +70,7 @@ def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
 
 def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     several = grid.times.size > 1
-    mean = grid.frame_mean - KELVIN
+    mean = grid.frame_mean - ZERO_CELSIUS
     bars = grid.frame_standard_deviation if several else grid.standard_deviation[0]
     uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
@@ -149,7 +148,7 @@ def _draw_curves(
     away = np.abs(profile.offset)
     frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
     number = int(np.flatnonzero(measurement.times == profile.times[frame])[0])
-    image = measurement.data["radiance_temperature"][number].values - KELVIN
+    image = measurement.data["radiance_temperature"][number].values - ZERO_CELSIUS
     picture = _show(axes, image, measurement, tool)
     for points, colour in zip(profile.points, colours, strict=True):
         axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
@@ -162,7 +161,7 @@ def _draw_curves(
 
 
 def _draw_profile(axes: Axes, profile: BandProfile, frame: int, colour: Array) -> None:
-    values = profile.temperature[frame] - KELVIN
+    values = profile.temperature[frame] - ZERO_CELSIUS
     if not np.isfinite(values).any():
         return
     along, uncertainty = 1e6 * profile.distance, profile.estimate.standard_uncertainty[frame]

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, Readings
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Estimate
 
 _HEIGHT: Final = 5.2
@@ -59,12 +59,12 @@ def _draw_values(
     axes: Axes, place: Array, readings: Sequence[Estimate], labels: Sequence[str]
 ) -> None:
     measured, *simulated = readings
-    x, values = 1e6 * place, measured.values - KELVIN
+    x, values = 1e6 * place, measured.values - ZERO_CELSIUS
     axes.plot(x, values, "k.", markersize=4, label="measured")
     expanded = COVERAGE * measured.standard_uncertainty
     drawing.shade(axes, x, values, expanded, GREY, 0.3, "expanded uncertainty, k = 2")
     for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
-        values = reading.values - KELVIN
+        values = reading.values - ZERO_CELSIUS
         axes.plot(x, values, color=_colour(i), label=label)
         drawing.shade(axes, x, values, COVERAGE * reading.standard_uncertainty, _colour(i))
 

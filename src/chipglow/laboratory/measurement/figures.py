@@ -13,8 +13,8 @@ from chipglow.camera import CalibrationFit, FittedCalibration, Flag, Measurement
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID
-from chipglow.quantities import Array
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION, VOID
+from chipglow.quantities import ZERO_CELSIUS, Array
 
 _FLAGS: Final = {
     Flag.UNDER_RANGE: ("below the lower range limit", VOID),
@@ -34,7 +34,7 @@ _SAMPLES: Final = 300
 def draw_measurement(measurement: Measurement, time: float | None = None) -> Figure:
     """Draw the radiance temperature of a frame, its flags, and how the temperatures are spread."""
     index = shown_frame(measurement.times, time, "measurement")
-    celsius = measurement.radiance_temperature()[index] - KELVIN
+    celsius = measurement.radiance_temperature()[index] - ZERO_CELSIUS
     flags, raster = measurement.flags[index], measurement.raster
     least, most = _IMAGE_HEIGHTS
     height = min(max(5.6 * raster.rows / raster.columns, least), most)
@@ -83,7 +83,9 @@ def draw_calibrations(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> 
         figure = drawing.new_figure(5.2)
         upper, lower = figure.subplots(2, 1, sharex=True)
         first = next(iter(fits.values()))
-        upper.plot(first.temperatures - KELVIN, first.counts, "o", color=GREY, label="blackbody")
+        upper.plot(
+            first.temperatures - ZERO_CELSIUS, first.counts, "o", color=GREY, label="blackbody"
+        )
         for (name, fit), colour, mark in zip(fits.items(), _COLOURS, _MARKS, strict=False):
             _draw_fit(upper, lower, name, fit, colour, mark)
         upper.set_ylabel("counts")
@@ -105,11 +107,11 @@ def _draw_fit(
     calibration = fit.calibration
     kelvins = np.linspace(calibration.lowest, calibration.highest, _SAMPLES)
     counts = calibration.counts(kelvins)
-    upper.plot(kelvins - KELVIN, counts, color=colour, linewidth=1.0, label=name)
+    upper.plot(kelvins - ZERO_CELSIUS, counts, color=colour, linewidth=1.0, label=name)
     uncertainty = calibration.uncertainty(counts) / calibration.band.slope(kelvins)
-    lower.fill_between(kelvins - KELVIN, -uncertainty, uncertainty, color=colour, alpha=0.2)
+    lower.fill_between(kelvins - ZERO_CELSIUS, -uncertainty, uncertainty, color=colour, alpha=0.2)
     bars = fit.standard_uncertainties / calibration.slope(fit.temperatures)
     lower.errorbar(
-        fit.temperatures - KELVIN, fit.residuals_temperature, bars,
+        fit.temperatures - ZERO_CELSIUS, fit.residuals_temperature, bars,
         fmt=mark, color=colour, markersize=4, linewidth=0.8, label=name,
     )  # fmt: skip

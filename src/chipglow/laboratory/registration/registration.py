@@ -17,7 +17,6 @@ from chipglow.text import Notes
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
 Method: TypeAlias = Literal["points", "dots", "mutual-information"]
 MODELS: Final = ("similarity", "affine", "homography")
-METHODS: Final = ("points", "dots", "mutual-information")
 
 _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
 _FLATTEST: Final = 0.01
@@ -74,9 +73,6 @@ class Registration:
             )
         if not abs(np.linalg.det(self.matrix)) > 0:
             raise ValueError("registration: matrix: is singular, expected one with an inverse")
-        for name, text, known in (("model", self.model, MODELS), ("method", self.method, METHODS)):
-            if text not in known:
-                raise ValueError(f"registration: {name} is {text!r}, expected {' or '.join(known)}")
         if not self.degrees_of_freedom > 0:
             raise ValueError(
                 f"registration: degrees_of_freedom is {self.degrees_of_freedom!r}, expected over 0"
