@@ -118,7 +118,7 @@ class BandProfile:
         return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each frame's band, a row each."""
+        """Every point of each frame's band; one row each."""
         there = np.isfinite(self.points[..., 0]).ravel()
         frame, point = (index.ravel() for index in np.indices(self.temperature.shape))
         stages = np.array([stage.value for stage in self.stage], dtype=object)
@@ -158,7 +158,7 @@ class BandProfile:
         )
 
     def stage_frame(self) -> pd.DataFrame:
-        """Each frame's band, a row each."""
+        """Each frame's band; one row each."""
         return pd.DataFrame([self._stage_row(frame) for frame in range(self.times.size)])
 
     def _stage_row(self, frame: int) -> dict[str, float | str]:
@@ -203,7 +203,7 @@ def band_profile(
         y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
     reference : int, optional
         Number of the frame whose band is fully developed. By default the given curve is its place;
-        without a curve, the frame in which the band that begins near the edge has the greatest
+        without a curve, the frame in which the band that begins near the edge has the largest
         integral of its temperature over the camera's lower range limit.
     width : float, optional
         Width across the curve in m over which to average; a pixel by default.

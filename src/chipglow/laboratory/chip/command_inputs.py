@@ -84,7 +84,7 @@ def chosen_tool(
 
 
 def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
-    """A warning, if the image clearly shows a rake face elsewhere than where the tool's is said."""
+    """Warn if the image clearly shows a rake face away from that of the given tool."""
     try:
         found = find_tool(measurement)
     except ValueError:

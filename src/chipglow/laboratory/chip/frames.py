@@ -15,7 +15,7 @@ from chipglow.uncertainty import Cause, Component, Estimate
 FRAMES: Final = "frames"
 """Name of the component of uncertainty that the scatter of frames makes."""
 _LEAST: Final = 8
-"""Frames from which on it is asked how alike successive ones are."""
+"""Frames at or above which the correlation of successive frames is estimated."""
 
 
 def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]:

@@ -121,7 +121,7 @@ class RakeGrid:
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
 
     def to_frame(self) -> pd.DataFrame:
-        """Every square of every frame, a row each."""
+        """Every square of every frame; one row each."""
         places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
         time, depth, along = (1e6 * place.ravel() for place in places)
         return pd.DataFrame(
@@ -156,7 +156,7 @@ class RakeGrid:
         )
 
     def mean_frame(self) -> pd.DataFrame:
-        """Every square in the mean over the frames, a row each."""
+        """Every square in the mean over the frames; one row each."""
         depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
         several = self.times.size > 1
         standard_deviation = (

@@ -138,7 +138,7 @@ class PolarGrid:
 
 @njit(cache=True, nogil=True)
 def _greatest_within_reach(total, penalty):  # type: ignore[no-untyped-def]
-    """For each place the greatest of the totals about it less their penalties, and its index."""
+    """For each place the largest of the totals about it less their penalties, and its index."""
     best, came_from = np.empty(total.size), np.empty(total.size, np.int64)
     reach = penalty.size // 2
     for i in range(total.size):
@@ -172,7 +172,7 @@ def strongest_part(points: Array, strength: Array, longest: float) -> slice:
 
 
 def even_steps(points: Array, step: float) -> Array:
-    """Curve smoothed by local parabolas and laid out anew at even steps of arc length in m."""
+    """Curve resampled at even steps of arc length in m and smoothed by local parabolas."""
     along = arc_length(points)
     even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
     resampled = np.stack([np.interp(even, along, points[:, axis]) for axis in (0, 1)], axis=1)
@@ -208,7 +208,7 @@ def normals_of(points: Array) -> Array:
 
 
 def highest(values: Array, offsets: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Place of each row's greatest value by a parabola through it and its neighbours."""
+    """Place of each row's largest value by a parabola through it and its neighbours."""
     peak = values.argmax(axis=1)
     inside = (peak > 0) & (peak < offsets.size - 1)
     peak = np.clip(peak, 1, offsets.size - 2)

@@ -65,7 +65,7 @@ class Instant:
     start: float
     """When the exposure begins in s."""
     band: ShearBand | None
-    """Ridge of the strain rate's mean over the exposure; None if there is none."""
+    """Ridge of the strain rate's mean over the exposure; None if undefined."""
     temperatures: Array
     """Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
     scene, empty without a band.
@@ -106,7 +106,7 @@ class Segment:
     contact_length: float
     """Length over which the chip touches the rake face in m."""
     momentary_band: ShearBand | None
-    """The band in `frame` alone, which motion does not blur; None if there is none."""
+    """The band in `frame` alone, which motion does not blur; None if undefined."""
     sweep: float
     """How far the band's middle moves across itself during the exposure, in m; NaN where it is
     not found in both the first and the last frame.
@@ -156,7 +156,7 @@ def _momentary_band(raster: Raster, frame: Frame, tool: Tool) -> ShearBand | Non
 
 
 def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
-    """Travel of the greatest strain rate on the line across the band's middle."""
+    """Travel of the largest strain rate on the line across the band's middle."""
     line = band.across(40e-6, scene.raster.spacing / 2)
     places = []
     for index in (indices[0], indices[-1]):

@@ -1,4 +1,4 @@
-"""Measured beside simulated: whether they agree within their uncertainty."""
+"""Comparison of measurement and simulation within their uncertainties."""
 
 from chipglow.laboratory.comparison.comparison import (
     Comparison,

@@ -1,4 +1,4 @@
-"""Measured beside simulated: at the rake face and in the shear band, for several emissivities."""
+"""Comparison of measurement and simulation at the rake face and in the shear band."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -137,7 +137,7 @@ class Readings:
     """Depth in the chip in m, shape (m,); None along the band."""
 
     def to_frame(self, labels: Sequence[str]) -> pd.DataFrame:
-        """Every value of each simulation, a row each."""
+        """Every value of each simulation; one row each."""
         measured, unknown = self.measured, np.full(self.measured.shape, np.nan)
         place = {"along_um": unknown, "depth_um": unknown, "distance_um": unknown + self.distance}
         if self.depth is not None:
@@ -162,7 +162,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measurement beside simulations."""
+    """A measurement compared with simulations."""
 
     labels: tuple[str, ...]
     grid: Readings | None
@@ -173,12 +173,12 @@ class Comparison:
     notes: Notes
 
     def to_frame(self) -> pd.DataFrame:
-        """Every value of each simulation, a row each."""
+        """Every value of each simulation; one row each."""
         readings = [one for one in (self.grid, self.band) if one is not None]
         return pd.concat([one.to_frame(self.labels) for one in readings], ignore_index=True)
 
     def fit_frame(self) -> pd.DataFrame:
-        """How each simulation fits at each place, a row each."""
+        """How each simulation fits at each place; one row each."""
         return pd.DataFrame(
             {
                 "place": result.place.rstrip(","),
@@ -245,7 +245,7 @@ def compare(
     stated: StatedUncertainties | None = None,
     reference: int | None = None,
 ) -> Comparison:
-    """Lay a measurement and simulations over each other.
+    """Compare a measurement with simulations.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def compare(
     and of the mean over the frames. A tool that is elsewhere moves the squares, the cutting edge
     from which the distance along a found ridge counts, and a given curve's place in the
     simulations. Which set fits best is the one with the least root mean square of the differences;
-    how sure that is, is found by drawing all values anew from their uncertainties: what is
+    its confidence is found by drawing all values from their uncertainties: what is
     systematic, and each part of the tool's place, with one deviate a file, what is random with one
     a value.
     """
@@ -516,7 +516,7 @@ def _scatter(frames: Array, known: NDArray[np.bool_]) -> FrameScatter:
 
 
 def _at(distance: Array, own: Array, values: Array) -> Array:
-    """Values at other distances; NaN beside a NaN and beyond the ends."""
+    """Values at other distances; NaN next to a NaN and beyond the ends."""
     return np.interp(distance, own, values, left=np.nan, right=np.nan)
 
 

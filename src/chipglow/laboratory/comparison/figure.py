@@ -1,4 +1,4 @@
-"""Measured beside simulated, and their difference (the paper's Figures 7 and 9)."""
+"""Measured and simulated temperatures and their difference (the paper's Figures 7 and 9)."""
 
 from collections.abc import Sequence
 from typing import Any, Final

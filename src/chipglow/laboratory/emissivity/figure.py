@@ -26,7 +26,7 @@ _SLENDER: Final = 3.0
 def draw_emissivity(
     found: EmissivityMap, regions: Sequence[Region], lines: Sequence[EmissivityLine] = ()
 ) -> Figure:
-    """Draw the radiance temperature with the regions, and the emissivity beside it."""
+    """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
     temperature = found.radiance_temperature - ZERO_CELSIUS
     panels = (

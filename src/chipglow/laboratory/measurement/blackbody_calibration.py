@@ -30,11 +30,11 @@ class BlackbodyCalibration:
         return preferred(self.fits)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each fit, a row each."""
+        """Every point of each fit; one row each."""
         return pd.concat([_points(name, fit) for name, fit in self.fits.items()], ignore_index=True)
 
     def parameter_frame(self) -> pd.DataFrame:
-        """Every parameter of each fit, a row each."""
+        """Every parameter of each fit; one row each."""
         return pd.concat(
             [
                 pd.DataFrame(

@@ -65,7 +65,7 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
 
 
 def load_recording(description: MeasurementDescription) -> Recording:
-    """Read what a camera wrote, with what a description says of it."""
+    """Read a camera file and apply its description."""
     if description.file is None:
         raise DescriptionError("file: is missing, expected a camera's file")
     try:
@@ -98,7 +98,7 @@ def _read(description: MeasurementDescription, file: str, every: bool = False) -
 def measurement_of(
     description: MeasurementDescription, recording: Recording, name: str
 ) -> Measurement:
-    """Make a measurement of a recording as its description says."""
+    """Convert a recording to a measurement according to its description."""
     try:
         correction, bad_pixels = pixel_correction(description, recording, FlatFieldSources())
         calibration = description.calibration
@@ -147,7 +147,7 @@ def uniform_counts(
 def pixel_correction(
     description: MeasurementDescription, recording: Recording, sources: "FlatFieldSources"
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
-    """What corrects a recording's pixels, and which of them are bad, as its description says."""
+    """Return the pixel correction and the bad pixels that a description defines."""
     fields = sources.of(description, recording)
     correction = fields.correction if fields and description.flat_field.correct else None
     if fields is not None and description.bad_pixels == "find":

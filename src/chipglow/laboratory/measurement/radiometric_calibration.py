@@ -272,7 +272,7 @@ def _attributes(
 
 
 def _known(recording: Recording, calibration: Calibration | None, name: str) -> Any:
-    """What the file says, or else the calibration that holds for it."""
+    """Value of the file or, without one, of the calibration."""
     said = getattr(recording, name)
     return getattr(calibration, name, None) if said is None else said
 

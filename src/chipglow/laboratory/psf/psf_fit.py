@@ -262,7 +262,7 @@ class _Problem:
         return result
 
     def fitted(self, vector: Array) -> ModelFit:
-        """The result, with what the residuals say of it."""
+        """The result, with uncertainties from the residuals."""
         residual, jacobian = self.residual(vector), self.jacobian(vector)
         reduced = self._reduced_chi_squared(vector, residual)
         scaled = jacobian * self.scales

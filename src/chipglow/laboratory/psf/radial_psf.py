@@ -157,7 +157,7 @@ def radial_psf(
 
 
 def _ring_width(edges: Values, fractions: Values) -> float:
-    """Twice the greatest radius in m with half of the greatest density, by straight lines."""
+    """Twice the largest radius in m with half of the largest density, by straight lines."""
     radius, density = (edges[1:] + edges[:-1]) / 2, fractions / np.diff(edges**2)
     half = density.max() / 2
     last = int(np.flatnonzero(density >= half)[-1])

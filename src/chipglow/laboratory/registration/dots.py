@@ -203,7 +203,7 @@ def _weight(blobs: Array) -> float:
 
 
 def _alike(blobs: Array) -> Array:
-    """The group of like size and strength with the greatest weight."""
+    """The group of like size and strength with the largest weight."""
     best = blobs[:0]
     for size, strength in blobs[:, 2:].tolist():
         alike = np.abs(np.log(blobs[:, 2] / size)) < np.log(_ALIKE_SIZE)
@@ -215,7 +215,7 @@ def _alike(blobs: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Disc:
-    """A disc with a soft edge, and what of the image is not as it says."""
+    """A disc with a soft edge, and its residuals."""
 
     column: float
     row: float

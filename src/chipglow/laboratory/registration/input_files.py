@@ -29,7 +29,7 @@ _HALF: Final = 0.5
 
 
 def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
-    """Read what a visible camera saw."""
+    """Read frames of a visible camera."""
     path = Path(path)
     if path.suffix.lower() in PICTURE_SUFFIXES:
         frames = _frames(path)

@@ -105,7 +105,7 @@ class Registration:
         return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
-        """Standard uncertainty of a mapped position in m: median and greatest over an image.
+        """Standard uncertainty of a mapped position in m: median and largest over an image.
 
         It is the root of the sum of the variances along x and y.
         """
@@ -150,7 +150,7 @@ class PointFit:
     """The points: x and y in m, and column and row in the visible picture, each of shape (n, 2)."""
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point, a row each."""
+        """Every point; one row each."""
         return pd.DataFrame(
             {
                 "point": np.arange(1, len(self.positions) + 1),

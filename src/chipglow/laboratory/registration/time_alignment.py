@@ -85,7 +85,7 @@ def align_times(
     Notes
     -----
     The visible signal, smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
-    54 (2010) 1167), is put to the infrared times; the correlation of both is greatest at the offset
+    54 (2010) 1167), is put to the infrared times; the correlation of both is largest at the offset
     that is least squares for infrared = a + b visible(time). All offsets are tried, a third
     of a visible frame apart, at which at least half of the infrared frames have visible ones;
     Gauss-Newton ends it. What the spline cannot follow, faster than the visible camera's frames,
@@ -139,7 +139,7 @@ def simultaneous_frames(
     Returns
     -------
     list of ndarray
-        For each infrared frame the numbers of the visible frames, from 0; empty if there is none.
+        For each infrared frame the numbers of the visible frames, from 0; empty if none.
     """
     begin = alignment.visible_time(infrared_times)
     end = alignment.visible_time(infrared_times + integration_time)
@@ -313,7 +313,7 @@ class RecordingAlignment:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every infrared frame, a row each."""
+        """Every infrared frame; one row each."""
         return pd.DataFrame(
             {
                 "infrared_frame": np.arange(self.infrared_times.size),
