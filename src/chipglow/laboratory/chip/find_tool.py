@@ -171,12 +171,7 @@ def _up(image: Array, rows: NDArray[Any]) -> Array:
     return np.asarray((image.shape[0] - 1) / 2 - rows, dtype=np.float64)
 
 
-def _gain(
-    windows: Array,
-    place: Array,
-    blur: float,
-    image: Array,
-) -> Array:
+def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
     """Root mean square that a break explains beyond a smooth course, as a fraction of the level."""
     steps = np.arange(-_REACH, _REACH + 1.0)
     basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)

@@ -193,12 +193,7 @@ def _beyond_layer(points: Array, tool: Tool) -> Array:
     return beyond
 
 
-def _widths(
-    points: Array,
-    normals: Array,
-    raster: Raster,
-    rate: Array,
-) -> Array:
+def _widths(points: Array, normals: Array, raster: Raster, rate: Array) -> Array:
     """Full width at half maximum across each point of the curve."""
     step = raster.spacing / 2
     offsets = step * np.arange(ceil(_WIDEST / step) + 1, dtype=np.float64)

@@ -232,12 +232,7 @@ class _Disc:
         return np.asarray(self.contrast * erfc((distance - self.radius) / self.softness) / 2)
 
 
-def _discs(
-    image: Array,
-    known: NDArray[np.bool_],
-    blobs: Array,
-    bright: bool,
-) -> list[_Disc]:
+def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
     """Discs of like radius at blobs, fitted again without the skirts of their neighbours."""
     first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
     discs = _like(first, bright)

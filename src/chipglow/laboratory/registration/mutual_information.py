@@ -317,12 +317,7 @@ def _shifted_scores(
             yield score, shift
 
 
-def _score(
-    level: _Level,
-    pixels: Array,
-    bins: NDArray[np.int64],
-    edges: Array,
-) -> float | None:
+def _score(level: _Level, pixels: Array, bins: NDArray[np.int64], edges: Array) -> float | None:
     """Mutual information times common edges of samples at pixels; None if too few overlap."""
     column, row = np.rint(pixels).astype(np.int64).T
     rows, columns = level.codes.shape
