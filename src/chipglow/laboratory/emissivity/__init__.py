@@ -17,7 +17,6 @@ from chipglow.laboratory.emissivity.file import (
     read_emissivity_map,
     write_emissivity,
 )
-from chipglow.laboratory.emissivity.heated import HeatedObject, HeatedRow
 from chipglow.laboratory.emissivity.region_emissivities import (
     RegionEmissivities,
     determine_emissivities,
@@ -40,8 +39,6 @@ __all__ = [
     "EmissivityLine",
     "EmissivityMap",
     "EmissivityMapFile",
-    "HeatedObject",
-    "HeatedRow",
     "Heating",
     "MeasuredEmissivity",
     "ReflectedTemperature",
