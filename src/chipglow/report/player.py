@@ -16,7 +16,8 @@ from PIL import Image
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text
-from chipglow.report.facts import Facts, texts, time_text
+from chipglow.report.facts import Facts, time_text
+from chipglow.report.page import texts
 from chipglow.scene import Raster, Tool
 
 _COLOURS: Final = 255
