@@ -123,3 +123,9 @@ def own_laws():
     yield
     FLOW_LAWS._own.clear()
     FLOW_LAWS._own.update(before)
+
+
+@pytest.fixture
+def no_figures(monkeypatch):
+    """Reports without figures, which take most of their time."""
+    monkeypatch.setattr("chipglow.report.report._FIGURES", {})

@@ -19,7 +19,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
-from chipglow.drawing import drawing
+from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.report.page import expression, template, texts
 from chipglow.scene import Material
@@ -111,6 +111,13 @@ class Facts:
         lines = self.data.isel(exposure=0).sel(line=["rake", "band"])
         points = np.stack([lines.line_x.values, lines.line_y.values], axis=-1)
         return [one[np.isfinite(one).all(axis=1)] for one in points]
+
+    def heat_limits(self, celsius: Array) -> tuple[float, float]:
+        """Return ends of a scale of temperatures, the lower near the camera's lower limit."""
+        low, high = scales.ends(celsius, 0.5, 99.9, 1.0)
+        limit = self.analysis.camera.lower_limit
+        low = low if limit is None else max(limit - KELVIN - 50.0, low)
+        return low, max(high, low + 50.0)
 
     def series(self, reading: str, unit: str) -> Array | None:
         """Return error in °C or fraction of the PSF in % over the PSF widths; None if unknown."""

@@ -106,7 +106,7 @@ def measurement(facts: Facts) -> Figure:
     for axes, name in zip(rows, names, strict=True):
         truth = shown.scene_radiance_temperature.sel(surface=name).values - KELVIN
         measured = shown.radiance_temperature.sel(surface=name).values - KELVIN
-        limits = _heat_limits(facts, truth)
+        limits = facts.heat_limits(truth)
         pixels = analysis.measurements[name].raster
         drawing.show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
         picture = drawing.show_image(axes[1], measured, pixels, analysis.tool, scales.HEAT, limits)
@@ -250,14 +250,6 @@ def _of(facts: Facts, title: str, surface: str) -> str:
 def _line_title(facts: Facts, line: str) -> str:
     title = {"rake": "across the rake face", "band": "across the shear band"}.get(line, line)
     return _of(facts, title, str(facts.data.line_surface.sel(line=line).item()))
-
-
-def _heat_limits(facts: Facts, truth: Array) -> tuple[float, float]:
-    """Return ends of a scale of temperatures in °C, the lower near the camera's lower limit."""
-    low, high = scales.ends(truth, 0.5, 99.9, 1.0)
-    limit = facts.analysis.camera.lower_limit
-    low = low if limit is None else max(limit - KELVIN - 50.0, low)
-    return low, max(high, low + 50.0)
 
 
 def _draws(values: Array) -> Array:
