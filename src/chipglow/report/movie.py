@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import ceil, floor, log10
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import matplotlib
 import numpy as np
@@ -101,7 +101,7 @@ class CutPicture:
         high = _AROUND + _PANEL * self._raster.rows / self._raster.columns
         height = 2 * round(min(max(high, _HEIGHTS[0]), _HEIGHTS[1]) / 2)
         self._figure = Figure(figsize=(_WIDTH / _DPI, height / _DPI), dpi=_DPI, layout="compressed")
-        self._canvas: Any = FigureCanvasAgg(self._figure)
+        self._canvas = cast(Any, FigureCanvasAgg(self._figure))  # untyped
         self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
         self._slowest = ends.rate[0]
         low, top = (limit - scales.KELVIN for limit in ends.temperature)
