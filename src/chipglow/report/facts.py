@@ -53,7 +53,6 @@ class Facts:
             "KELVIN": KELVIN,
             "VOID": Material.VOID,
             "analysis": analysis,
-            "band_width": np.mean([one.band_width for one in cut.segments]) if cut else nan,
             "calibration": camera.calibration(camera.pixels(analysis.raster).shape),
             "camera": camera,
             "cause": data.exposure.attrs["title"],
