@@ -399,7 +399,7 @@ def looked_at(folder, **camera):
     return errors(study)
 
 
-def test_the_errors_of_a_scene_have_the_noise_of_each_draw(no_figures, tmp_path):
+def test_the_errors_of_a_scene_have_the_noise_of_each_draw(few_figures, tmp_path):
     """Pixel phases differ by their noise too; the same study gives the same numbers again."""
     section = {
         "response": {
