@@ -235,7 +235,7 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
                 own_width, colour = psf.fwhm * 1e6, _ORDERS[order][0]
                 _draw_point(axes, own_width, scale * draws.mean, colour, "PSF of this camera")
             place = data.place.sel(reading=name).item()
-            axes.set(title=f"{title}, {place}", ylabel="%" if scale == 100 else "°C")
+            axes.set(title=place, ylabel=f"{title} / {'%' if scale == 100 else '°C'}")
     for axes in grid[-1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
     _legend(figure, grid.flat, columns=2)
@@ -275,7 +275,8 @@ def _draw_published(axes: Axes, line: str) -> None:
     """Draw the published values on a line of a cut."""
     error, fraction = PAPER[f"{line}_error_degC"], PAPER[f"{line}_psf_fraction_percent"]
     _draw_point(axes, 0.0, error.value, BLUE, "the paper's error")
-    _draw_point(axes, 0.0, error.value * fraction.value / 100, VERMILLION, "the paper's PSF part")
+    portion = error.value * fraction.value / 100
+    _draw_point(axes, 0.0, portion, VERMILLION, "the paper's PSF contribution")
     worst = PAPER.get(f"{line}_worst_error_degC")
     if worst is not None:
         label = "the paper, beside the band"

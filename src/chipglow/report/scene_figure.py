@@ -59,7 +59,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         if has_quality and frame.quality is not None:
             _draw_quality(top, next(places), frame, frame.quality, raster, tool)
         for empty in places:
-            _leave_out(empty, grid[-2, 1] if rows > 1 else None)
+            drawing.leave_out(empty, grid[-2, 1] if rows > 1 else None, raster)
         solid = frame.material == Material.WORKPIECE
         below = bottom.subplots(histogram_rows, 2, squeeze=False)
         for axes, panel in zip(below.flat, panels, strict=False):
@@ -155,15 +155,6 @@ def _draw_quality(
     title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
     ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
     drawing.veil(axes, filled, raster, VERMILLION, 1.0)
-
-
-def _leave_out(axes: Axes, above: Axes | None) -> None:
-    """Remove a panel and label the one above it, now the lowest of its column."""
-    axes.remove()
-    if above is None:
-        return
-    above.set_xlabel("x / µm")
-    above.tick_params(labelbottom=True)
 
 
 def _draw_histogram(axes: Axes, panel: ImagePanel, values: NDArray[Any]) -> None:
