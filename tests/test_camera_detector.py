@@ -399,7 +399,7 @@ def looked_at(folder, **camera):
     return errors(study)
 
 
-def test_the_errors_of_a_scene_have_the_noise_of_each_draw(few_figures, tmp_path):
+def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
     """Pixel phases differ by their noise too; the same study gives the same numbers again."""
     section = {
         "response": {
@@ -440,6 +440,7 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(few_figures, tmp_path
         assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
 
 
+@pytest.mark.slow
 def test_every_headline_draw_of_a_cut_has_noise_of_its_own():
     """The noise is that of the detector, and another in each draw, chip and exposure."""
     detector = Detector(

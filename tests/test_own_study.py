@@ -133,7 +133,7 @@ def test_what_is_left_to_the_paper_is_said():
     assert list(left_to_the_paper(whole)) == []
 
 
-def test_the_paper_stands_beside_its_own_study_only(chip_analysis, few_figures, tmp_path):
+def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
     assert all(row.paper is None for row in result_rows(chip_analysis, titanium))
     write_report(chip_analysis, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)

@@ -386,7 +386,7 @@ def test_a_width_is_found_where_the_series_meets_the_value():
     assert crossing(widths, np.array([-10.0, -30.0, -50.0]), -60.0) is None
 
 
-def test_what_is_missing_is_left_out_and_unknown_is_null(result, few_figures, tmp_path):
+def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_path):
     segments = tuple(replace(segment, sweep=float("nan")) for segment in result.cut.segments)
     ideal = replace(result.camera, psf=None, lower_limit=None)
     unseen = result.data.copy()
@@ -400,7 +400,7 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, few_figures, tm
     assert row.one_draw == one_draw(result.data, "rake").error
     assert "outside the image" in row.explanation
     names = {path.stem for path in (tmp_path / "figures").iterdir()}
-    assert names == {"figure-3-heated-chips", "figure-5-scene", "figure-9-band-curves"}
+    assert names == FIGURES - {"figure-2-psf", "forces"}
     assert "failed" not in Page((tmp_path / "report.html").read_text(encoding="utf-8")).text
     assert "segment_period_us" not in {row.key for row in result_rows(bare)}
     segmentation = replace(result.cut.forces.segmentation, period=float("nan"))
@@ -410,7 +410,7 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, few_figures, tm
     assert "no period" in row.explanation
 
 
-def test_a_part_that_fails_is_shown_beside_the_others(result, few_figures, tmp_path):
+def test_a_part_that_fails_is_shown_beside_the_others(result, undrawn, tmp_path):
     """The analysis names one part; a figure that cannot be drawn is another."""
     reason = "region chip 1 body: reaches over columns 50.34 to 81.35"
     data = result.data.drop_vars("ridge_distance")
@@ -420,8 +420,8 @@ def test_a_part_that_fails_is_shown_beside_the_others(result, few_figures, tmp_p
     page = "".join(Page((tmp_path / "report.html").read_text(encoding="utf-8")).text)
     assert f"heated chips and tool failed: {reason}" in page
     assert "Development of the shear band failed: AttributeError" in page
-    names = {path.stem for path in (tmp_path / "figures").iterdir()}
-    assert names == {"figure-2-psf", "figure-5-scene", "forces"}
+    gone = {"figure-3-heated-chips", "figure-4-heated-tool", "figure-9-band-curves"}
+    assert {path.stem for path in (tmp_path / "figures").iterdir()} == FIGURES - gone
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["failed"] == failed
     assert summary["results"]["rake_error_degC"] < 0
