@@ -97,11 +97,9 @@ def page(shared, visit):
     """A page in its initial state, which it goes back to."""
     yield shared
     shared.get_by_role("button", name="Whole view").click()
-    if "?" in shared.url:
-        while "?" in shared.url:
-            shared.locator("#undo").dispatch_event("click")
-            shared.wait_for_timeout(50)
-        ready(shared)
+    while "?" in (before := shared.url):
+        shared.locator("#undo").click()
+        shared.wait_for_url(lambda url, before=before: url != before)
 
 
 @pytest.fixture(scope="module")
