@@ -227,6 +227,7 @@ class SceneModel:
         cursor = PointPlace(CURSOR, state.cursor)
         places = cursor, *map(state.line, LINES)
         count = textures if surface.redrawn(1) is not surface else 1
+        noise = np.arange(count * phases**2).reshape(count, 1, phases**2)
         draws = []
         for number in range(count):
             progress(number / count)
@@ -235,20 +236,20 @@ class SceneModel:
                 starts=np.array([state.start]),
                 drawn=(0,),
                 shown=0,
-                views=(View(CURSOR, [places], 1, number * phases**2, (0, 0, 1)),),
+                views=(View(CURSOR, [places], noise[number][None]),),
                 phases=phases,
                 reference=state.study.analysis.reference,
                 effects={ALL: CASES[ALL]},
             )
             laid = {CURSOR: camera.lay(one[CURSOR], scene)}
-            draws.append(look(scene, one, laid, camera, schedule, lambda _: None))
+            draws.append(look(scene, one, laid, camera, schedule, lambda _: None).rows)
         progress(1.0)
-        pixel = np.stack([d.readings.rows[0, CURSOR, "pixel"][0, 0] for d in draws])
+        pixel = np.stack([rows["readings"][0, CURSOR, "pixel"][0, 0] for rows in draws])
         error = pixel[..., 1] - pixel[..., 0]
         return Drawn(
             state,
             {
-                name: np.concatenate([d.lines.rows[0, title, title][0, 0, :, 1] for d in draws])
+                name: np.concatenate([rows["lines"][0, title, title][0, 0, :, 1] for rows in draws])
                 - KELVIN
                 for name, title in LINES.items()
             },
