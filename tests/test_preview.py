@@ -361,7 +361,10 @@ def test_the_command_makes_a_movie_of_the_cut_and_then_of_its_scene(folder):
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("a.avi", "ending in .mp4 or .gif"), ("none/a.gif", "there is no folder none")],
+    [
+        ("a.avi", "--preview: a.avi, expected a file that ends in .mp4 or .gif"),
+        ("none/a.gif", "there is no folder none"),
+    ],
 )
 def test_a_preview_that_cannot_be_written_is_refused_before_the_cut(
     folder, monkeypatch, name, said
@@ -380,7 +383,7 @@ def test_mp4_without_pyav_is_one_line(folder, monkeypatch):
     monkeypatch.setattr("chipglow.io.movie_file.find_spec", lambda _: None)
     result = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", "a.mp4")
     assert result.exit_code == 2
-    assert result.output.startswith("chipglow: --preview: a.mp4: MP4 needs PyAV")
+    assert result.output.startswith("chipglow: a.mp4: MP4 needs PyAV")
     assert result.output.count("\n") == 1
 
 

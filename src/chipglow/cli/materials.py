@@ -27,8 +27,10 @@ def _row(name: str) -> dict[str, str]:
     }
 
 
-def show_material(name: str) -> None:
-    """Print all properties of a material, with units and numbered sources."""
+def show_material(name: str, plot: Path | None) -> None:
+    """Print all properties of a material, with units and numbered sources; optionally draw it."""
+    from chipglow.report.materials import material_figure
+
     material = material_file(name)
     sources = list(dict.fromkeys(number.source for number in material.properties))
     rows = [
@@ -47,10 +49,4 @@ def show_material(name: str) -> None:
     screen.heading()
     for count, source in enumerate(sources, 1):
         screen.heading(f"({count}) {source}")
-
-
-def plot_material(name: str, path: Path) -> None:
-    """Draw a material."""
-    from chipglow.report.materials import material_figure
-
-    finish(Notes(), (path, figure(material_figure, material_file(name))))
+    finish(Notes(), (plot, figure(material_figure, material)))

@@ -35,7 +35,7 @@ MUCH_DISK: Final = 2e9
 """Expected size of the cached scene in bytes above which the user is asked first."""
 
 
-def say_where_it_starts(study: Study, resume: bool, agreed: bool) -> None:
+def confirm_cost(study: Study, resume: bool, agreed: bool) -> None:
     """Print the state of earlier runs and the expected cost; ask before a large one."""
     console = Console(stderr=True)
     if is_cut(study):
