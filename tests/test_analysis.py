@@ -28,7 +28,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
-from chipglow.analysis.error_images import LEAST_COVERED
+from chipglow.analysis.images import LEAST_COVERED
 from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
@@ -658,7 +658,11 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
     for order in ("detector", "optics"):
         errors = error_images(replace(CAMERA, psf_order=order), exposure_at(study, "chip 2"))
         across = study.places[0].lines(CAMERA.pitch)["rake"]
-        face = sample(errors.case_1, errors.raster, across.points[across.distance == 0.0])
+        face = sample(
+            errors.case_1.values,
+            study.measurements["chip 2"].raster,
+            across.points[across.distance == 0.0],
+        )
         first = data.sel(psf_order=order, reading="rake").isel(
             psf_width=at, exposure=0, pixel_phase=0
         )
@@ -687,7 +691,7 @@ def test_an_effect_switched_off_is_one_more_row(chip):
     exposure = CAMERA.expose(scene, CHIP_1, float(result.data.exposure[0]))
     for effect, seen in (("all", exposure), ("without motion", still(CAMERA, exposure)[1])):
         errors = error_images(CAMERA, seen)
-        expected = nearest(errors.measured, errors.raster, place.point)
+        expected = nearest(errors.measured.values, CAMERA.pixels(scene.raster), place.point)
         assert row.sel(effects=effect) == pytest.approx(float(expected), abs=1e-9)
     assert row.sel(effects="all") != row.sel(effects="without motion")
 

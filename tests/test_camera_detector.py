@@ -12,8 +12,7 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from typer.testing import CliRunner
 
-from chipglow.analysis import Plan, analyse, headline, headlines, sensitivity_error
-from chipglow.analysis.error_images import error_images
+from chipglow.analysis import Plan, analyse, error_images, headline, headlines, sensitivity_error
 from chipglow.camera import (
     UNUSABLE,
     AnnularAperturePSF,

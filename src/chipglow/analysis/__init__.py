@@ -3,14 +3,16 @@
 from chipglow.analysis.cut import lacking, spread_starts
 from chipglow.analysis.distribution import Distribution, VarianceComponent
 from chipglow.analysis.engine import analyse
-from chipglow.analysis.error_images import (
-    ErrorImages,
-    Unblurred,
+from chipglow.analysis.images import (
+    ALL,
+    CASES,
+    Effect,
+    ExposureImages,
     error_images,
+    error_parts,
+    pixel_phases,
     reference_temperature,
 )
-from chipglow.analysis.error_parts import ErrorParts, error_parts
-from chipglow.analysis.looks import CASES, Effect, pixel_phases
 from chipglow.analysis.places import (
     BandPlace,
     HottestPlace,
@@ -50,6 +52,7 @@ from chipglow.analysis.wavelengths import (
 )
 
 __all__ = [
+    "ALL",
     "CASES",
     "RATIO_CAUSES",
     "Analysis",
@@ -58,8 +61,7 @@ __all__ = [
     "CuttingForces",
     "Distribution",
     "Effect",
-    "ErrorImages",
-    "ErrorParts",
+    "ExposureImages",
     "Headline",
     "HottestPlace",
     "LinePlace",
@@ -71,7 +73,6 @@ __all__ = [
     "RatioErrors",
     "RegionPlace",
     "Spot",
-    "Unblurred",
     "VarianceComponent",
     "WavelengthPlan",
     "analyse",

@@ -27,7 +27,8 @@ from chipglow.analysis.dataset import (
     ridge_variables,
     scene_variables,
 )
-from chipglow.analysis.looks import CASES, Effect, Looked, Schedule, View, look
+from chipglow.analysis.images import CASES, Effect
+from chipglow.analysis.looks import Looked, Schedule, View, look
 from chipglow.analysis.places import BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.result import Analysis, Cut

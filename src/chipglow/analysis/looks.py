@@ -5,39 +5,25 @@ exposure, an exposure is formed by all cameras, and blurred radiance serves all 
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, floor
-from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chipglow.analysis.error_images import ReferenceKind, read_temperature, reference_temperature
-from chipglow.analysis.places import Place, Stack
-from chipglow.camera import Camera, Exposure, PointSpreadFunction, blur
+from chipglow.analysis.images import (
+    Array,
+    Effect,
+    ExposureImages,
+    ReferenceKind,
+    Stack,
+    pixel_phases,
+)
+from chipglow.analysis.places import Place
+from chipglow.camera import Camera, Exposure
 from chipglow.radiometry import Band
 from chipglow.scene import Line, Raster, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import EmissivityField, Surface
-
-Array: TypeAlias = NDArray[np.float64]
-Effect: TypeAlias = Callable[[Camera, Exposure], tuple[Camera, Exposure]]
-"""Changes the camera or what reaches it, such as to switch an effect off."""
-
-ALL: Final = "all"
-WITHOUT_PSF: Final = "without psf"
-
-
-def _without_psf(camera: Camera, exposure: Exposure) -> tuple[Camera, Exposure]:
-    # Without a PSF its order does not matter; one value lets cameras share the image.
-    return replace(camera, psf=None, psf_order="optics"), exposure
-
-
-CASES: Final[Mapping[str, Effect]] = {
-    ALL: lambda camera, exposure: (camera, exposure),
-    WITHOUT_PSF: _without_psf,
-}
-"""The paper's case 1 and case 2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,74 +100,6 @@ class Looked:
     line_motion: Table
 
 
-class ExposureImages:
-    """Images of one exposure by cameras that differ in pixels, PSF or noise."""
-
-    def __init__(self, exposure: Exposure, reference: ReferenceKind) -> None:
-        self.exposure, self._kind = exposure, reference
-        self._references: dict[tuple[object, ...], Array] = {}
-        self._measured: dict[Camera, Array] = {}
-        self._blurred: tuple[PointSpreadFunction | None, Array] = None, np.zeros(0)
-
-    def stack(self, camera: Camera, effects: Mapping[str, Effect], keep: bool = True) -> Stack:
-        """Reference, then what is measured with each of the effects, shape (row, y, x).
-
-        `keep` says whether the images are kept for cameras that are equal under an effect.
-        """
-        reference = self._reference(camera)
-        rows = [reference]
-        for effect in effects.values():
-            changed, exposure = effect(camera, self.exposure)
-            if exposure is not self.exposure:
-                measured = ExposureImages(exposure, self._kind)._measure(changed)
-            elif (known := self._measured.get(changed)) is not None:
-                measured = known
-            else:
-                measured = self._measure(changed)
-                if keep:
-                    self._measured[changed] = measured
-            rows.append(np.where(np.isnan(reference), np.nan, measured))
-        return np.stack(rows)
-
-    def _reference(self, camera: Camera) -> Array:
-        key = (camera.pitch, camera.offset, camera.shape, camera.fill_factor)
-        if key not in self._references:
-            self._references[key] = reference_temperature(camera, self.exposure, self._kind)
-        return self._references[key]
-
-    def _measure(self, camera: Camera) -> Array:
-        radiance, psf = self.exposure.mean_radiance, camera.psf
-        if psf is not None and camera.psf_order == "optics" and "footprint" not in psf.includes:
-            radiance = self._blur(psf)
-            optical = replace(camera, psf=None)
-        else:
-            optical = camera
-        image = optical.form_image(radiance, self.exposure.raster)
-        return read_temperature(camera, image, self.exposure.start)[0]
-
-    def _blur(self, psf: PointSpreadFunction) -> Array:
-        """The radiance of the samples behind the optics; that of the last PSF is kept."""
-        if self._blurred[0] != psf:
-            exposure = self.exposure
-            self._blurred = psf, blur(exposure.mean_radiance, psf, exposure.raster.spacing)
-        return self._blurred[1]
-
-
-def pixel_phases(camera: Camera, count: int) -> list[Camera]:
-    """The camera with its pixels at other places of the scene, spread evenly over a pixel.
-
-    `count` is the number of places along each axis: `count`² cameras, each with as many whole
-    pixels as fit the scene. The first phase is the camera's own.
-    """
-    right, down = camera.offset
-    steps = camera.pitch * np.arange(count) / count
-    return [
-        replace(camera, shape=None, offset=(right + float(x), down + float(y)))
-        for y in steps
-        for x in steps
-    ]
-
-
 def look(
     scene: Scene,
     surfaces: Mapping[str, Surface],
@@ -209,10 +127,9 @@ def look(
         exposed = camera.expose_fields(scene, fields, float(start))
         textures = dict(zip(first, exposed, strict=False))
         for name, exposure in textures.items():
-            image = camera.form_image(exposure.mean_radiance, scene.raster)
-            looked.images[name].append(image)
-            reference = reference_temperature(camera, exposure, schedule.reference)
-            looked.references[name].append(reference)
+            images = ExposureImages(exposure, schedule.reference)
+            looked.images[name].append(images.radiance(camera))
+            looked.references[name].append(images.reference(camera))
         seen = {(name, 0): exposure for name, exposure in textures.items()}
         seen |= dict(zip(others, exposed[len(first) :], strict=drawn is not None))
         if i == schedule.shown:
@@ -256,7 +173,7 @@ def _draw(
     """Read every view of one exposure, for all textures, pixel phases and other cameras."""
     for number, view in enumerate(schedule.views):
         for texture in range(view.textures):
-            images = ExposureImages(seen[view.surface, texture], schedule.reference)
+            images = ExposureImages(seen[view.surface, texture], schedule.reference, True)
             noisy = [c.redrawn(view.number(exposure, texture, p)) for p, c in enumerate(cameras)]
             for place in view.places[exposure]:
                 key = number, place.name
@@ -271,7 +188,7 @@ def _draw(
                         looked.lines.put((*key, name), index, values)
             for other, change in enumerate(schedule.vary if texture == 0 else ()):
                 for phase, camera in enumerate(noisy):
-                    stack = images.stack(change(camera), schedule.effects, keep=False)
+                    stack = images.stack(change(camera), schedule.effects)
                     pixels = camera.pixels(images.exposure.raster)
                     for place in view.places[exposure]:
                         key, index = (number, place.name), (other, exposure, phase)

@@ -13,12 +13,12 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.images import Stack
 from chipglow.laboratory.chip import ShearBand
 from chipglow.scene import Line, Raster, Region, Tool, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
-Stack = NDArray[np.float64]
 NEAR: Final = 2.0
 """Distance in pixels within which an extremum of an image belongs to a place."""
 

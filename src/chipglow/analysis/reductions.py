@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.distribution import Distribution, ratio
-from chipglow.analysis.looks import ALL, WITHOUT_PSF
+from chipglow.analysis.images import ALL, WITHOUT_PSF
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
 

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.cut import Progress, find_segments, spread_starts
-from chipglow.analysis.looks import pixel_phases
+from chipglow.analysis.images import pixel_phases
 from chipglow.analysis.places import PointPlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.ratio_error import ideal_image, true_temperature
