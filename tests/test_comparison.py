@@ -394,7 +394,10 @@ def test_the_command_writes_what_it_says(folder):
         ((*FILES, "--emissivity-uncertainty", "2"), "--emissivity-uncertainty: 2, expected 0"),
         ((*FILES, "--position", "1 s"), "--position: '1 s' is not a length"),
         ((*FILES, "--curve", "one.nc"), "one.nc: expected"),
-        ((*FILES, "--reference", "1 s"), "--reference: 1 s, expected 0 us to 20 us"),
+        (
+            (*FILES, "--reference", "1 s"),
+            "--reference: 1000000 us is not in the measurement, expected 0 us to 20 us",
+        ),
         ((*FILES, "--plot", "a.txt"), "a.txt, expected a file that ends in .png"),
         (("measured.nc", "curve.csv"), "curve.csv: curve: unit: is missing"),
         ((*FILES, *USUAL, "--out", "."), "which chipglow did not write"),

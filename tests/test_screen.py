@@ -92,9 +92,10 @@ def test_a_pipe_gets_one_line_a_row_without_colours():
     assert [row.split()[0] for row in rows[: len(fields)]] == fields
 
 
-def test_a_narrow_terminal_loses_no_number(file):
-    wide = chipglow("shearband", file, COLUMNS="200").stdout
-    narrow = chipglow("shearband", file, COLUMNS="60").stdout
+@pytest.mark.parametrize("command", ["shearband", "rake"])
+def test_a_narrow_terminal_loses_no_number(file, command):
+    wide = chipglow(command, file, COLUMNS="200").stdout
+    narrow = chipglow(command, file, COLUMNS="60").stdout
     assert max(map(len, narrow.split("\n\n")[0].splitlines())) <= 60
     numbers = [word for word in wide.split("\n\n")[0].split() if word[-1].isdigit()]
     assert numbers

@@ -45,7 +45,8 @@ def show_material(name: str, plot: Path | None) -> None:
     screen = current()
     screen.say(f"{material.name}: {material.description}")
     screen.heading()
-    screen.table("properties", pd.DataFrame(rows), ["field", "value", "note"])
+    columns = ["field", "value", "note"]
+    screen.table("properties", pd.DataFrame(rows), columns, unbroken=("field",))
     screen.heading()
     for count, source in enumerate(sources, 1):
         screen.heading(f"({count}) {source}")

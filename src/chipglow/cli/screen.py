@@ -116,7 +116,8 @@ class Screen:
         from rich.measure import Measurement
 
         console = self._console()
-        if Measurement.get(console, console.options, table).minimum <= console.width:
+        unlimited = console.options.update(max_width=10 * _PIPE_WIDTH)
+        if Measurement.get(console, unlimited, table).minimum <= console.width:
             console.print(table)
             return
         if table.title:
