@@ -28,6 +28,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
+from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import LEAST_COVERED
 from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
@@ -736,6 +737,15 @@ def test_a_part_that_fails_leaves_the_others(chip, monkeypatch):
     assert "columns 50.34 to 81.35" in result.failed["heated chips and tool"]
     assert result.cut.heated == () and result.cut.chip is not None
     assert set(headlines(result.data)) >= {"rake", "band"}
+
+
+def test_bands_far_apart_are_heated_on_a_wider_image():
+    """The body's region lies half a spacing beside the band: beyond 80 pixels of 2 um."""
+    camera = replace(CAMERA, pitch=2e-6)
+    chip, tool = heated_objects(camera, {"chip 1": CHIP_1}, TOOL, 20e-6, 180e-6, 1)
+    assert chip.map.raster.columns == 130
+    for row in (*chip.rows, *tool.rows):
+        assert row.found.mean == pytest.approx(row.true.mean, abs=0.05), row.feature
 
 
 def test_a_study_that_can_not_be_is_refused(chip):

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
-from math import sqrt
+from math import ceil, floor, sqrt
 from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -200,6 +200,20 @@ class ExposureImages:
         return errors.assign(
             {name: (("y", "x"), part, {"units": "K"}) for name, part in parts.items()}
         )
+
+
+def around(raster: Raster, points: Array) -> tuple[tuple[slice, slice], Raster]:
+    """The samples around points, shape (n, 2), as a part of the rows and columns of a raster."""
+    columns, rows = ((points - [raster.left, raster.top]) * [1, -1] / raster.spacing).T
+    above, left = (
+        min(max(floor(places.min()) - 2, 0), count - 1)
+        for places, count in zip((rows, columns), raster.shape, strict=True)
+    )
+    below, right = (max(ceil(places.max()) + 2, 1) for places in (rows, columns))
+    part = slice(above, max(below, above + 1)), slice(left, max(right, left + 1))
+    shape = (len(range(*one.indices(count))) for one, count in zip(part, raster.shape, strict=True))
+    corner = raster.left + left * raster.spacing, raster.top - above * raster.spacing
+    return part, Raster(*corner, raster.spacing, *shape)
 
 
 def pixel_phases(camera: Camera, count: int) -> list[Camera]:

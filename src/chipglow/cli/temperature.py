@@ -1,9 +1,8 @@
 """The command ``chipglow temperature``: true temperature of regions of known emissivity."""
 
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
 from chipglow.cli.finish import finish
@@ -60,26 +59,29 @@ def temperature(
         surroundings = lab.ReflectedTemperature(reflected or 293.0, reflected_uncertainty or 0.0)
     fitted = None if calibration is None else load_calibration(calibration)
     measurements = [load_measurement(image, settings or ()) for image in images]
-    known: lab.KnownEmissivity | Mapping[str, Any]
-    if _is_number(emissivity):
-        known = lab.KnownEmissivity(float(emissivity), emissivity_uncertainty or 0.0)
-    elif emissivity_uncertainty is None:
-        known = lab.read_region_emissivity(Path(emissivity))
-    else:
-        raise ValueError("--emissivity-uncertainty: the file states it, expected none with a file")
+    lines = _emissivities(emissivity, emissivity_uncertainty)
     names = list(map(str, images))
-    result = lab.true_temperatures(measurements, named, known, surroundings, fitted, drift, names)
+    result = lab.true_temperatures(measurements, named, lines, surroundings, fitted, drift, names)
     _print(result)
     notes = sum((one.notes for one in measurements), result.notes)
     finish(notes, (table, partial(write_frame, result.to_frame())))
 
 
-def _is_number(text: str) -> bool:
+def _emissivities(
+    text: str, uncertainty: float | None
+) -> "lab.EmissivityLine | dict[str, lab.EmissivityLine]":
+    """Return one emissivity, or those of a file."""
+    from chipglow.laboratory import emissivity as lab
+
     try:
-        float(text)
+        number = float(text)
     except ValueError:
-        return False
-    return True
+        if uncertainty is not None:
+            raise ValueError(
+                "--emissivity-uncertainty: the file states it, expected none with a file"
+            ) from None
+        return lab.read_emissivity_lines(Path(text))
+    return lab.EmissivityLine.constant(number, uncertainty or 0.0)
 
 
 def _print(result: "lab.RegionTemperatures") -> None:

@@ -22,45 +22,20 @@ _CLEARLY: Final = 4.0
 
 @dataclass(frozen=True)
 class ChosenTool:
-    """A tool, its uncertainty and its notes.
-
-    Parameters
-    ----------
-    tool : Tool
-        The tool in the measurement's coordinates.
-    notes : Notes
-        Assumptions, warnings and, as remarks, what was found.
-    uncertainty : ToolUncertainty, optional
-        How well its place is known, if it was found and no option gives an uncertainty.
-    """
+    """A tool, its uncertainty and its notes."""
 
     tool: Tool
+    """The tool in the measurement's coordinates."""
     notes: Notes = field(default_factory=Notes)
+    """Assumptions, warnings and, as remarks, what was found."""
     uncertainty: ToolUncertainty | None = None
+    """How well its place is known, if it was found and no option gives an uncertainty."""
 
 
 def chosen_tool(
     measurement: Measurement, tool: str | None, position: float | None = None
 ) -> ChosenTool:
-    """Return the tool that an option ``--tool`` chooses.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        The measurement.
-    tool : str, optional
-        A tool's YAML file, or ``found`` to detect the rake face in the image; by default the tool
-        that the measurement states.
-    position : float, optional
-        Standard uncertainty of positions in m, instead of that of a detected tool.
-
-    Raises
-    ------
-    ValueError
-        If there is no such tool.
-    OSError
-        If the file cannot be read.
-    """
+    """Return the tool that an option ``--tool`` chooses."""
     if tool is None:
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":
