@@ -13,7 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from chipglow.cli import app
-from chipglow.cli.finish import figure
+from chipglow.cli.screen import figure
 from chipglow.io import StoredScene, open_scene, write_scene
 from chipglow.quantities.format import rounded_text
 from chipglow.report import draw_scene, scene_summary

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
     from chipglow.laboratory import comparison as lab

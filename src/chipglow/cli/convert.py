@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from chipglow.cli import options as opt
-from chipglow.cli.finish import finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, finish
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording

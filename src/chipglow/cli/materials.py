@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, figure, finish
 from chipglow.cutting import material_file, material_names
 from chipglow.text import Notes
 

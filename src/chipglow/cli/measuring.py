@@ -5,8 +5,8 @@ from math import floor
 from pathlib import Path
 
 from chipglow.camera import Measurement
-from chipglow.cli.finish import finish
 from chipglow.cli.progress import progress_bars
+from chipglow.cli.screen import finish
 from chipglow.io import open_scene, write_measurement
 from chipglow.study import Study, fit
 

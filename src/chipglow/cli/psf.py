@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from chipglow.cli import options as opt
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, figure, finish
 
 
 def psf(

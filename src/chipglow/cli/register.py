@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import typer
 
 from chipglow.cli import options as opt
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
     from chipglow.camera import Measurement

@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TextIO
@@ -12,6 +12,7 @@ from chipglow.cli.tables import budget_frame, facts_table, screen_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
     from rich.console import Console
     from rich.table import Table
 
@@ -152,6 +153,29 @@ def begin() -> None:
 def current() -> Screen:
     """Return the output of the running command."""
     return _CURRENT.get()
+
+
+def finish(notes: "Notes", *files: tuple[Path | None, Callable[[Path], object]]) -> None:
+    """Print assumptions and warnings, then write each file that has a path."""
+    screen = current()
+    screen.notes(notes)
+    for path, write in files:
+        if path is not None:
+            write(path)
+            screen.file(path)
+
+
+def figure(draw: "Callable[..., Figure]", *arguments: Any) -> Callable[[Path], None]:
+    """Return a function that draws a figure and writes it in the format of the file's name."""
+
+    def write(path: Path) -> None:
+        from chipglow.io import atomic_path
+
+        drawn = draw(*arguments)
+        with atomic_path(path) as temporary:
+            drawn.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
+
+    return write
 
 
 def _plain(value: Any) -> Any:

@@ -11,8 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, figure, finish
 from chipglow.cli.times import frame_at
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
