@@ -13,6 +13,7 @@ import pytest
 import typer
 import yaml
 from analytic_chip import AnalyticChip
+from conftest import leave_undrawn
 from typer.testing import CliRunner
 
 from chipglow.camera import Camera, Measurement
@@ -49,7 +50,7 @@ analysis: {{exposures: 3, psf_widths: [8 um, 12 um]}}
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, undrawn, monkeypatch):
     monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
     work = tmp_path / "work"
     work.mkdir()
@@ -116,6 +117,7 @@ def finished(tmp_path_factory, chip_scene):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("CHIPGLOW_CACHE", str(work.parent / "run-cache"))
         patch.chdir(work)
+        leave_undrawn(patch)
         replace_cut(patch, chip_scene)
         return work, chipglow("run", "study.yaml", "--out", "results")
 
@@ -362,7 +364,9 @@ def write_foreign_chip(path, scene):
     np.savez(path, material=material, **fields)
 
 
-def test_run_analyses_an_imported_scene_instead_of_the_cut(folder, runs, chip_scene, finished):
+def test_run_analyses_an_imported_scene_instead_of_the_cut(
+    folder, runs, chip_scene, finished, read_here
+):
     write_foreign_chip(folder / "chip.npz", chip_scene)
     described = {
         "source": "chip.npz",

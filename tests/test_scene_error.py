@@ -7,6 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import leave_undrawn
 from typer.testing import CliRunner
 
 from chipglow.analysis import (
@@ -215,11 +216,12 @@ def reported(tmp_path_factory):
     (work / "study.yaml").write_text(STUDY)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(work)
+        leave_undrawn(patch)
         return work, chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out")
 
 
 @pytest.fixture
-def folder(reported, monkeypatch):
+def folder(reported, undrawn, monkeypatch):
     monkeypatch.chdir(reported[0])
     return reported[0]
 
