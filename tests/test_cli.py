@@ -13,8 +13,8 @@ import pytest
 import typer
 import yaml
 from analytic_chip import AnalyticChip
-from conftest import leave_undrawn
 from typer.testing import CliRunner
+from undrawn import leave_undrawn
 
 from chipglow.camera import Camera, Measurement
 from chipglow.cli import app

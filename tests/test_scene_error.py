@@ -7,8 +7,8 @@ import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import leave_undrawn
 from typer.testing import CliRunner
+from undrawn import leave_undrawn
 
 from chipglow.analysis import (
     LinePlace,
