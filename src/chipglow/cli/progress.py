@@ -69,11 +69,11 @@ def say_checkpoint(what: str, progress: float, resume: bool) -> None:
 @contextmanager
 def progress_bars() -> Iterator[Report]:
     """Show a progress bar on stderr for each step that is reported."""
-    columns = *Progress.get_default_columns(), "left,", TimeElapsedColumn(), "elapsed"
     console = Console(stderr=True)
     # Where Ctrl-C shows as ^C behind a bar that fills its line, the next bar would be one too low.
     console.width = max(console.width - _MARGIN, _MARGIN)
-    with Progress(*columns, console=console) as bars:
+    elapsed = "left,", TimeElapsedColumn(), "elapsed"
+    with Progress(*Progress.get_default_columns(), *elapsed, console=console) as bars:
         tasks: dict[str, TaskID] = {}
 
         def report(step: str, fraction: float) -> None:
