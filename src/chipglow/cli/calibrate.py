@@ -68,8 +68,8 @@ def calibrate(
     """
     from chipglow.camera import MODELS
     from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
-    from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
     from chipglow.laboratory.measurement.description import band_of
+    from chipglow.laboratory.measurement.figures import draw_calibrations
 
     try:
         camera_band = band_of(band)

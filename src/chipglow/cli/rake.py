@@ -34,7 +34,7 @@ def rake(
 ) -> None:
     """Average the radiance temperature in squares along the rake face (the paper's Figure 7)."""
     from chipglow.laboratory.chip import ToolUncertainty, chosen_tool, rake_grid
-    from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+    from chipglow.laboratory.chip.figures import draw_rake_grid
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
 

@@ -77,10 +77,10 @@ def register(
 ) -> None:
     """Map each point of an infrared image to a visible image."""
     from chipglow.laboratory import registration as lab
-    from chipglow.laboratory.chip import tool_of
+    from chipglow.laboratory.chip import load_tool
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
-    from chipglow.laboratory.registration.picture_file import PICTURE_SUFFIXES, write_blink
+    from chipglow.laboratory.registration.input_files import PICTURE_SUFFIXES, write_blink
     from chipglow.laboratory.result_file import write_frame
 
     if pairs is not None and align is None:
@@ -94,7 +94,7 @@ def register(
     _check_frame("--frame", frame, measured.times.size)
     _check_frame("--visible-frame", visible_frame, pictures.times.size)
     picture = pictures.signal[visible_frame]
-    outline = measured.tool if tool is None else tool_of(measured, tool)
+    outline = measured.tool if tool is None else load_tool(tool)
     fit: lab.PointFit | lab.DotFit | lab.ImageFit | None = None
     if known is not None:
         registration = lab.load_registration(known)

@@ -43,7 +43,7 @@ def shearband(
     """Read the radiance temperature along the shear band (the paper's Figure 9)."""
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
-    from chipglow.laboratory.chip.band_figure import draw_band_profile
+    from chipglow.laboratory.chip.figures import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from math import degrees, nan
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -57,12 +57,12 @@ def _show_scene(path: Path, at: float | None, plot: Path | None) -> None:
     summary = scene_summary(scene, time)
     screen = current()
     screen.facts("scene", _scene_facts(scene, path))
-    screen.heading(f"\nAt {microseconds(summary.times[summary.index])}:")
+    screen.heading(f"\nAt {microseconds(scene.times[summary.index])}:")
     screen.facts("state", _state(summary))
     screen.heading()
     _show_fields(summary)
-    screen.values(_raster_values(summary.raster, summary.times))
-    screen.values({"at_us": 1e6 * summary.times[summary.index]})
+    screen.values(_raster_values(scene.raster, scene.times))
+    screen.values({"at_us": 1e6 * scene.times[summary.index]})
     _show_attributes(scene.data.attrs, ("tool_",))
     finish(Notes(), (plot, figure(draw_scene, scene, time)))
     scene.data.close()
@@ -82,7 +82,7 @@ def _check_shown(path: Path) -> None:
 
 
 def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
-    from chipglow.laboratory.measurement.figure import draw_measurement
+    from chipglow.laboratory.measurement.figures import draw_measurement
 
     measurement = read_measurement(path)
     times = measurement.times
@@ -170,18 +170,8 @@ def _raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]
 
 def _show_fields(summary: "SceneSummary") -> None:
     everywhere = f"in {len(summary.sampled)} frames"
-    columns = {name: name for name in ("field", "unit", "least", "median", "greatest")}
-    columns[everywhere] = "overall"
-    frame = pd.DataFrame(
-        {
-            "field": field.field.title,
-            "unit": field.field.unit,
-            **dict(zip(("least", "median", "greatest"), field.now or (nan,) * 3, strict=True)),
-            "overall": field.overall or (),
-        }
-        for field in summary.fields
-    )
-    current().table("fields", frame, columns, "Over the material", unbroken=("field",))
+    columns = {everywhere if name == "overall" else name: name for name in summary.fields}
+    current().table("fields", summary.fields, columns, "Over the material", unbroken=("field",))
 
 
 def _show_attributes(attributes: Mapping[Any, Any], omitted: tuple[str, ...]) -> None:
