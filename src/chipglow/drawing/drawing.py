@@ -138,11 +138,6 @@ def draw_tool(axes: Axes, tool: Tool, factor: float = 1e6) -> None:
     axes.plot(*outline.T, color="black", linewidth=1.0)
 
 
-def black_tool(axes: Axes, tool: Tool) -> None:
-    """Fill the tool in black."""
-    axes.fill(*(tool.outline(3e-3) * 1e6).T, color="black")
-
-
 def draw_line(
     axes: Axes,
     points: NDArray[np.float64],
