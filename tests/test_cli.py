@@ -364,6 +364,7 @@ def write_foreign_chip(path, scene):
     np.savez(path, material=material, **fields)
 
 
+@pytest.mark.slow
 def test_run_analyses_an_imported_scene_instead_of_the_cut(
     folder, runs, chip_scene, finished, read_here
 ):
