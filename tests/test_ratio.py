@@ -461,7 +461,7 @@ def test_what_a_study_of_bands_refuses():
         WavelengthPlan((SHORT,))
     with pytest.raises(ValueError, match="bands: 2, expected two or more that differ"):
         WavelengthPlan((SHORT, SHORT))
-    with pytest.raises(ValueError, match="delay: -1, expected 0 or more"):
+    with pytest.raises(ValueError, match="delay: -1 s, expected 0 s or more"):
         WavelengthPlan((SHORT, LONG), delay=-1)
     with pytest.raises(
         ValueError, match=r"(?s)wavelengths.misregistration.*-1 um, expected 0 um or more"
