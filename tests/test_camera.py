@@ -585,7 +585,7 @@ def test_broken_measurements_are_refused(broken):
         {"lower_limit": 20.0},
         {"reflected": 20.0},
         {"band": "3-5 um"},
-        {"pitch": "6 um"},
+        {"pitch": "6 s"},
         {"shape": 5},
         {"shape": "5x"},
         {"shape": (5.0, 5.0)},
@@ -593,16 +593,16 @@ def test_broken_measurements_are_refused(broken):
         {"offset": "00"},
         {"fill_factor": "1"},
         {"psf": "12 um"},
-        {"integration_time": "10 us"},
-        {"frame_rate": "600 Hz"},
+        {"integration_time": "10 um"},
+        {"frame_rate": "600"},
         {"frame_rate": float("inf")},
-        {"lower_limit": "300 degC"},
-        {"reflected": "20 degC"},
+        {"lower_limit": "300"},
+        {"reflected": "-300 degC"},
     ],
     ids=str,
 )
 def test_impossible_cameras_are_refused(values):
-    with pytest.raises(ValueError, match=f"Camera.{next(iter(values))}: .*, expected"):
+    with pytest.raises(ValueError, match=rf"Camera.{next(iter(values))}(.\d)?: .*, expected"):
         Camera(**values)
 
 

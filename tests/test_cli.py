@@ -448,7 +448,7 @@ def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip
     np.testing.assert_allclose(ratio[solid & (raster.x < -106e-6)], 0.3, atol=2e-3)
     np.testing.assert_allclose(ratio[solid & (raster.x > -94e-6)], 0.8, atol=2e-3)
     (folder / "study.yaml").write_text(study.replace("seen: e.nc", "chip 1: e.nc"))
-    assert_refused(chipglow(*arguments), "surface: maps: 'chip 1' is the name of a chip too")
+    assert_refused(chipglow(*arguments), "surface: maps: 'chip 1' is the name of another chip too")
 
 
 def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):

@@ -142,8 +142,9 @@ class Parameter:
             for one in value:
                 self._check(one, text)
         elif type(value) in (int, float) and not self._holds(value):
-            expected = self.allowed or self._limits(text)
-            raise ValueError(f"{text(value)}, expected {expected}")
+            if self.allowed:
+                raise ValueError(f"{self._text(value)}, expected {self.allowed}")
+            raise ValueError(f"{text(value)}, expected {self._limits(text)}")
 
     def _holds(self, number: Any) -> bool:
         return (
