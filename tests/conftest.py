@@ -11,8 +11,7 @@ import pytest
 from hypothesis import settings
 
 from chipglow.cutting import FLOW_LAWS
-from chipglow.io.sandbox import Sandbox, _failure
-from chipglow.io.sources import SourceError
+from chipglow.io.sandbox import Sandbox, failure
 
 MOST_SECONDS = 1200
 
@@ -100,7 +99,7 @@ def read_here(monkeypatch):
     """Readers run in this process, without the 1.2 s that a subprocess takes to start."""
 
     @contextmanager
-    def answers(sandbox, job, most=0):
+    def answers(sandbox, job):
         yield answered(sandbox.name, job)
 
     monkeypatch.setattr(Sandbox, "answers", answers)
@@ -111,9 +110,7 @@ def answered(name, job):
     try:
         yield from job()
     except Exception as error:
-        failure = _failure(name, error)
-        wrong = FileNotFoundError if failure.kind == "missing" else SourceError
-        raise wrong(failure.header["text"]) from error
+        raise failure(name, error) from error
 
 
 @pytest.fixture

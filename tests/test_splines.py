@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import h5py
 import numba
 import numpy as np
 import pytest
@@ -212,7 +211,7 @@ def test_a_second_look_reads_nothing(tmp_path, monkeypatch):
             raise AssertionError("read again")
 
         with monkeypatch.context() as patch:
-            patch.setattr(h5py.Dataset, "__getitem__", refuse)
+            patch.setattr("chipglow.io.scene_file.read_chunk", refuse)
             again = scene.frame(3)
             with pytest.raises(AssertionError, match="read again"):
                 scene.frame(4)

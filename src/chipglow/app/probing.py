@@ -4,11 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from chipglow.io import is_measurement, open_scene, read_measurement
-from chipglow.io.sandbox import Message
 from chipglow.io.sources import SourceError
 
 
-def probed(path: Path, name: str) -> Iterator[Message]:
+def probed(path: Path, name: str) -> Iterator[int]:
     """Read what opening will read.
 
     Parameters
@@ -20,8 +19,8 @@ def probed(path: Path, name: str) -> Iterator[Message]:
 
     Yields
     ------
-    Message
-        How many frames it has.
+    int
+        Number of its frames.
 
     Raises
     ------
@@ -37,4 +36,4 @@ def probed(path: Path, name: str) -> Iterator[Message]:
             frames = len(scene)
     except (ValueError, OSError) as error:
         raise SourceError(str(error).replace(str(path), name)) from None
-    yield Message({"frames": frames})
+    yield frames

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chipglow.io.interrupts import uninterrupted
-from chipglow.io.unfinished import hold
+from chipglow.io.unfinished import has_checkpoint, hold
 
 MANIFEST: Final = ".chipglow-files"
 """File in a folder of results that lists the files that chipglow wrote there, one a line."""
@@ -30,6 +30,9 @@ def atomic_path(
     path: str | os.PathLike[str], keep: Callable[[Path], bool] = lambda _: False
 ) -> Iterator[Path]:
     """Write a file under a temporary name; move it into place at the end.
+
+    Temporary files of the same name whose process was killed are removed first, except those of a
+    scene that can be resumed.
 
     Parameters
     ----------
@@ -50,14 +53,20 @@ def atomic_path(
         As `check_output`; or if nothing can be written there; the message names `path`.
     """
     path = check_output(Path(path))
+    _remove_abandoned(path)
     temporary = _temporary_beside(path)
+    lock = None
     try:
         with _errors_name(path, temporary):
+            temporary.touch()
+            lock = _lock(temporary)
             yield temporary
             temporary.replace(path)
     finally:
         if not keep(temporary):
             temporary.unlink(missing_ok=True)
+        if lock is not None:
+            os.close(lock)
 
 
 @contextmanager
@@ -106,14 +115,12 @@ class KeptErrorFile(io.FileIO):
     """A file to write that keeps its first error, for the writer to raise.
 
     HDF5 loses the errors of what it writes late, and a process that closes an HDF5 file on a full
-    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`. The file is
-    held until it is closed, so that others see that it is being written.
+    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         super().__init__(path, "w+")
         self._error: OSError | None = None
-        hold(self.fileno())
 
     def write(self, data: Any) -> int:
         """Write all the data, or keep the error; after an error write nothing more."""
@@ -235,21 +242,26 @@ def _temporary_beside(path: Path) -> Path:
 
 
 def _remove_abandoned(path: Path) -> None:
-    """Remove temporary folders of `path` that no process holds any more."""
+    """Remove temporary files and folders of `path` that no process holds any more."""
     path = path.absolute()
     name = f".{escape(path.stem)}.{'[0-9a-f]' * 8}.part{escape(path.suffix)}"
-    for folder in path.parent.glob(name):
-        lock = _lock(folder)
+    for part in path.parent.glob(name):
+        lock = None if has_checkpoint(part) else _lock(part)
         if lock is not None:
-            shutil.rmtree(folder, ignore_errors=True)
+            if part.is_dir():
+                shutil.rmtree(part, ignore_errors=True)
+            else:
+                part.unlink(missing_ok=True)
             os.close(lock)
 
 
-def _lock(folder: Path) -> int | None:
-    """Hold a folder until the descriptor is closed; None if that is not possible."""
+def _lock(part: Path) -> int | None:
+    """Hold a file or folder until the descriptor is closed; None if that is not possible."""
+    if sys.platform == "win32":  # where an open file cannot be moved
+        return None
     try:
-        descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:  # Windows opens no folders
+        descriptor = os.open(part, os.O_RDONLY)
+    except OSError:
         return None
     if hold(descriptor):
         return descriptor

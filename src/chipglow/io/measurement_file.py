@@ -12,8 +12,8 @@ import xarray as xr
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.chunks import COMPRESSION
 from chipglow.io.digest import append_digest, check_file, is_intact
-from chipglow.io.packing import COMPRESSION
 
 Made = TypeVar("Made")
 

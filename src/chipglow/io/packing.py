@@ -8,13 +8,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-COMPRESSION: Final[Mapping[str, Any]] = {
-    "compression": "gzip",
-    "compression_opts": 1,
-    "shuffle": True,
-}
-"""Compression of all that is written: every reader of NetCDF-4 knows it, and it has a checksum."""
-
 
 class Packing(ABC):
     """How a field's float32 values are kept in a file."""

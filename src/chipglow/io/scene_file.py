@@ -16,16 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io import spline_file
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.chunks import COMPRESSION, read_chunk, write_chunk
 from chipglow.io.decoded import CACHED_BYTES, Decoded
 from chipglow.io.digest import append_digest, check_file
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import COMPRESSION, HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
+from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
     has_checkpoint,
-    keep_hold,
     write_checkpoint,
 )
 from chipglow.scene import (
@@ -186,7 +186,7 @@ class SceneWriter:
         self._file.resize_dimension("time", count + 1)
         self._file.variables["time"][count] = frame.time
         for name, values in packed.items():
-            self._file.variables[name][count] = values
+            write_chunk(self._hdf[name], count, values)
         self._sink.check(self.path)
         self._times.append(frame.time)
 
@@ -269,11 +269,8 @@ class SceneWriter:
 
     def _open(self, stack: ExitStack) -> None:
         stack.push(self._drop_checkpoint)
-        # A part that nobody holds is taken for abandoned: it is held until it is in its place.
-        moved = stack.enter_context(ExitStack())
         self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
         self._sink = stack.enter_context(KeptErrorFile(self._part))
-        keep_hold(self._sink, moved)
         stack.callback(self._sink.check, self.path)
         stack.callback(append_digest, self._sink)
         self._hdf = stack.enter_context(
@@ -452,7 +449,9 @@ class StoredScene(Scene):
         found = self._near_splines.get(index)
         if found is None:
             with self._telling(spline_file.SPLINES, index):
-                nodes, limits = (self._datasets[name][index] for name in spline_file.CHUNKED)
+                nodes, limits = (
+                    read_chunk(self._datasets[name], index) for name in spline_file.CHUNKED
+                )
             found = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
             spline_file.check(found)
             self._near_splines.keep(index, found, nodes.nbytes)
@@ -470,7 +469,7 @@ class StoredScene(Scene):
         packed = self._near.get((name, index))
         if packed is None:
             with self._telling(name, index):
-                packed = self._datasets[name][index]
+                packed = read_chunk(self._datasets[name], index)
             self._near.keep((name, index), packed, packed.nbytes)
         values = self._direct[name].unpack(packed)
         return values.copy() if values is packed else values

@@ -4,7 +4,7 @@ import os
 import sys
 import zlib
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
@@ -150,12 +150,6 @@ def hold(descriptor: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def keep_hold(file: FileIO, until: ExitStack) -> None:
-    """Keep a file locked until a stack ends, though it be closed before."""
-    if sys.platform != "win32":  # where nothing locks it, and an open file could not be moved
-        until.callback(os.close, os.dup(file.fileno()))
 
 
 def _draft(part: Path) -> Path:
