@@ -29,86 +29,38 @@ _RENAME_EXCHANGE: Final = 2
 def atomic_path(
     path: str | os.PathLike[str], keep: Callable[[Path], bool] = lambda _: False
 ) -> Iterator[Path]:
-    """Write a file under a temporary name; move it into place at the end.
+    """Write a file under a temporary name in the same folder; move it into place at the end.
 
-    Temporary files of the same name whose process was killed are removed first, except those of a
-    scene that can be resumed.
-
-    Parameters
-    ----------
-    path : path-like
-        The file to write; an existing file is replaced. Of a symbolic link its target is written.
-    keep : callable, optional
-        Told the temporary name if the block raises: whether to leave that file where it is.
-
-    Yields
-    ------
-    pathlib.Path
-        Temporary name in the same folder, with the same suffix. If the block raises, the file of
-        this name is removed, or kept, and `path` stays as it was.
-
-    Raises
-    ------
-    OSError
-        As `check_output`; or if nothing can be written there; the message names `path`.
+    An existing file is replaced; of a symbolic link the target. If the block raises, `path` stays
+    as it was, and the temporary file is removed unless `keep` says that it stays.
     """
     path = check_output(Path(path))
-    _remove_abandoned(path)
-    temporary = _temporary_beside(path)
-    lock = None
-    try:
-        with _errors_name(path, temporary):
-            temporary.touch()
-            lock = _lock(temporary)
+    with _temporary(path, Path.touch) as temporary:
+        try:
             yield temporary
             temporary.replace(path)
-    finally:
-        if not keep(temporary):
-            temporary.unlink(missing_ok=True)
-        if lock is not None:
-            os.close(lock)
+        finally:
+            if not keep(temporary):
+                temporary.unlink(missing_ok=True)
 
 
 @contextmanager
 def atomic_folder(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
     """Fill a folder of results under a temporary name; move it into place at the end.
 
-    Temporary folders of the same results whose process was killed are removed first.
-
-    Parameters
-    ----------
-    path : path-like
-        The folder to write. Files that chipglow wrote there earlier are replaced.
-    force : bool
-        Keep other files that the folder holds. By default such a folder is refused.
-
-    Yields
-    ------
-    pathlib.Path
-        Temporary folder beside it. If the block raises, it is removed and `path` stays as it was.
-
-    Raises
-    ------
-    OSError
-        As `check_output_folder`; or if nothing can be written there; the message names `path`.
+    Files that chipglow wrote there earlier are replaced. A folder with other files is refused; with
+    `force` it keeps them. If the block raises, `path` stays as it was.
     """
     path = check_output_folder(Path(path), force)
-    _remove_abandoned(path)
-    temporary = _temporary_beside(path)
-    lock = None
-    try:
-        with _errors_name(path, temporary):
-            temporary.mkdir()
-            lock = _lock(temporary)
+    with _temporary(path, Path.mkdir) as temporary:
+        try:
             yield temporary
             _write_manifest(temporary, _files(temporary))
-        check_output_folder(path, force)
-        with uninterrupted():
-            _replace_folder(temporary, path)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
+            check_output_folder(path, force)
+            with uninterrupted():
+                _replace_folder(temporary, path)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 class KeptErrorFile(io.FileIO):
@@ -148,19 +100,7 @@ class KeptErrorFile(io.FileIO):
 
 
 def check_output(path: Path) -> Path:
-    """Check that a file can be written; return it or, if it is a symbolic link, its target.
-
-    Raises
-    ------
-    FileNotFoundError
-        If its folder does not exist.
-    IsADirectoryError
-        If it is a folder.
-    PermissionError
-        If its folder is not writable.
-    OSError
-        If it is a device or another special file.
-    """
+    """Check that a file can be written; return it or, if it is a symbolic link, its target."""
     target = _checked_target(path)
     if target.is_dir():
         raise IsADirectoryError(f"{path}: is a folder, expected the name of a file")
@@ -170,19 +110,7 @@ def check_output(path: Path) -> Path:
 
 
 def check_output_folder(path: Path, force: bool = False) -> Path:
-    """Check that a folder of results can be written; return it or, of a link, its target.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the folder in which it would be does not exist.
-    NotADirectoryError
-        If it exists and is not a folder.
-    FileExistsError
-        If it holds a file that chipglow did not write, unless `force`.
-    PermissionError
-        If it is not writable.
-    """
+    """Check that a folder of results can be written; return it or, of a link, its target."""
     target = _checked_target(path)
     if not target.exists():
         return target
@@ -236,14 +164,25 @@ def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
         raise
 
 
-def _temporary_beside(path: Path) -> Path:
+@contextmanager
+def _temporary(path: Path, create: Callable[[Path], None]) -> Iterator[Path]:
+    """Create a file or folder beside `path` and hold it; others whose process ended are removed."""
     path = path.absolute()  # "." has no name
-    return path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    _remove_abandoned(path)
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    lock = None
+    try:
+        with _errors_name(path, temporary):
+            create(temporary)
+            lock = _lock(temporary)
+            yield temporary
+    finally:
+        if lock is not None:
+            os.close(lock)
 
 
 def _remove_abandoned(path: Path) -> None:
-    """Remove temporary files and folders of `path` that no process holds any more."""
-    path = path.absolute()
+    """Remove temporary files and folders of `path` that no process holds, but no checkpoint's."""
     name = f".{escape(path.stem)}.{'[0-9a-f]' * 8}.part{escape(path.suffix)}"
     for part in path.parent.glob(name):
         lock = None if has_checkpoint(part) else _lock(part)

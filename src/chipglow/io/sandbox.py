@@ -52,16 +52,10 @@ _END: Final = "end of the answers"
 
 @dataclass(frozen=True)
 class Sandbox:
-    """Limits of a subprocess in which a file is read.
+    """Limits of a subprocess in which a file is read, which errors call `name`.
 
-    Parameters
-    ----------
-    name : str
-        What errors call the file.
-    patience : float
-        Longest time in s for each answer.
-    memory : int
-        Maximum memory in bytes that the process may take for data; where the system can limit it.
+    `patience` is the maximum time in s for each answer, `memory` the bytes that it may take for
+    data where the system can limit it.
     """
 
     name: str
@@ -124,18 +118,9 @@ class Sandbox:
 
 @dataclass(frozen=True)
 class Isolated(Source):
-    """Another source, read in a subprocess.
+    """Another source, read in a subprocess: see `Sandbox`.
 
-    Parameters
-    ----------
-    source : Source
-        What to read.
-    name : str
-        What errors call it.
-    memory : int
-        Most memory in bytes that the process may take for data; where the system can limit it.
-    patience : float, optional
-        Longest time in s for the survey, and for a frame; as `patience_for` has it by default.
+    By default `patience_for` its files.
     """
 
     source: Source
@@ -170,15 +155,7 @@ def _survey(source: Source) -> Iterator[Survey]:
 
 
 def patience_for(inputs: Sequence[str]) -> float:
-    """How long to wait for an answer about files: `PATIENCE`, and `PATIENCE_PER_BYTE` of them.
-
-    `MOST_PATIENCE` at most.
-
-    Parameters
-    ----------
-    inputs : sequence of str
-        Files, folders with all below them, and patterns.
-    """
+    """Return the time in s to wait for an answer about files, folders and patterns."""
     size = sum(_size(file) for name in inputs for file in islice(_files_of(name), _MOST_FILES))
     return min(PATIENCE + PATIENCE_PER_BYTE * size, MOST_PATIENCE)
 

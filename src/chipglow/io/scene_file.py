@@ -3,7 +3,9 @@
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import lru_cache, partial
 from importlib.metadata import version
+from math import prod
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -17,7 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.io import spline_file
 from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.chunks import COMPRESSION, read_chunk, write_chunk
-from chipglow.io.decoded import CACHED_BYTES, Decoded
 from chipglow.io.digest import append_digest, check_file
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
@@ -79,6 +80,9 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
 _VERSION: Final = "v110"
 
 
+CACHED_BYTES: Final = 512 * 1024**2
+"""Size of the part of a scene that stays decompressed in memory: of a cut's splines all of it."""
+
 CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 """The fields that the cutting simulation knows."""
 
@@ -104,8 +108,6 @@ class SceneWriter:
     hottest : float
         Greatest temperature in K that the frames may have. Over the default, 1838.375 K,
         temperature takes 32 bits instead of 16 and reaches all that a scene may have.
-    packing : mapping
-        Resolution of each field; by default one that suits any scene.
     lattice : Lattice, optional
         Keep the splines of the frames instead of their samples; for frames that have them.
     resume : UnfinishedScene, optional
@@ -127,7 +129,6 @@ class SceneWriter:
         fields: Sequence[str] = CUT_FIELDS,
         *,
         hottest: float = HOTTEST_PACKED,
-        packing: Mapping[str, Packing] = PACKING,
         lattice: Lattice | None = None,
         resume: UnfinishedScene | None = None,
     ) -> None:
@@ -138,7 +139,7 @@ class SceneWriter:
         self._units = {name: units[name] for name in fields}
         self._lattice = lattice
         self._chunked = spline_file.CHUNKED if lattice else tuple(self._units)
-        self._packing = packing_for(hottest, packing)
+        self._packing = packing_for(hottest)
         self._stack = ExitStack()
         self._times: list[float] = []
         self._chunks: list[tuple[int, int, int]] = []
@@ -166,16 +167,7 @@ class SceneWriter:
 
     @uninterrupted()
     def append(self, frame: Frame) -> None:
-        """Write the next frame.
-
-        Raises
-        ------
-        SceneError
-            If the frame breaks the contract of a scene, is not later than the one before, lacks a
-            field, or has a value beyond the file's range.
-        OSError
-            If the file cannot be written, as on a full disk.
-        """
+        """Write the next frame."""
         if self._times and frame.time <= self._times[-1]:
             raise SceneError(
                 f"scene: frame at {frame.time:.9g} s, expected later than {self._times[-1]:.9g} s"
@@ -192,25 +184,7 @@ class SceneWriter:
 
     @uninterrupted()
     def checkpoint(self, state: Mapping[str, NDArray[Any]], progress: float) -> Path:
-        """Keep the frames so far, with a state to go on from, even if the process is killed.
-
-        Parameters
-        ----------
-        state : mapping
-            Arrays by name.
-        progress : float
-            Fraction of the work that is done, 0 to 1.
-
-        Returns
-        -------
-        pathlib.Path
-            The checkpoint's file; it is removed when the scene is complete.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written; the checkpoint before it stays.
-        """
+        """Keep the frames so far, with a state to go on from, even if the process is killed."""
         self._hdf.flush()
         self._sink.check(self.path)
         os.fsync(self._sink.fileno())
@@ -230,23 +204,7 @@ class SceneWriter:
         thrust: ArrayLike,
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
-        """Write the force history, once, and the energy balance with it.
-
-        Parameters
-        ----------
-        times : array_like
-            Times in s, ascending, shape (n,).
-        cutting, thrust : array_like
-            Forces per width of cut in N/m, shape (n,).
-        energies : mapping, optional
-            Energies per width of cut in J/m by the names of `ENERGY_UNITS`, each of shape (n,).
-
-        Raises
-        ------
-        SceneError
-            If an energy is missing or unknown, the shapes differ, a value is not finite or the
-            times do not ascend.
-        """
+        """Write the force history, once, and the energy balance with it."""
         time = np.asarray(times, dtype=np.float64)
         units = {**FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
         given = {"cutting_force": cutting, "thrust_force": thrust, **(energies or {})}
@@ -385,8 +343,11 @@ class StoredScene(Scene):
         self.lattice = spline_file.stored_lattice(self._file, data)
         if self.lattice is not None:
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
-        self._near_splines: Decoded[SplineFrame] = Decoded(CACHED_BYTES)
-        self._near: Decoded[NDArray[Any]] = Decoded(CACHED_BYTES)
+        samples = (
+            data.sizes["y"] * data.sizes["x"] if self.lattice is None else prod(self.lattice.shape)
+        )
+        chunks = CACHED_BYTES // (samples * np.dtype(np.float32).itemsize)
+        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, self._datasets))
         super().__init__(data)
 
     def coarser(self, step: int, every: int = 1) -> Scene:
@@ -416,11 +377,6 @@ class StoredScene(Scene):
         return HOTTEST_PACKED if narrow else HOTTEST_PLAUSIBLE
 
     @property
-    def packing(self) -> Mapping[str, Packing]:
-        """Resolution of each field."""
-        return {**PACKING, **self._direct}
-
-    @property
     def compression(self) -> str:
         """HDF5 filters of temperature or splines: ``shuffle, deflate``; ``none``."""
         kept = "temperature" if self.lattice is None else spline_file.SPLINES
@@ -446,43 +402,41 @@ class StoredScene(Scene):
         if self.lattice is None:
             return None
         index = range(len(self.times))[index]
-        found = self._near_splines.get(index)
-        if found is None:
-            with self._telling(spline_file.SPLINES, index):
-                nodes, limits = (
-                    read_chunk(self._datasets[name], index) for name in spline_file.CHUNKED
-                )
-            found = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
-            spline_file.check(found)
-            self._near_splines.keep(index, found, nodes.nbytes)
-        return found
+        nodes, limits = (self._chunk(name, index) for name in spline_file.CHUNKED)
+        frame = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
+        spline_file.check(frame)
+        return frame
 
     def _read(self, name: str, index: int) -> NDArray[Any]:
         splines = self.splines(index)
         if splines is not None:
             material = splines.material()
             return material if name == "material" else splines.values(name, material)
-        if name not in self._direct:
-            with self._telling(name, index):
-                return super()._read(name, index)
         index = range(len(self.times))[index]
-        packed = self._near.get((name, index))
-        if packed is None:
-            with self._telling(name, index):
-                packed = read_chunk(self._datasets[name], index)
-            self._near.keep((name, index), packed, packed.nbytes)
+        if name not in self._direct:
+            with _telling(self.path, name, index):
+                return super()._read(name, index)
+        packed = self._chunk(name, index)
         values = self._direct[name].unpack(packed)
         return values.copy() if values is packed else values
 
-    @contextmanager
-    def _telling(self, name: str, index: int) -> Iterator[None]:
-        """Say of what cannot be read where it is."""
-        try:
-            yield
-        except OSError as error:
-            raise SceneError(
-                f"{self.path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
-            ) from error
+
+def _read_chunk(
+    path: Path, datasets: Mapping[str, h5py.Dataset], name: str, index: int
+) -> NDArray[Any]:
+    with _telling(path, name, index):
+        return read_chunk(datasets[name], index)
+
+
+@contextmanager
+def _telling(path: Path, name: str, index: int) -> Iterator[None]:
+    """Say of what cannot be read where it is."""
+    try:
+        yield
+    except OSError as error:
+        raise SceneError(
+            f"{path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
+        ) from error
 
 
 class _CoarserScene(Scene):
@@ -563,7 +517,6 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
         attributes=scene.data.attrs,
         fields=scene.fields,
         hottest=stored.hottest if stored is not None else HOTTEST_PLAUSIBLE,
-        packing=stored.packing if stored is not None else PACKING,
         lattice=stored.lattice if stored is not None and not samples else None,
     ) as writer:
         for frame in scene.frames():
