@@ -28,7 +28,8 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
-from chipglow.analysis.error_images import LEAST_COVERED
+from chipglow.analysis.heated import heated_objects
+from chipglow.analysis.images import LEAST_COVERED
 from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
@@ -658,7 +659,11 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
     for order in ("detector", "optics"):
         errors = error_images(replace(CAMERA, psf_order=order), exposure_at(study, "chip 2"))
         across = study.places[0].lines(CAMERA.pitch)["rake"]
-        face = sample(errors.case_1, errors.raster, across.points[across.distance == 0.0])
+        face = sample(
+            errors.case_1.values,
+            study.measurements["chip 2"].raster,
+            across.points[across.distance == 0.0],
+        )
         first = data.sel(psf_order=order, reading="rake").isel(
             psf_width=at, exposure=0, pixel_phase=0
         )
@@ -687,7 +692,7 @@ def test_an_effect_switched_off_is_one_more_row(chip):
     exposure = CAMERA.expose(scene, CHIP_1, float(result.data.exposure[0]))
     for effect, seen in (("all", exposure), ("without motion", still(CAMERA, exposure)[1])):
         errors = error_images(CAMERA, seen)
-        expected = nearest(errors.measured, errors.raster, place.point)
+        expected = nearest(errors.measured.values, CAMERA.pixels(scene.raster), place.point)
         assert row.sel(effects=effect) == pytest.approx(float(expected), abs=1e-9)
     assert row.sel(effects="all") != row.sel(effects="without motion")
 
@@ -732,6 +737,15 @@ def test_a_part_that_fails_leaves_the_others(chip, monkeypatch):
     assert "columns 50.34 to 81.35" in result.failed["heated chips and tool"]
     assert result.cut.heated == () and result.cut.chip is not None
     assert set(headlines(result.data)) >= {"rake", "band"}
+
+
+def test_bands_far_apart_are_heated_on_a_wider_image():
+    """The body's region lies half a spacing beside the band: beyond 80 pixels of 2 um."""
+    camera = replace(CAMERA, pitch=2e-6)
+    chip, tool = heated_objects(camera, {"chip 1": CHIP_1}, TOOL, 20e-6, 180e-6, 1)
+    assert chip.map.raster.columns == 130
+    for row in (*chip.rows, *tool.rows):
+        assert row.found.mean == pytest.approx(row.true.mean, abs=0.05), row.feature
 
 
 def test_a_study_that_can_not_be_is_refused(chip):

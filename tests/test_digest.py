@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_io import a_file, a_measurement
 
-from chipglow.io import digest, open_scene, read_measurement, write_measurement
+from chipglow.io import digest, is_scene, open_scene, read_measurement, write_measurement
 from chipglow.io.chunks import COMPRESSION, read_chunk, write_chunk
 from chipglow.io.digest import is_intact
 from chipglow.io.sources import SourceError
@@ -55,6 +55,13 @@ def test_the_damaged_dataset_is_named(tmp_path, name):
     flip(path, place_of(path, name))
     with pytest.raises(ValueError, match=rf"scene\.nc: .*'{name}' is damaged"):
         open_scene(path)
+
+
+def test_a_damaged_file_is_named_whatever_it_is(tmp_path):
+    path = a_file(tmp_path)
+    flip(path, place_of(path, "x"))
+    with pytest.raises(ValueError, match=r"scene\.nc: 'x' is damaged"):
+        is_scene(path)
 
 
 def test_damage_that_hdf5_does_not_see_is_found(tmp_path):

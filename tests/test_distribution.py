@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution, ratio
+from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution
 
 CAUSES = ("segment", "texture", "pixel phase")
 
@@ -99,15 +99,6 @@ def test_the_place_of_a_value():
     assert found.fraction_below(-1.0) == 0.0
     assert found.fraction_below(4.0) == 0.45
     assert found.fraction_below(100.0) == 1.0
-
-
-def test_a_ratio_is_taken_draw_by_draw():
-    part = Distribution(np.array([[[-10.0, -30.0]]]), CAUSES)
-    whole = Distribution(np.array([[[-40.0, -60.0]]]), CAUSES)
-    found = ratio(part, whole)
-    assert found is not None
-    np.testing.assert_allclose(found.values, [[[0.25, 0.5]]])
-    assert ratio(whole, Distribution(np.array([[[-1.0, 0.0]]]), CAUSES)) is None
 
 
 @pytest.mark.parametrize(

@@ -12,13 +12,14 @@ import numpy as np
 import xarray as xr
 
 import chipglow
-from chipglow.analysis import RatioErrors, ratio_errors, wavelengths_frame
+from chipglow.analysis import ratio_errors, wavelengths_frame
 from chipglow.analysis.wavelengths import band_name
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.report.wavelength_figure import draw_wavelengths
+from chipglow.scene import Raster
 from chipglow.surface import CHIP_1
 
 matplotlib.use("Agg")
@@ -43,7 +44,8 @@ def main() -> None:
     camera = quick.camera.build()
     first, second = (replace(camera.in_band(band), lower_limit=None) for band in (SHORT, LONG))
     pair = RatioCamera(first, second, shift=(1e-6, 0.0))
-    draw_images(ratio_errors(pair, scene, CHIP_1, 379e-6), scene.tool)
+    errors = ratio_errors(pair, scene, CHIP_1, 379e-6)
+    draw_images(errors, pair.placed(scene.raster)[0].pixels(scene.raster), scene.tool)
     grey, metal = (chipglow.wavelengths(study(quick, law)) for law in ("none", METAL))
     draw_wavelengths(grey).savefig(HERE / "ratio-wavelengths.png", dpi=150)
     print_study(grey, metal)
@@ -77,22 +79,22 @@ def print_thermometers() -> None:
         print(f"| {band_name(band)} alone | {' | '.join(cells)} |")
 
 
-def draw_images(errors: RatioErrors, tool: Any) -> None:
+def draw_images(errors: xr.Dataset, raster: Raster, tool: Any) -> None:
     """Truth, ratio temperature, and what makes its error."""
     with drawing.style():
-        figure = drawing.image_figure(errors.raster, 2.6, 3)
+        figure = drawing.image_figure(raster, 2.6, 3)
         axes = figure.subplots(3, 2, sharex=True, sharey=True)
         shown = {"true temperature": errors.truth, "ratio temperature": errors.measured}
         for axis, (title, image) in zip(axes.flat, shown.items(), strict=False):
-            celsius = image - KELVIN
-            heat = drawing.show_image(axis, celsius, errors.raster, tool, HEAT, (20.0, 800.0))
+            celsius = image.values - KELVIN
+            heat = drawing.show_image(axis, celsius, raster, tool, HEAT, (20.0, 800.0))
             axis.set_title(title)
         drawing.colour_bar(figure, heat, axes[0], "°C")
         for axis, name in zip(axes.flat[2:], CAUSES, strict=True):
-            image = errors.causes[name]
-            part = drawing.show_image(axis, image, errors.raster, tool, SIGNED, (-20.0, 20.0))
+            image = errors.step.sel(cause=name).values
+            part = drawing.show_image(axis, image, raster, tool, SIGNED, (-20.0, 20.0))
             axis.set_title(f"by {name}")
-            hot = np.abs(image[errors.truth > HOT])
+            hot = np.abs(image[errors.truth.values > HOT])
             print(f"{name}: over 400 °C {np.median(hot):.2f} K and less, {hot.max():.1f} K at most")
         drawing.colour_bar(figure, part, axes[1:], "K")
         for axis in axes.flat:

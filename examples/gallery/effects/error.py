@@ -35,20 +35,20 @@ emissivity = camera.lay(chipglow.CHIP_2, scene)
 exposure = expose(
     scene, emissivity, camera.band, scene.times[24], camera.integration_time, camera.reflected
 )
-errors = chipglow.error_images(camera, exposure)
+errors, pixels = chipglow.error_images(camera, exposure), camera.pixels(scene.raster)
 
 shown = {
     "case 1: everything": errors.case_1,
     "case 2: without PSF": errors.case_2,
-    "part of the PSF": errors.case_1 - errors.case_2,
+    "part of the PSF": errors.psf_portion,
 }
 in_range = errors.reference > camera.lower_limit
-shown = {name: np.where(in_range, image, np.nan) for name, image in shown.items()}
+shown = {name: image.where(in_range).values for name, image in shown.items()}
 with style():
     figure = new_figure(2.7)
     figure.set_layout_engine("compressed")
     for axes, (name, image) in zip(figure.subplots(1, 3, sharey=True), shown.items(), strict=True):
-        picture = show_image(axes, image, errors.raster, scene.tool, SIGNED, (-120.0, 120.0))
+        picture = show_image(axes, image, pixels, scene.tool, SIGNED, (-120.0, 120.0))
         axes.set_title(name)
         axes.label_outer()
     figure.colorbar(picture, ax=figure.axes, label="K", extend="both")

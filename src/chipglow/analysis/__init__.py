@@ -1,102 +1,60 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
-from chipglow.analysis.cut import lacking, spread_starts
-from chipglow.analysis.distribution import Distribution, VarianceComponent
-from chipglow.analysis.engine import analyse
-from chipglow.analysis.error_images import (
-    ErrorImages,
-    Unblurred,
-    error_images,
-    reference_temperature,
+from chipglow.analysis.cut import (
+    Cut as Cut,
+    CuttingForces as CuttingForces,
+    lacking as lacking,
+    spread_starts as spread_starts,
 )
-from chipglow.analysis.error_parts import ErrorParts, error_parts
-from chipglow.analysis.looks import CASES, Effect, pixel_phases
+from chipglow.analysis.distribution import (
+    Distribution as Distribution,
+    VarianceComponent as VarianceComponent,
+)
+from chipglow.analysis.engine import Analysis as Analysis, analyse as analyse
+from chipglow.analysis.heated import HeatedObject as HeatedObject, HeatedRow as HeatedRow
+from chipglow.analysis.images import (
+    ALL as ALL,
+    CASES as CASES,
+    ExposureImages as ExposureImages,
+    error_images as error_images,
+    error_parts as error_parts,
+    pixel_phases as pixel_phases,
+    reference_temperature as reference_temperature,
+)
 from chipglow.analysis.places import (
-    BandPlace,
-    HottestPlace,
-    LinePlace,
-    Place,
-    PointPlace,
-    RakePlace,
-    RegionPlace,
+    BandPlace as BandPlace,
+    HottestPlace as HottestPlace,
+    LinePlace as LinePlace,
+    Place as Place,
+    PointPlace as PointPlace,
+    RakePlace as RakePlace,
+    RegionPlace as RegionPlace,
 )
-from chipglow.analysis.plan import Plan
-from chipglow.analysis.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
+from chipglow.analysis.plan import Plan as Plan
 from chipglow.analysis.reductions import (
-    Headline,
-    OneDraw,
-    headline,
-    headlines,
-    image_error,
-    image_psf_portion,
-    line_change,
-    line_error,
-    line_psf_portion,
-    line_steepest,
-    one_draw,
-    readings_frame,
-    sensitivity_error,
-    sensitivity_psf_fraction,
-    with_errors,
+    Headline as Headline,
+    OneDraw as OneDraw,
+    headline as headline,
+    headlines as headlines,
+    image_error as image_error,
+    image_psf_portion as image_psf_portion,
+    line_change as line_change,
+    line_error as line_error,
+    line_psf_portion as line_psf_portion,
+    line_steepest as line_steepest,
+    one_draw as one_draw,
+    readings_frame as readings_frame,
+    sensitivity_error as sensitivity_error,
+    sensitivity_psf_fraction as sensitivity_psf_fraction,
+    with_errors as with_errors,
 )
-from chipglow.analysis.result import Analysis, Cut, CuttingForces
 from chipglow.analysis.wavelengths import (
-    Spot,
-    WavelengthPlan,
-    cut_spots,
-    point_spots,
-    wavelength_errors,
-    wavelengths_frame,
+    CAUSES as CAUSES,
+    Spot as Spot,
+    WavelengthPlan as WavelengthPlan,
+    cut_spots as cut_spots,
+    point_spots as point_spots,
+    ratio_errors as ratio_errors,
+    wavelength_errors as wavelength_errors,
+    wavelengths_frame as wavelengths_frame,
 )
-
-__all__ = [
-    "CASES",
-    "RATIO_CAUSES",
-    "Analysis",
-    "BandPlace",
-    "Cut",
-    "CuttingForces",
-    "Distribution",
-    "Effect",
-    "ErrorImages",
-    "ErrorParts",
-    "Headline",
-    "HottestPlace",
-    "LinePlace",
-    "OneDraw",
-    "Place",
-    "Plan",
-    "PointPlace",
-    "RakePlace",
-    "RatioErrors",
-    "RegionPlace",
-    "Spot",
-    "Unblurred",
-    "VarianceComponent",
-    "WavelengthPlan",
-    "analyse",
-    "cut_spots",
-    "error_images",
-    "error_parts",
-    "headline",
-    "headlines",
-    "image_error",
-    "image_psf_portion",
-    "lacking",
-    "line_change",
-    "line_error",
-    "line_psf_portion",
-    "line_steepest",
-    "one_draw",
-    "pixel_phases",
-    "point_spots",
-    "ratio_errors",
-    "readings_frame",
-    "reference_temperature",
-    "sensitivity_error",
-    "sensitivity_psf_fraction",
-    "spread_starts",
-    "wavelength_errors",
-    "wavelengths_frame",
-    "with_errors",
-]

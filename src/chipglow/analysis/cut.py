@@ -1,4 +1,4 @@
-"""What an analysis needs to know of a cut: its shear bands, segments, forces and chip."""
+"""The cut of a scene: its shear bands, segments, forces and chip."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -8,13 +8,17 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.result import CuttingForces
+from chipglow.analysis.heated import HeatedObject
 from chipglow.cutting import EnergyHistory
 from chipglow.laboratory.chip import (
+    ChipMetrics,
+    Inertia,
     Instant,
     NoContactError,
     NoShearBandError,
     Segment,
+    Segmentation,
+    ShearBand,
     inertia,
     segmentation,
 )
@@ -29,20 +33,63 @@ _DEVELOPED: Final = 0.95
 _AROUND: Final = 2
 """Instants from the developed band to the one that still develops, and to the one that moved."""
 
+_NEEDED: Final = {
+    "plastic_strain": "plastic strain: no chip is told from the workpiece",
+    "plastic_strain_rate": "plastic strain rate: no shear band is looked for",
+    "velocity_x": "velocity: the chip's speed and shape are not measured",
+}
+"""Fields that the analysis of a cut needs, and what is missing without them."""
+
 
 @dataclass(frozen=True, eq=False)
-class Segments:
-    """Shear bands of a cut over time: those of the longest part first, then of `other_parts`.
+class CuttingForces:
+    """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
 
-    `segments` are those with a developed band: that of the instant `developed`, then one for each
-    other part with band and contact, whose instants are `drawn`.
+    `unaccounted` is the part of the drive's work that the energy balance of the cutting simulation
+    does not account for at the end; NaN if the scene has no energy account.
+    """
+
+    time: NDArray[np.float64]
+    cutting: NDArray[np.float64]
+    thrust: NDArray[np.float64]
+    segmentation: Segmentation
+    unaccounted: float
+    inertia: Inertia
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """What only a cut with a shear band and a contact at the rake face has.
+
+    `instants` show the shear band over the scene's longest part without a gap, then in each of the
+    `other_parts`; `developed` is the number of that with the fully developed band. `segments` are
+    the exposures that are drawn: the developed one, then one of each other part. `moments` are
+    frames before, with and after the developed band.
     """
 
     instants: tuple[Instant, ...]
     other_parts: int
     developed: int
-    drawn: tuple[int, ...]
     segments: tuple[Segment, ...]
+    moments: tuple[Frame, ...]
+    chip: ChipMetrics | None = None
+    forces: CuttingForces | None = None
+    heated: tuple[HeatedObject, ...] = ()
+
+    @property
+    def one_segment(self) -> tuple[Instant, ...]:
+        """The instants of the scene's longest part: how one band develops."""
+        return self.instants[: len(self.instants) - self.other_parts]
+
+    @property
+    def band(self) -> ShearBand:
+        """The fully developed shear band."""
+        return self.segments[0].band
+
+    @property
+    def band_width(self) -> float:
+        """Mean width of the segments' shear bands in m."""
+        return float(np.nanmean([segment.band_width for segment in self.segments]))
 
 
 def lacking(scene: Scene) -> Iterator[str]:
@@ -52,18 +99,12 @@ def lacking(scene: Scene) -> Iterator[str]:
             "No rake face is read: the scene has no tool (the section cutting.tool of the study "
             "gives it one)."
         )
-    for name, title, why in (
-        ("plastic_strain", "plastic strain", "no chip is told from the workpiece"),
-        ("plastic_strain_rate", "plastic strain rate", "no shear band is looked for"),
-        ("velocity_x", "velocity", "the chip's speed and shape are not measured"),
-    ):
+    for name, title in _NEEDED.items():
         if name not in scene.fields:
-            yield f"The scene has no {title}: {why}."
+            yield f"The scene has no {title}."
 
 
-def find_segments(
-    scene: Scene, duration: float, exposures: int, touching: float, tell: Progress
-) -> Segments:
+def find_cut(scene: Scene, duration: float, exposures: int, touching: float, tell: Progress) -> Cut:
     """Segments of a cut's chip with a developed shear band: one for each part of the scene.
 
     `duration` is that of an exposure in s; see `Plan` for `exposures` and `touching`.
@@ -82,24 +123,23 @@ def find_segments(
         instants.append(Instant.at(scene, float(start), duration))
     tell("shear band", 1.0)
     developed = _developed(scene, instants[: len(starts)])
-    found = {
-        i: Segment.of(scene, instants[i], duration, touching)
-        for i in (developed, *range(len(starts), len(instants)))
-        if instants[i].band is not None
-    }
-    if not found[developed].contact_length > 0:
+    segments = [
+        Segment.of(scene, instant, duration, touching)
+        for instant in (instants[developed], *instants[len(starts) :])
+        if instant.band is not None
+    ]
+    if not segments[0].contact_length > 0:
         raise NoContactError("rake face: the chip does not touch it in the developed instant")
-    found = {i: segment for i, segment in found.items() if segment.contact_length > 0}
-    return Segments(tuple(instants), len(others), developed, tuple(found), tuple(found.values()))
-
-
-def moments(scene: Scene, duration: float, found: Segments) -> tuple[Frame, ...]:
-    """Frames in the middle of instants: the band develops, is developed, has moved on."""
-    last = len(found.instants) - found.other_parts - 1
-    around = (found.developed - _AROUND, found.developed, found.developed + _AROUND)
-    chosen = sorted({min(max(number, 0), last) for number in around})
-    return tuple(
-        scene.frame(middle_frame(scene, found.instants[i].start, duration)) for i in chosen
+    around = (developed - _AROUND, developed, developed + _AROUND)
+    return Cut(
+        instants=tuple(instants),
+        other_parts=len(others),
+        developed=developed,
+        segments=tuple(segment for segment in segments if segment.contact_length > 0),
+        moments=tuple(
+            scene.frame(middle_frame(scene, starts[number], duration))
+            for number in sorted({min(max(number, 0), len(starts) - 1) for number in around})
+        ),
     )
 
 
@@ -119,8 +159,8 @@ def cutting_forces(scene: Scene) -> CuttingForces | None:
 
 def middle_frame(scene: Scene, start: float, duration: float) -> int:
     """Number of the frame in the middle of an exposure."""
-    after = np.searchsorted(scene.times, start + duration / 2 + 1e-6 * scene.frame_spacing)
-    return max(int(after) - 1, 0)
+    middle = start + duration / 2 + 1e-6 * scene.frame_spacing
+    return max(int(np.searchsorted(scene.times, middle, side="right")) - 1, 0)
 
 
 def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:

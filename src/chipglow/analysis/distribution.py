@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, nan, sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ COVERAGE: Final = 0.95
 """Probability with which one more draw lies within `Distribution.interval`."""
 
 
-@dataclass(frozen=True, eq=False)
-class VarianceComponent:
+class VarianceComponent(NamedTuple):
     """What one cause contributes to the scatter of a distribution.
 
     The cause took `draws` values. `standard_deviation` is that of the means over all other causes,
@@ -76,16 +75,15 @@ class Distribution:
         the means of each cause, and a rest that only combinations of causes make.
         """
         total = float(((self.values - self.mean) ** 2).sum())
-        parts = {}
+        parts, axes = {}, range(self.values.ndim)
         for axis, name in enumerate(self.causes):
-            means = self._means(axis)
+            means = self.values.mean(axis=tuple(other for other in axes if other != axis))
             squares = self.draws / means.size * float(((means - self.mean) ** 2).sum())
             deviation = float(means.std(ddof=1)) if means.size > 1 else nan
-            parts[name] = VarianceComponent(
-                means.size, deviation, squares / total if total else 0.0
-            )
+            fraction = squares / total if total else 0.0
+            parts[name] = VarianceComponent(means.size, deviation, fraction)
         rest = max(1.0 - sum(part.fraction for part in parts.values()), 0.0) if total else 0.0
-        freedom = self._freedom_together
+        freedom = self._freedoms[-1]
         deviation = sqrt(rest * total / freedom) if freedom else nan
         parts[TOGETHER] = VarianceComponent(self.draws, deviation, rest)
         return parts
@@ -124,25 +122,10 @@ class Distribution:
 
     def fraction_below(self, value: float) -> float:
         """Part of the draws under a value, 0 to 1; draws that equal it count half."""
-        below = np.count_nonzero(self.values < value) + 0.5 * np.count_nonzero(self.values == value)
-        return float(below / self.draws)
-
-    def _means(self, axis: int) -> NDArray[np.float64]:
-        others = tuple(other for other in range(self.values.ndim) if other != axis)
-        return np.asarray(self.values.mean(axis=others))
+        return float(((self.values < value) + 0.5 * (self.values == value)).mean())
 
     @property
     def _freedoms(self) -> list[int]:
         """Degrees of freedom of the causes, and of their combinations."""
-        return [*(count - 1 for count in self.values.shape), self._freedom_together]
-
-    @property
-    def _freedom_together(self) -> int:
-        return self.draws - 1 - sum(int(count) - 1 for count in self.values.shape)
-
-
-def ratio(part: Distribution, whole: Distribution) -> Distribution | None:
-    """Draw by draw, a part of a whole; None where a draw of the whole is 0."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        values = part.values / whole.values
-    return Distribution(values, whole.causes) if np.isfinite(values).all() else None
+        alone = [count - 1 for count in self.values.shape]
+        return [*alone, self.draws - 1 - sum(alone)]

@@ -1,48 +1,41 @@
 """The analysis of a scene: the schedule of its images, the places that are read, the result."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
 from typing import Any, Final, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
 from chipglow.analysis.cut import (
+    Cut,
     Progress,
-    Segments,
     cutting_forces,
-    find_segments,
+    find_cut,
     lacking,
     middle_frame,
-    moments,
     spread_starts,
 )
-from chipglow.analysis.dataset import (
-    assembled,
-    drawn_variables,
-    history_variables,
-    image_variables,
-    ridge_variables,
-    scene_variables,
-)
-from chipglow.analysis.looks import CASES, Effect, Looked, Schedule, View, look
+from chipglow.analysis.heated import heated_objects
+from chipglow.analysis.images import CASES, Array, Effect
+from chipglow.analysis.looks import Looked, Schedule, Variables, View, look, row_variables
 from chipglow.analysis.places import BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
-from chipglow.analysis.result import Analysis, Cut
+from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
 from chipglow.laboratory.chip import (
     NoContactError,
     NoShearBandError,
+    ShearBand,
     chip_metrics,
     contact_length,
     resolution_warnings,
 )
-from chipglow.laboratory.emissivity.heated import heated_objects
-from chipglow.scene import Frame, Material, Scene
+from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.tool_attributes import tool_attributes
-from chipglow.surface import Surface
+from chipglow.surface import EmissivityField, Surface
 
 PSF_ORDERS: Final = ("detector", "optics")
 """Where the point spread function acts: on the pixels' grid as in the paper, or before them."""
@@ -60,7 +53,57 @@ HEADLINES: Final[Mapping[tuple[str, str], str]] = {
 _USUAL_SPACING: Final = 180e-6
 """Distance of shear bands along a chip in m, if the forces show no period."""
 
+_SHOWN_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "material")
+_COORDINATES: Final = (
+    "place", "quantity", "seen_surface", "textures", "line_surface", "line_textures",
+)  # fmt: skip
+_KELVIN: Final = {"units": "K"}
+
 _Part = TypeVar("_Part")
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """The error of a camera against its scene.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Every number, in SI units; `chipglow.analysis.reductions` reads it.
+    plan : Plan
+        What was analysed.
+    camera : Camera
+        The camera.
+    raster : Raster
+        The scene's samples.
+    frame : Frame
+        The scene in the middle of the shown exposure.
+    tool : Tool or None
+        The scene's tool.
+    places : tuple of Place
+        Where the errors are read in the shown exposure.
+    measurements : mapping
+        By surface, one frame for each instant.
+    cut : Cut or None
+        What only a cut has.
+    warnings, missing : tuple of str
+        Sentences: what limits the validity of the results; what could not be analysed, and why.
+    failed : mapping
+        Parts of the analysis that failed, by title, with the reason.
+    """
+
+    data: xr.Dataset
+    plan: Plan
+    camera: Camera
+    raster: Raster
+    frame: Frame
+    tool: Tool | None
+    places: tuple[Place, ...]
+    measurements: Mapping[str, Measurement]
+    cut: Cut | None
+    warnings: tuple[str, ...]
+    missing: tuple[str, ...]
+    failed: Mapping[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,45 +174,57 @@ def analyse(
     tell = progress or (lambda label, part: None)
     task = _Task(scene, surfaces, camera, plan, tell, effects)
     fields = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
-    found, missing = _segments(task)
-    schedule, frame = _scene_schedule(task) if found is None else _cut_schedule(task, found)
+    cut, missing = _find_cut(task)
+    schedule = _scene_schedule(task) if cut is None else _cut_schedule(task, cut)
     looked = look(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
         name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
         for number, (name, images) in enumerate(looked.images.items())
     }
-    cut = None if found is None else _cut(task, found)
-    emissivities = [field.emissivity(frame) for field in fields.values()]
-    variables = _variables(
-        task, schedule, looked, frame, measurements, emissivities, found is not None
-    )
+    middle = middle_frame(scene, schedule.starts[schedule.shown], task.duration)
+    frame = cut.segments[0].frame if cut else scene.frame(middle)
+    variables = {
+        **_scene_variables(task, frame, fields, looked),
+        **_image_variables(measurements, looked, schedule.shown),
+        **row_variables(
+            looked.rows, schedule, HEADLINES if cut else {}, "segment" if cut else "exposure"
+        ),
+    }
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,
         "error_reference": plan.reference,
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
+    warnings = list(_image_warnings(task, looked))
     if cut is not None:
-        variables |= ridge_variables(cut.instants, measurements)
-        variables |= history_variables(cut.forces, cut.chip)
+        cut = _completed(task, cut)
+        warnings = [*resolution_warnings(scene, cut.band_width), *warnings]
+        variables |= _ridge_variables(cut, measurements) | _history_variables(cut)
+        variables["psf_order"] = "psf_order", list(PSF_ORDERS)
+        variables["psf_width"] = "psf_width", np.asarray(plan.psf_widths), {"units": "m"}
         attributes |= {"rake_surface": plan.rake_surface, "band_surface": plan.band_surface}
+    data = xr.Dataset(variables, attrs=attributes)
+    data = data.set_coords([name for name in _COORDINATES if name in data])
+    exposure = schedule.drawn.index(schedule.shown)
+    places = {place.name: place for view in schedule.views for place in view.places[exposure]}
     return Analysis(
-        data=assembled(variables, attributes),
+        data=data,
         plan=plan,
         camera=camera,
         raster=scene.raster,
         frame=frame,
         tool=scene.tool,
-        places=tuple(_shown_places(schedule)),
+        places=tuple(places.values()),
         measurements=measurements,
         cut=cut,
-        warnings=(*(_coarse(task, found) if found else ()), *_of_images(task, looked)),
-        missing=(*missing, *_unread(schedule, looked)),
+        warnings=tuple(warnings),
+        missing=(*missing, *_unread(data)),
         failed=task.failed,
     )
 
 
-def _segments(task: _Task) -> tuple[Segments | None, tuple[str, ...]]:
-    """Segments of a cut; None and the reasons if the scene shows none or none are wanted."""
+def _find_cut(task: _Task) -> tuple[Cut | None, tuple[str, ...]]:
+    """The cut; None and the reasons if the scene shows none or none is wanted."""
     plan, scene = task.plan, task.scene
     if plan.places or not plan.cut:
         return None, ()
@@ -179,34 +234,30 @@ def _segments(task: _Task) -> tuple[Segments | None, tuple[str, ...]]:
         if name not in task.surfaces:
             raise ValueError(f"plan: surface {name!r} is not one of {list(task.surfaces)}")
     try:
-        found = find_segments(scene, task.duration, plan.exposures, plan.touching, task.tell)
+        return find_cut(scene, task.duration, plan.exposures, plan.touching, task.tell), ()
     except (NoShearBandError, NoContactError) as error:
         return None, (f"Rake face and shear band are not analysed: {error}.",)
-    return found, ()
 
 
-def _cut_schedule(task: _Task, found: Segments) -> tuple[Schedule, Frame]:
-    plan, surfaces = task.plan, task.surfaces
-    reach = plan.line_reach, plan.line_step
-    segments = found.segments
-    used: list[tuple[str, list[list[Place]]]] = [
+def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
+    """All instants; the segments are drawn, at the rake face and in the shear band."""
+    plan, reach = task.plan, (task.plan.line_reach, task.plan.line_step)
+    used: tuple[tuple[str, list[list[Place]]], ...] = (
         (
             plan.rake_surface,
-            [[RakePlace("rake face", one.tool, one.contact_length, *reach)] for one in segments],
+            [[RakePlace("rake face", s.tool, s.contact_length, *reach)] for s in cut.segments],
         ),
-        (plan.band_surface, [[BandPlace("shear band", one.band, *reach)] for one in segments]),
-    ]
-    random = any(_is_random(surfaces[name]) for name, _ in used)
-    textures, phases = plan.textures if random else 1, plan.phases**2
-    strides = 2 * textures * phases, 2 * phases, 2
-    schedule = Schedule(
-        starts=np.array([instant.start for instant in found.instants]),
-        drawn=found.drawn,
-        shown=found.developed,
-        views=tuple(
-            View(name, places, textures, number, strides)
-            for number, (name, places) in enumerate(used)
-        ),
+        (plan.band_surface, [[BandPlace("shear band", s.band, *reach)] for s in cut.segments]),
+    )
+    textures = max(_textures(task, name) for name, _ in used)
+    shape = len(cut.segments), textures, plan.phases**2, len(used)
+    numbers = np.arange(np.prod(shape)).reshape(shape)
+    starts = [instant.start for instant in cut.instants]
+    return Schedule(
+        starts=np.array(starts),
+        drawn=tuple(starts.index(segment.start) for segment in cut.segments),
+        shown=cut.developed,
+        views=tuple(View(name, places, numbers[..., i]) for i, (name, places) in enumerate(used)),
         phases=plan.phases,
         reference=plan.reference,
         effects=task.effects,
@@ -216,25 +267,23 @@ def _cut_schedule(task: _Task, found: Segments) -> tuple[Schedule, Frame]:
             for width in plan.psf_widths
         ],
     )
-    return schedule, segments[0].frame
 
 
-def _scene_schedule(task: _Task) -> tuple[Schedule, Frame]:
+def _scene_schedule(task: _Task) -> Schedule:
+    """Exposures spread over the scene, which are all drawn; that with the hottest is shown."""
     plan, scene, duration = task.plan, task.scene, task.duration
     starts = spread_starts(scene, duration, plan.exposures)
-    frames = [middle_frame(scene, float(start), duration) for start in starts]
+    frames = [middle_frame(scene, start, duration) for start in starts]
     shown = int(np.argmax([float(scene.field("temperature", i).max()) for i in frames]))
-    frame = scene.frame(frames[shown])
-    places = tuple(_places(task, frame))
     for place in plan.places:
         place.check_within(task.camera.pixels(scene.raster))
-    views, first = [], 0
-    for name, surface in task.surfaces.items():
-        textures = plan.textures if _is_random(surface) else 1
-        strides = 0, plan.phases**2, 1
-        views.append(View(name, [places] * len(starts), textures, first, strides))
-        first += textures * plan.phases**2
-    schedule = Schedule(
+    places, views, first = tuple(_places(task, frames[shown])), [], 0
+    for name in task.surfaces:
+        shape = _textures(task, name), plan.phases**2
+        numbers = first + np.arange(np.prod(shape)).reshape(shape)
+        views.append(View(name, [places] * len(starts), np.stack([numbers] * len(starts))))
+        first += numbers.size
+    return Schedule(
         starts=starts,
         drawn=tuple(range(len(starts))),
         shown=shown,
@@ -243,129 +292,159 @@ def _scene_schedule(task: _Task) -> tuple[Schedule, Frame]:
         reference=plan.reference,
         effects=task.effects,
     )
-    return schedule, frame
 
 
-def _is_random(surface: Surface) -> bool:
-    return surface.redrawn(1) is not surface
+def _textures(task: _Task, name: str) -> int:
+    """How many textures of a surface are drawn: one if none is random."""
+    surface = task.surfaces[name]
+    return task.plan.textures if surface.redrawn(1) is not surface else 1
 
 
-def _places(task: _Task, frame: Frame) -> Iterator[Place]:
+def _places(task: _Task, middle: int) -> Iterator[Place]:
     """The hottest pixel, the rake face if material touches it, then the user's places."""
     plan, scene = task.plan, task.scene
     yield HottestPlace()
     if scene.tool is not None and not plan.places:
-        workpiece = frame.material == Material.WORKPIECE
+        workpiece = scene.field("material", middle) == Material.WORKPIECE
         contact = contact_length(scene.raster, workpiece, scene.tool, plan.touching)
         if contact > 0:
             yield RakePlace("rake face", scene.tool, contact, plan.line_reach, plan.line_step)
     yield from plan.places
 
 
-def _cut(task: _Task, found: Segments) -> Cut:
-    """Chip, forces and heated objects of a cut; each part may fail."""
+def _completed(task: _Task, cut: Cut) -> Cut:
+    """The cut with its chip, forces and heated objects; each of them may fail."""
     task.tell("chip", 0.0)
     chip = task.attempt("chip metrics", lambda: chip_metrics(task.scene))
     task.tell("chip", 1.0)
     spacing = chip.chip_spacing if chip and isfinite(chip.chip_spacing) else _USUAL_SPACING
+    textures, tool = task.plan.textures, cut.segments[0].tool
     heated = task.attempt(
         "heated chips and tool",
-        lambda: heated_objects(
-            task.camera,
-            task.surfaces,
-            found.segments[0].tool,
-            _band_width(found),
-            spacing,
-            task.plan.textures,
-        ),
+        lambda: heated_objects(task.camera, task.surfaces, tool, cut.band_width, spacing, textures),
     )
-    return Cut(
-        instants=found.instants,
-        other_parts=found.other_parts,
-        developed=found.developed,
-        segments=found.segments,
-        moments=moments(task.scene, task.duration, found),
-        chip=chip,
-        forces=task.attempt("forces", lambda: cutting_forces(task.scene)),
-        heated=heated or (),
-    )
+    forces = task.attempt("forces", lambda: cutting_forces(task.scene))
+    return replace(cut, chip=chip, forces=forces, heated=heated or ())
 
 
-def _band_width(found: Segments) -> float:
-    return float(np.nanmean([segment.band_width for segment in found.segments]))
-
-
-def _variables(
-    task: _Task,
-    schedule: Schedule,
-    looked: Looked,
-    frame: Frame,
-    measurements: Mapping[str, Measurement],
-    emissivities: Sequence[NDArray[np.float32]],
-    is_cut: bool,
-) -> dict[str, Any]:
-    camera, names = task.camera, list(task.surfaces)
-    exposures, stacks = zip(*(looked.shown[name] for name in names), strict=True)
-    measured = np.stack(stacks)
-    # A detector may flag more than what is under the limit.
-    flags = np.stack([measurements[name].usable[schedule.shown] for name in names])
-    variables = {
-        "surface": ("surface", names),
-        **scene_variables(
-            frame,
-            task.scene.raster,
-            emissivities,
-            [np.asarray(camera.band.temperature(one.centre_radiance)) for one in exposures],
+def _scene_variables(
+    task: _Task, frame: Frame, fields: Mapping[str, EmissivityField], looked: Looked
+) -> Variables:
+    """The scene at the shown exposure, and its emissivity and radiance temperature by surface."""
+    raster, temperature = task.scene.raster, task.camera.band.temperature
+    radiant = [temperature(exposure.centre_radiance) for exposure, _ in looked.shown.values()]
+    known = {name: getattr(frame, name) for name in _SHOWN_FIELDS}
+    over = "surface", "y", "x"
+    return {
+        "surface": ("surface", list(fields)),
+        "y": ("y", raster.y, {"units": "m"}),
+        "x": ("x", raster.x, {"units": "m"}),
+        **{
+            name: (over[1:], values, {"units": FIELD_UNITS[name]})
+            for name, values in known.items()
+            if values is not None
+        },
+        "emissivity": (
+            over,
+            np.stack([laid.emissivity(frame) for laid in fields.values()]),
+            {"units": "1"},
         ),
-        **image_variables(
-            list(measurements.values()),
-            [np.stack(looked.references[name]) for name in names],
-            measured,
-            ~flags,
+        "scene_radiance_temperature": (over, np.stack(radiant).astype(np.float32), _KELVIN),
+    }
+
+
+def _image_variables(
+    measurements: Mapping[str, Measurement], looked: Looked, shown: int
+) -> Variables:
+    """What the camera makes of every instant, and of the shown one with and without effects."""
+    every = list(measurements.values())
+    pixels, per_pixel = every[0].raster, ("pixel_y", "pixel_x")
+    over = "surface", "instant", *per_pixel
+    return {
+        "instant": ("instant", every[0].times, {"units": "s"}),
+        "pixel_y": ("pixel_y", pixels.y, {"units": "m"}),
+        "pixel_x": ("pixel_x", pixels.x, {"units": "m"}),
+        "radiance_temperature": (over, [one.radiance_temperature() for one in every], _KELVIN),
+        "reference_temperature": (over, list(looked.references.values()), _KELVIN),
+        "flags": (over, [one.flags for one in every], {"units": "1"}),
+        "image_measured": (
+            ("surface", "effects", *per_pixel),
+            np.stack([stack for _, stack in looked.shown.values()]),
+            _KELVIN,
         ),
-        **drawn_variables(
-            looked, schedule, HEADLINES if is_cut else {}, "segment" if is_cut else "exposure"
+        # A detector may flag more than what is under the limit.
+        "flagged": (
+            ("surface", *per_pixel),
+            np.stack([~one.usable[shown] for one in every]),
+            {"units": "1"},
         ),
     }
-    if schedule.vary:
-        variables["psf_order"] = "psf_order", list(PSF_ORDERS)
-        variables["psf_width"] = "psf_width", np.asarray(task.plan.psf_widths), {"units": "m"}
+
+
+def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Variables:
+    """The shear band's ridge in every instant, and what is measured along it."""
+    bands = [instant.band for instant in cut.instants]
+    length = max(band.ridge.distance.size for band in bands if band is not None)
+
+    def along(read: Callable[[int, ShearBand], Array]) -> Array:
+        """Values along the ridges, NaN beyond their ends."""
+        values = np.full((len(bands), length), np.nan)
+        for i, band in enumerate(bands):
+            if band is not None:
+                row = read(i, band)
+                values[i, : row.size] = row
+        return values
+
+    over = "instant", "ridge_point"
+    curves = []
+    for one in measurements.values():
+        # Whether under the lower limit or not.
+        frames, pixels = one.band.temperature(one.radiance), one.raster
+        curves.append(along(lambda i, band: sample(frames[i], pixels, band.ridge.points)))  # noqa: B023
+    temperatures = [instant.temperatures for instant in cut.instants]
+    return {
+        "ridge_distance": (over, along(lambda i, band: band.ridge.distance), {"units": "m"}),
+        "ridge_x": (over, along(lambda i, band: band.ridge.points[:, 0]), {"units": "m"}),
+        "ridge_y": (over, along(lambda i, band: band.ridge.points[:, 1]), {"units": "m"}),
+        "ridge_strain_rate": (over, along(lambda i, band: band.rate), {"units": "1/s"}),
+        "ridge_width": (over, along(lambda i, band: band.widths), {"units": "m"}),
+        "ridge_temperature": (over, along(lambda i, band: temperatures[i]), _KELVIN),
+        "ridge_radiance_temperature": (("surface", *over), np.stack(curves), _KELVIN),
+    }
+
+
+def _history_variables(cut: Cut) -> Variables:
+    """Forces and chip thickness over time, as far as they are known."""
+    variables: Variables = {}
+    if forces := cut.forces:
+        variables |= {
+            "force_time": ("force_time", forces.time, {"units": "s"}),
+            "cutting_force": ("force_time", forces.cutting, {"units": "N/m"}),
+            "thrust_force": ("force_time", forces.thrust, {"units": "N/m"}),
+        }
+    if cut.chip:
+        scan = cut.chip.scan
+        thickness = scan.thickness, {"units": "m", "height": scan.height}
+        variables |= {
+            "chip_time": ("chip_time", scan.time, {"units": "s"}),
+            "chip_thickness": ("chip_time", *thickness),
+        }
     return variables
 
 
-def _shown_places(schedule: Schedule) -> Iterator[Place]:
-    exposure = schedule.drawn.index(schedule.shown)
-    seen: set[str] = set()
-    for view in schedule.views:
-        for place in view.places[exposure]:
-            if place.name not in seen:
-                seen.add(place.name)
-                yield place
-
-
-def _coarse(task: _Task, found: Segments) -> tuple[str, ...]:
-    """What the grid of the cutting simulation does not resolve."""
-    return resolution_warnings(task.scene, _band_width(found))
-
-
-def _of_images(task: _Task, looked: Looked) -> Iterator[str]:
+def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
     """Warnings of the images of the shown exposure."""
     for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"
 
 
-def _unread(schedule: Schedule, looked: Looked) -> Iterator[str]:
-    """Places of any scene of which there is no reading that all draws have, a sentence each."""
-    for number, view in enumerate(schedule.views):
-        for place in view.places[0]:
-            rows = [
-                values[:, : view.textures]
-                for (of_view, name, _), values in looked.readings.rows.items()
-                if (of_view, name) == (number, place.name)
-            ]
-            if not any(np.isfinite(row).all() for row in rows):
-                yield (
-                    f"{place.name}, {view.surface}: not read: in some draw nothing radiates "
-                    "there, or it lies outside the pixels."
-                )
+def _unread(data: xr.Dataset) -> Iterator[str]:
+    """Places of which there is no reading that all draws have, a sentence each."""
+    read = {(one.place, one.surface) for one in headlines(data).values()}
+    for key in dict.fromkeys(zip(data.place.values, data.seen_surface.values, strict=True)):
+        if key not in read:
+            yield (
+                f"{', '.join(key)}: not read: in some draw nothing radiates there, or it lies "
+                "outside the pixels."
+            )

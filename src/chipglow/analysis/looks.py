@@ -4,59 +4,58 @@ Images that agree up to a stage share it: frames are read once for all surfaces 
 exposure, an exposure is formed by all cameras, and blurred radiance serves all pixel phases.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import ceil, floor
-from typing import Final, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.error_images import ReferenceKind, read_temperature, reference_temperature
-from chipglow.analysis.places import Place, Stack
-from chipglow.camera import Camera, Exposure, PointSpreadFunction, blur
+from chipglow.analysis.images import (
+    Array,
+    Effect,
+    ExposureImages,
+    ReferenceKind,
+    Stack,
+    around,
+    pixel_phases,
+)
+from chipglow.analysis.places import Place
+from chipglow.camera import Camera, Exposure
 from chipglow.radiometry import Band
 from chipglow.scene import Line, Raster, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import EmissivityField, Surface
 
-Array: TypeAlias = NDArray[np.float64]
-Effect: TypeAlias = Callable[[Camera, Exposure], tuple[Camera, Exposure]]
-"""Changes the camera or what reaches it, such as to switch an effect off."""
+Variables: TypeAlias = dict[str, Any]
 
-ALL: Final = "all"
-WITHOUT_PSF: Final = "without psf"
-
-
-def _without_psf(camera: Camera, exposure: Exposure) -> tuple[Camera, Exposure]:
-    # Without a PSF its order does not matter; one value lets cameras share the image.
-    return replace(camera, psf=None, psf_order="optics"), exposure
-
-
-CASES: Final[Mapping[str, Effect]] = {
-    ALL: lambda camera, exposure: (camera, exposure),
-    WITHOUT_PSF: _without_psf,
+_DRAWS = ("exposure", "texture", "pixel_phase")
+_DIMS = {
+    "readings": (*_DRAWS, "row"),
+    "varied": ("camera", "exposure", "pixel_phase", "row"),
+    "lines": (*_DRAWS, "row", "point"),
+    "line_place": ("exposure", "coordinate", "point"),
+    "line_scene": (*_DRAWS[:2], "point"),
+    "line_motion": (*_DRAWS[:2], "value"),
 }
-"""The paper's case 1 and case 2."""
+"""Axes of what is read; a row is the reference or what is measured with one of the effects."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """A surface and the places that are read on it in each drawn exposure.
 
-    Draws of a view have other noise of the detector each: their numbers begin with `first` and
-    grow by `strides` from one exposure, texture and pixel phase to the next.
+    `numbers` are those of the detector's noise, shape (exposure, texture, pixel phase).
     """
 
     surface: str
     places: Sequence[Sequence[Place]]
-    textures: int
-    first: int
-    strides: tuple[int, int, int]
+    numbers: NDArray[np.int_]
 
-    def number(self, *index: int) -> int:
-        """Number of the draw of an exposure, texture and pixel phase."""
-        return self.first + sum(i * step for i, step in zip(index, self.strides, strict=True))
+    @property
+    def textures(self) -> int:
+        """How many textures are drawn."""
+        return int(self.numbers.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,259 +76,225 @@ class Schedule:
     effects: Mapping[str, Effect]
     vary: Sequence[Callable[[Camera], Camera]] = ()
 
+    def sizes(self, pitch: float) -> dict[str, int]:
+        """Lengths of the axes of what is read."""
+        places = [place for view in self.views for places in view.places for place in places]
+        lines = [line for place in places for line in place.lines(pitch).values()]
+        return {
+            "exposure": len(self.drawn),
+            "texture": max((view.textures for view in self.views), default=1),
+            "pixel_phase": self.phases**2,
+            "row": 1 + len(self.effects),
+            "camera": len(self.vary),
+            "coordinate": 3,
+            "point": max((line.distance.size for line in lines), default=0),
+            "value": 1,
+        }
 
-class Table:
-    """Arrays of one shape by key, NaN where nothing was put."""
 
-    def __init__(self, *shape: int) -> None:
+class Rows(dict[tuple[int, str, str], Array]):
+    """Arrays of one shape by number of the view, place and name; NaN where nothing was put."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        super().__init__()
         self.shape = shape
-        self.rows: dict[tuple[int, str, str], Array] = {}
 
-    def put(self, key: tuple[int, str, str], index: tuple[int, ...], values: Array) -> None:
-        """Put values at an index of the first axes, and from the beginning of the last."""
-        row = self.rows.setdefault(key, np.full(self.shape, np.nan))
-        row[index][..., : values.shape[-1]] = values
+    def put(
+        self, view: int, place: Place, index: tuple[int, ...], values: Mapping[str, Array]
+    ) -> None:
+        """Put values by name at an index of the first axes, from the beginning of the last."""
+        for name, one in values.items():
+            key = view, place.name, name
+            if key not in self:
+                self[key] = np.full(self.shape, np.nan)
+            self[key][index][..., : one.shape[-1]] = one
 
+    @property
     def stacked(self) -> Array:
-        """All rows; the first axis is the keys'."""
-        return np.stack(list(self.rows.values())) if self.rows else np.empty((0, *self.shape))
+        """All arrays; the first axis is the keys'."""
+        return np.stack(list(self.values()))
 
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """What was read and seen. Keys of the tables are number of the view, place and quantity.
+    """What was read, and images (radiance) and references by surface and exposure.
 
-    `images` (radiance) and `references` are by surface and exposure, `shown` by surface: the
-    exposure, and what is measured with each of the effects, NaN where the reference is.
+    `shown` holds by surface the shown exposure and what is measured with each of the effects, NaN
+    where the reference is.
     """
 
-    images: Mapping[str, list[Array]]
-    references: Mapping[str, list[Array]]
+    images: dict[str, list[Array]]
+    references: dict[str, list[Array]]
     shown: dict[str, tuple[Exposure, Stack]]
-    readings: Table
-    varied: Table
-    lines: Table
-    line_places: Table
-    line_scene: Table
-    line_motion: Table
-
-
-class ExposureImages:
-    """Images of one exposure by cameras that differ in pixels, PSF or noise."""
-
-    def __init__(self, exposure: Exposure, reference: ReferenceKind) -> None:
-        self.exposure, self._kind = exposure, reference
-        self._references: dict[tuple[object, ...], Array] = {}
-        self._measured: dict[Camera, Array] = {}
-        self._blurred: tuple[PointSpreadFunction | None, Array] = None, np.zeros(0)
-
-    def stack(self, camera: Camera, effects: Mapping[str, Effect], keep: bool = True) -> Stack:
-        """Reference, then what is measured with each of the effects, shape (row, y, x).
-
-        `keep` says whether the images are kept for cameras that are equal under an effect.
-        """
-        reference = self._reference(camera)
-        rows = [reference]
-        for effect in effects.values():
-            changed, exposure = effect(camera, self.exposure)
-            if exposure is not self.exposure:
-                measured = ExposureImages(exposure, self._kind)._measure(changed)
-            elif (known := self._measured.get(changed)) is not None:
-                measured = known
-            else:
-                measured = self._measure(changed)
-                if keep:
-                    self._measured[changed] = measured
-            rows.append(np.where(np.isnan(reference), np.nan, measured))
-        return np.stack(rows)
-
-    def _reference(self, camera: Camera) -> Array:
-        key = (camera.pitch, camera.offset, camera.shape, camera.fill_factor)
-        if key not in self._references:
-            self._references[key] = reference_temperature(camera, self.exposure, self._kind)
-        return self._references[key]
-
-    def _measure(self, camera: Camera) -> Array:
-        radiance, psf = self.exposure.mean_radiance, camera.psf
-        if psf is not None and camera.psf_order == "optics" and "footprint" not in psf.includes:
-            radiance = self._blur(psf)
-            optical = replace(camera, psf=None)
-        else:
-            optical = camera
-        image = optical.form_image(radiance, self.exposure.raster)
-        return read_temperature(camera, image, self.exposure.start)[0]
-
-    def _blur(self, psf: PointSpreadFunction) -> Array:
-        """The radiance of the samples behind the optics; that of the last PSF is kept."""
-        if self._blurred[0] != psf:
-            exposure = self.exposure
-            self._blurred = psf, blur(exposure.mean_radiance, psf, exposure.raster.spacing)
-        return self._blurred[1]
-
-
-def pixel_phases(camera: Camera, count: int) -> list[Camera]:
-    """The camera with its pixels at other places of the scene, spread evenly over a pixel.
-
-    `count` is the number of places along each axis: `count`² cameras, each with as many whole
-    pixels as fit the scene. The first phase is the camera's own.
-    """
-    right, down = camera.offset
-    steps = camera.pitch * np.arange(count) / count
-    return [
-        replace(camera, shape=None, offset=(right + float(x), down + float(y)))
-        for y in steps
-        for x in steps
-    ]
+    rows: Mapping[str, Rows]
 
 
 def look(
     scene: Scene,
     surfaces: Mapping[str, Surface],
-    first: Mapping[str, EmissivityField],
+    fields: Mapping[str, EmissivityField],
     camera: Camera,
     schedule: Schedule,
     progress: Callable[[float], None],
 ) -> Looked:
     """Take the images of a schedule and read them; `progress` is told the fraction done.
 
-    `first` are the surfaces with their first texture on the scene.
+    `fields` are the surfaces with their first texture on the scene.
     """
+    first = {(name, 0): laid for name, laid in fields.items()}
     others = {
         (view.surface, number): camera.lay(surfaces[view.surface].redrawn(number), scene)
         for view in schedule.views
         for number in range(1, view.textures)
     }
-    looked = _empty(schedule, first, camera.pitch)
+    sizes = schedule.sizes(camera.pitch)
+    rows = {name: Rows(tuple(sizes[dim] for dim in dims)) for name, dims in _DIMS.items()}
+    looked = Looked({name: [] for name in fields}, {name: [] for name in fields}, {}, rows)
     cameras = pixel_phases(camera, schedule.phases)
     share = 1 / (len(schedule.starts) + len(schedule.drawn))
     for i, start in enumerate(schedule.starts):
         progress(share * (i + sum(number < i for number in schedule.drawn)))
-        drawn = schedule.drawn.index(i) if i in schedule.drawn else None
-        fields = [*first.values(), *(others.values() if drawn is not None else ())]
-        exposed = camera.expose_fields(scene, fields, float(start))
-        textures = dict(zip(first, exposed, strict=False))
-        for name, exposure in textures.items():
-            image = camera.form_image(exposure.mean_radiance, scene.raster)
-            looked.images[name].append(image)
-            reference = reference_temperature(camera, exposure, schedule.reference)
-            looked.references[name].append(reference)
-        seen = {(name, 0): exposure for name, exposure in textures.items()}
-        seen |= dict(zip(others, exposed[len(first) :], strict=drawn is not None))
-        if i == schedule.shown:
-            for number, (name, exposure) in enumerate(textures.items()):
-                images = ExposureImages(exposure, schedule.reference)
+        laid = first | others if i in schedule.drawn else first
+        exposed = camera.expose_fields(scene, list(laid.values()), float(start))
+        exposures = dict(zip(laid, exposed, strict=True))
+        for number, name in enumerate(fields):
+            images = ExposureImages(exposures[name, 0], schedule.reference)
+            looked.images[name].append(images.radiance(camera))
+            looked.references[name].append(images.reference(camera))
+            if i == schedule.shown:
                 stack = images.stack(camera.redrawn(number), schedule.effects)
-                looked.shown[name] = exposure, stack[1:]
-        if drawn is not None:
-            _draw(looked, schedule, drawn, seen, cameras)
+                looked.shown[name] = images.exposure, stack[1:]
+        if i in schedule.drawn:
+            _draw(rows, schedule, schedule.drawn.index(i), exposures, cameras)
     progress(1.0)
     return looked
 
 
-def _empty(schedule: Schedule, surfaces: Iterable[str], pitch: float) -> Looked:
-    exposures, phases = len(schedule.drawn), schedule.phases**2
-    textures = max((view.textures for view in schedule.views), default=1)
-    rows = 1 + len(schedule.effects)
-    places = [p for view in schedule.views for places in view.places for p in places]
-    sizes = [line.distance.size for place in places for line in place.lines(pitch).values()]
-    points = max(sizes, default=0)
-    return Looked(
-        images={name: [] for name in surfaces},
-        references={name: [] for name in surfaces},
-        shown={},
-        readings=Table(exposures, textures, phases, rows),
-        varied=Table(len(schedule.vary), exposures, phases, rows),
-        lines=Table(exposures, textures, phases, rows, points),
-        line_places=Table(exposures, 3, points),
-        line_scene=Table(exposures, textures, points),
-        line_motion=Table(exposures, textures, 1),
-    )
+def row_variables(
+    rows: Mapping[str, Rows], schedule: Schedule, names: Mapping[tuple[str, str], str], cause: str
+) -> Variables:
+    """Readings and lines over all draws.
+
+    `names` are those of readings by place and quantity, and `cause` says what an exposure is.
+    """
+    views = schedule.views
+
+    def named(view: int, text: str) -> str:
+        return f"{text} ({views[view].surface})" if not names and len(views) > 1 else text
+
+    readings, kelvin, metre = rows["readings"], {"units": "K"}, {"units": "m"}
+    values = readings.stacked
+    variables: Variables = {
+        "effects": ("effects", list(schedule.effects)),
+        "exposure": (
+            "exposure",
+            schedule.starts[list(schedule.drawn)],
+            {"units": "s", "title": cause},
+        ),
+        "texture": ("texture", np.arange(values.shape[2])),
+        "pixel_phase": ("pixel_phase", np.arange(values.shape[3])),
+        "reading": ("reading", [names.get((p, q), named(v, f"{p}, {q}")) for v, p, q in readings]),
+        "place": ("reading", [place for _, place, _ in readings]),
+        "quantity": ("reading", [quantity for _, _, quantity in readings]),
+        "seen_surface": ("reading", [views[view].surface for view, _, _ in readings]),
+        "textures": ("reading", [views[view].textures for view, _, _ in readings]),
+        "reference": (("reading", *_DRAWS), values[..., 0], kelvin),
+        "measured": (("reading", *_DRAWS, "effects"), values[..., 1:], kelvin),
+    }
+    if lines := rows["lines"]:
+        values, places = lines.stacked, rows["line_place"].stacked
+        scene, motion = rows["line_scene"].stacked, rows["line_motion"].stacked[..., 0]
+        variables |= {
+            "line": ("line", [named(view, line) for view, _, line in lines]),
+            "line_surface": ("line", [views[view].surface for view, _, _ in lines]),
+            "line_textures": ("line", [views[view].textures for view, _, _ in lines]),
+            **{
+                f"line_{name}": (("line", "exposure", "point"), places[:, :, i], metre)
+                for i, name in enumerate(("distance", "x", "y"))
+            },
+            "line_reference": (("line", *_DRAWS, "point"), values[..., 0, :], kelvin),
+            "line_measured": (("line", *_DRAWS, "effects", "point"), values[..., 1:, :], kelvin),
+            "line_scene": (("line", *_DRAWS[:2], "point"), scene, kelvin),
+            "line_motion": (("line", *_DRAWS[:2]), motion, kelvin),
+        }
+    if schedule.vary:
+        values = rows["varied"].stacked
+        values = values.reshape(len(readings), 2, -1, *values.shape[2:])
+        dims = ("reading", "psf_order", "psf_width", "exposure", "pixel_phase")
+        variables["varied_reference"] = dims, values[..., 0], kelvin
+        variables["varied_measured"] = (*dims, "effects"), values[..., 1:], kelvin
+    return variables
 
 
 def _draw(
-    looked: Looked,
+    rows: Mapping[str, Rows],
     schedule: Schedule,
     exposure: int,
-    seen: Mapping[tuple[str, int], Exposure],
+    exposures: Mapping[tuple[str, int], Exposure],
     cameras: Sequence[Camera],
 ) -> None:
     """Read every view of one exposure, for all textures, pixel phases and other cameras."""
     for number, view in enumerate(schedule.views):
+        places = view.places[exposure]
         for texture in range(view.textures):
-            images = ExposureImages(seen[view.surface, texture], schedule.reference)
-            noisy = [c.redrawn(view.number(exposure, texture, p)) for p, c in enumerate(cameras)]
-            for place in view.places[exposure]:
-                key = number, place.name
-                _read_scene(looked, key, (exposure, texture), place, images.exposure, cameras[0])
+            images = ExposureImages(exposures[view.surface, texture], schedule.reference, True)
+            draws = view.numbers[exposure, texture]
+            noisy = [c.redrawn(int(draw)) for c, draw in zip(cameras, draws, strict=True)]
+            for place in places:
+                lines = _scene_lines(place, images.exposure, cameras[0])
+                for name, index in (
+                    ("line_place", (exposure,)),
+                    ("line_scene", (exposure, texture)),
+                    ("line_motion", (exposure, texture)),
+                ):
+                    rows[name].put(number, place, index, lines[name])
             for phase, camera in enumerate(noisy):
                 stack = images.stack(camera, schedule.effects)
-                pixels = camera.pixels(images.exposure.raster)
-                for place in view.places[exposure]:
-                    key, index = (number, place.name), (exposure, texture, phase)
-                    lines = _read(looked.readings, key, index, place, stack, pixels)
-                    for name, values in lines.items():
-                        looked.lines.put((*key, name), index, values)
+                for place in places:
+                    readings, along = _read(place, stack, camera.pixels(images.exposure.raster))
+                    rows["readings"].put(number, place, (exposure, texture, phase), readings)
+                    rows["lines"].put(number, place, (exposure, texture, phase), along)
             for other, change in enumerate(schedule.vary if texture == 0 else ()):
                 for phase, camera in enumerate(noisy):
-                    stack = images.stack(change(camera), schedule.effects, keep=False)
-                    pixels = camera.pixels(images.exposure.raster)
-                    for place in view.places[exposure]:
-                        key, index = (number, place.name), (other, exposure, phase)
-                        _read(looked.varied, key, index, place, stack, pixels)
+                    stack = images.stack(change(camera), schedule.effects)
+                    for place in places:
+                        readings, _ = _read(place, stack, camera.pixels(images.exposure.raster))
+                        rows["varied"].put(number, place, (other, exposure, phase), readings)
 
 
 def _read(
-    table: Table,
-    key: tuple[int, str],
-    index: tuple[int, int, int],
-    place: Place,
-    images: Stack,
-    pixels: Raster,
-) -> dict[str, Stack]:
-    """Put the readings at a place into a table; gives the images along the place's lines."""
+    place: Place, images: Stack, pixels: Raster
+) -> tuple[Mapping[str, Stack], Mapping[str, Stack]]:
+    """Readings at a place, and the images along its lines."""
     lines = {
         name: np.array([sample(image, pixels, line.points) for image in images])
         for name, line in place.lines(pixels.spacing).items()
     }
-    for quantity, values in place.read(images, pixels, lines).items():
-        table.put((*key, quantity), index, values)
-    return lines
+    return place.read(images, pixels, lines), lines
 
 
-def _read_scene(
-    looked: Looked,
-    key: tuple[int, str],
-    index: tuple[int, int],
-    place: Place,
-    seen: Exposure,
-    camera: Camera,
-) -> None:
-    """Where the lines of a place lie, and what the scene's samples show there."""
-    for name, line in place.lines(camera.pitch).items():
-        row = *key, name
-        motion = _motion(camera.band, seen, line, place.motion_samples * seen.raster.spacing)
-        looked.line_places.put(row, index[:1], np.stack([line.distance, *line.points.T]))
-        looked.line_scene.put(row, index, _scene_along(camera.band, seen, line))
-        looked.line_motion.put(row, index, np.array([motion]))
+def _scene_lines(place: Place, exposure: Exposure, camera: Camera) -> dict[str, dict[str, Array]]:
+    """Where the lines of a place lie, what the scene's samples show there, and their motion."""
+    lines, band = place.lines(camera.pitch), camera.band
+    at = place.motion_samples * exposure.raster.spacing
+    return {
+        "line_place": {n: np.stack([one.distance, *one.points.T]) for n, one in lines.items()},
+        "line_scene": {n: _scene_along(band, exposure, one) for n, one in lines.items()},
+        "line_motion": {
+            n: np.array([_motion(band, exposure, one, at)]) for n, one in lines.items()
+        },
+    }
 
 
 def _scene_along(band: Band, exposure: Exposure, line: Line) -> Array:
     """Radiance temperature of the samples in the middle of the exposure along a line."""
-    grid = exposure.raster
-    columns, rows = ((line.points - [grid.left, grid.top]) * [1, -1] / grid.spacing).T
-    above, left = (
-        min(max(floor(places.min()) - 2, 0), count - 1)
-        for places, count in zip((rows, columns), grid.shape, strict=True)
-    )
-    below, right = (max(ceil(places.max()) + 2, 1) for places in (rows, columns))
-    part = exposure.centre_radiance[above : max(below, above + 1), left : max(right, left + 1)]
-    corner = grid.left + left * grid.spacing, grid.top - above * grid.spacing
-    return sample(band.temperature(part), Raster(*corner, grid.spacing, *part.shape), line.points)
+    part, window = around(exposure.raster, line.points)
+    return sample(band.temperature(exposure.centre_radiance[part]), window, line.points)
 
 
-def _motion(band: Band, exposure: Exposure, line: Line, place: float) -> float:
+def _motion(band: Band, exposure: Exposure, line: Line, place: float) -> Array:
     """Mean over the exposure less its peak, as radiance temperatures, at one sample."""
-    point = line.points[np.argmin(np.abs(line.distance - place))]
+    point = line.points[[np.argmin(np.abs(line.distance - place))]]
     mean = nearest(exposure.mean_radiance, exposure.raster, point)
     peak = nearest(exposure.peak_radiance, exposure.raster, point)
-    return float(band.temperature(mean)) - float(band.temperature(peak))
+    return np.asarray(band.temperature(mean) - band.temperature(peak), np.float64)

@@ -13,12 +13,12 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.images import Stack
 from chipglow.laboratory.chip import ShearBand
 from chipglow.scene import Line, Raster, Region, Tool, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
-Stack = NDArray[np.float64]
 NEAR: Final = 2.0
 """Distance in pixels within which an extremum of an image belongs to a place."""
 
@@ -72,11 +72,9 @@ class PointPlace(Place):
     point: Point
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """See `Place.read`."""
         return {"pixel": np.array([float(nearest(one, pixels, self.point)) for one in images])}
 
     def outline(self) -> NDArray[np.float64]:
-        """See `Place.outline`."""
         return np.array([self.point])
 
 
@@ -102,15 +100,12 @@ class LinePlace(Place):
         return Line(distance, np.stack(points, axis=1))
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
-        """See `Place.lines`."""
         return {self.name: self.line(pitch)}
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """See `Place.read`."""
         return _mean_and_extremes(lines[self.name])
 
     def outline(self) -> NDArray[np.float64]:
-        """See `Place.outline`."""
         return np.array(self.corners)
 
 
@@ -126,12 +121,10 @@ class RegionPlace(Place):
             raise ValueError(f"{self.name}: is in pixels, expected lengths such as 120 um")
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """See `Place.read`."""
         inside = self.region.shape.holds(*np.meshgrid(pixels.x, pixels.y))
         return _mean_and_extremes(images[:, inside])
 
     def outline(self) -> NDArray[np.float64]:
-        """See `Place.outline`."""
         corners = self.region.shape.outline
         return np.concatenate([corners, corners[:1]])
 
@@ -143,7 +136,6 @@ class HottestPlace(Place):
     name: str = "hottest pixel"
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """See `Place.read`."""
         greatest = np.where(np.isnan(images), -np.inf, images).max(axis=(1, 2))
         return {"peak": np.where(np.isfinite(greatest), greatest, np.nan)}
 
@@ -152,14 +144,7 @@ class HottestPlace(Place):
 class RakePlace(Place):
     """The rake face as far as the chip touches it, read across at mid-contact and along it.
 
-    Parameters
-    ----------
-    tool : Tool
-        The tool.
-    contact_length : float
-        Length of the contact in m, over 0.
-    half_length, step : float
-        Reach to either side of the line across it, and distance between points, in m.
+    The line across it reaches `half_length` to either side; its points are `step` apart, in m.
     """
 
     tool: Tool
@@ -180,20 +165,18 @@ class RakePlace(Place):
         }
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """See `Place.read`."""
         across, contact = lines["rake"], lines["contact"]
         distance = _to_both_sides(self.half_length, self.step)
         reference = _mean(contact[0])
-        errors = np.array([_mean(measured - contact[0]) for measured in contact[1:]])
+        errors = [_mean(measured - contact[0]) for measured in contact[1:]]
         lowest = _lowest_near(distance, across[1] - across[0], pixels.spacing)
         return {
             "mid-contact": across[:, np.argmin(np.abs(distance))],
             "most negative within two pixels": across[:, lowest],
-            "mean along the contact": np.array([reference, *(reference + errors)]),
+            "mean along the contact": reference + np.array([0.0, *errors]),
         }
 
     def outline(self) -> NDArray[np.float64]:
-        """See `Place.outline`."""
         return np.asarray(self.tool.rake_point(np.array([0.0, self.contact_length])))
 
 
@@ -201,12 +184,8 @@ class RakePlace(Place):
 class BandPlace(Place):
     """The shear band, read across its middle.
 
-    Parameters
-    ----------
-    band : ShearBand
-        The band.
-    half_length, step : float
-        Reach to either side of the ridge of the strain rate, and distance between points, in m.
+    The line reaches `half_length` to either side of the ridge of the strain rate; its points are
+    `step` apart, in m.
     """
 
     band: ShearBand
@@ -218,21 +197,18 @@ class BandPlace(Place):
         return {"band": self.band.across(self.half_length, self.step)}
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """See `Place.read`."""
         across = lines["band"]
         distance = self.band.across(self.half_length, self.step).distance
+        # A camera shows no strain rate: the hottest is the centre for who has the image alone.
         hottest = _lowest_near(distance, -across[1], pixels.spacing)
+        lowest = _lowest_near(distance, across[1] - across[0], inf)
         return {
             "ridge of strain rate": across[:, np.argmin(np.abs(distance))],
-            # A camera shows no strain rate: the centre for somebody who has the image alone.
             "ridge of measured temperature": across[:, hottest],
-            "most negative beside it": across[
-                :, _lowest_near(distance, across[1] - across[0], inf)
-            ],
+            "most negative beside it": across[:, lowest],
         }
 
     def outline(self) -> NDArray[np.float64]:
-        """See `Place.outline`."""
         return self.band.ridge.points
 
 

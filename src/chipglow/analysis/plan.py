@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from chipglow.analysis.error_images import ReferenceKind
+from chipglow.analysis.images import ReferenceKind
 from chipglow.analysis.places import Place
 
 

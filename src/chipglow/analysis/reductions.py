@@ -7,10 +7,9 @@ from math import nan
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
-from chipglow.analysis.distribution import Distribution, ratio
-from chipglow.analysis.looks import ALL, WITHOUT_PSF
+from chipglow.analysis.distribution import Distribution
+from chipglow.analysis.images import ALL, WITHOUT_PSF, Array
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
 
@@ -33,7 +32,9 @@ class Headline:
     def psf_fraction(self) -> Distribution | None:
         """The PSF's portion over the error, draw by draw; None if the error changes its sign."""
         low, high = self.error.range
-        return None if low <= 0 <= high else ratio(self.psf_portion, self.error)
+        if low <= 0 <= high:
+            return None
+        return Distribution(self.psf_portion.values / self.error.values, self.error.causes)
 
 
 @dataclass(frozen=True)
@@ -49,14 +50,16 @@ class OneDraw:
         return self.psf_portion / self.error if self.error else nan
 
 
-def error(data: xr.Dataset) -> xr.DataArray:
-    """Error of every reading with all effects (the paper's case 1) in every draw."""
-    return data["measured"].sel(effects=ALL, drop=True) - data["reference"]
+def error(data: xr.Dataset, kind: str = "", effects: str = ALL) -> xr.DataArray:
+    """Error of readings (or of `kind` line_ or varied_), by default with all effects."""
+    return data[f"{kind}measured"].sel(effects=effects, drop=True) - data[f"{kind}reference"]
 
 
-def psf_portion(data: xr.Dataset) -> xr.DataArray:
-    """What the point spread function adds to the error of every reading in every draw."""
-    return _portion(data.measured)
+def psf_portion(data: xr.Dataset, kind: str = "") -> xr.DataArray:
+    """What the point spread function adds to the error; see `error`."""
+    measured = data[f"{kind}measured"]
+    with_psf, without = (measured.sel(effects=name, drop=True) for name in (ALL, WITHOUT_PSF))
+    return with_psf - without
 
 
 def headline(data: xr.Dataset, reading: str) -> Headline | None:
@@ -66,8 +69,7 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
     one = data[["reference", "measured"]].sel(reading=reading)
     one = one.isel(texture=slice(int(one.textures)))
     values = [
-        np.asarray(array.transpose(*_DRAWS).values, np.float64)
-        for array in (one.reference, error(one), psf_portion(one))
+        array.transpose(*_DRAWS).values for array in (one.reference, error(one), psf_portion(one))
     ]
     if not np.isfinite(values).all():
         return None
@@ -75,14 +77,13 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
     place, quantity, surface = (
         str(one[name].item()) for name in ("place", "quantity", "seen_surface")
     )
-    draws = (Distribution(array, causes) for array in values)
-    return Headline(place, quantity, surface, *draws)
+    return Headline(place, quantity, surface, *(Distribution(array, causes) for array in values))
 
 
 def headlines(data: xr.Dataset) -> dict[str, Headline]:
     """All readings that are finite in every draw."""
-    found = {str(name): headline(data, str(name)) for name in data.reading.values}
-    return {name: one for name, one in found.items() if one is not None}
+    every = {str(name): headline(data, str(name)) for name in data.reading.values}
+    return {name: one for name, one in every.items() if one is not None}
 
 
 def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
@@ -93,13 +94,12 @@ def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
 
 def line_error(data: xr.Dataset, line: str) -> xr.DataArray:
     """Error along a line over exposure, texture, pixel phase and point."""
-    one = _line(data, line)
-    return one["line_measured"].sel(effects=ALL, drop=True) - one["line_reference"]
+    return error(_line(data, line), "line_")
 
 
 def line_psf_portion(data: xr.Dataset, line: str) -> xr.DataArray:
     """The PSF's portion along a line over exposure, texture, pixel phase and point."""
-    return _portion(_line(data, line).line_measured)
+    return psf_portion(_line(data, line), "line_")
 
 
 def line_change(data: xr.Dataset, line: str, near: float, far: float) -> float:
@@ -125,44 +125,36 @@ def image_error(data: xr.Dataset, effects: str = ALL) -> xr.DataArray:
 
 def image_psf_portion(data: xr.Dataset) -> xr.DataArray:
     """The PSF's portion of the error of every pixel in the shown exposure."""
-    return _portion(data.image_measured)
+    return psf_portion(data, "image_")
 
 
-def sensitivity_error(data: xr.Dataset, order: str, reading: str) -> NDArray[np.float64]:
+def sensitivity_error(data: xr.Dataset, order: str, reading: str) -> Array:
     """Mean error over exposures and pixel phases, by the width of the PSF."""
-    return _by_width(_varied_error(data, order, reading))
+    return _by_width(error(data.sel(psf_order=order, reading=reading), "varied_"))
 
 
-def sensitivity_psf_fraction(data: xr.Dataset, order: str, reading: str) -> NDArray[np.float64]:
+def sensitivity_psf_fraction(data: xr.Dataset, order: str, reading: str) -> Array:
     """Mean of the PSF's portion over the error, by the width of the PSF."""
-    one = data.varied_measured.sel(psf_order=order, reading=reading)
-    return _by_width(_portion(one) / _varied_error(data, order, reading))
+    one = data.sel(psf_order=order, reading=reading)
+    return _by_width(psf_portion(one, "varied_") / error(one, "varied_"))
 
 
 def with_errors(data: xr.Dataset) -> xr.Dataset:
     """The Dataset with the errors of the images and of the readings as variables."""
-    images = {
+    errors = {
         "error_case_1": image_error(data),
         "error_case_2": image_error(data, WITHOUT_PSF),
         "error_psf_portion": image_psf_portion(data),
     }
-    whole, portion = error(data), psf_portion(data)
-    draws = {
-        f"draws_{_key(str(name))}_{part}": array.sel(reading=name, drop=True).drop_vars(
-            [coordinate for coordinate, one in data.coords.items() if one.dims == ("reading",)],
-            errors="ignore",
-        )
-        for name in data.reading.values
-        for part, array in (("error", whole), ("psf_portion", portion))
-    }
-    lines = {}
+    for part, array in (("error", error(data)), ("psf_portion", psf_portion(data))):
+        for name in map(str, data.reading.values):
+            key = "_".join("".join(c if c.isalnum() else " " for c in name).split())
+            one = array.sel(reading=name, drop=True)
+            errors[f"draws_{key}_{part}"] = one.reset_coords(drop=True)
     if "line" in data.dims:
-        along = data["line_measured"]
-        lines["line_error"] = along.sel(effects=ALL, drop=True) - data["line_reference"]
-        lines["line_psf_portion"] = _portion(along)
-    errors = images | draws | lines
-    found = {name: array.assign_attrs(units="K") for name, array in errors.items()}
-    return data.assign(found)
+        errors["line_error"] = error(data, "line_")
+        errors["line_psf_portion"] = psf_portion(data, "line_")
+    return data.assign({name: array.assign_attrs(units="K") for name, array in errors.items()})
 
 
 def readings_frame(data: xr.Dataset) -> pd.DataFrame:
@@ -189,11 +181,6 @@ def readings_frame(data: xr.Dataset) -> pd.DataFrame:
     )
 
 
-def _portion(measured: xr.DataArray) -> xr.DataArray:
-    with_psf, without = (measured.sel(effects=name, drop=True) for name in (ALL, WITHOUT_PSF))
-    return with_psf - without
-
-
 def _line(data: xr.Dataset, line: str) -> xr.Dataset:
     """The variables of a line without the points beyond its end in the first exposure."""
     names = [name for name in data.data_vars if str(name).startswith("line_")]
@@ -203,25 +190,12 @@ def _line(data: xr.Dataset, line: str) -> xr.Dataset:
     return one.assign_coords(distance=distance).isel(point=np.isfinite(distance.values))
 
 
-def _scene_lines(
-    data: xr.Dataset, line: str
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def _scene_lines(data: xr.Dataset, line: str) -> Iterator[tuple[Array, Array]]:
     one = _line(data, line)
     scene = one.line_scene.transpose("exposure", "texture", "point").values
     for values in scene.reshape(-1, scene.shape[-1]):
         yield one.distance.values, values
 
 
-def _varied_error(data: xr.Dataset, order: str, reading: str) -> xr.DataArray:
-    one = data[["varied_reference", "varied_measured"]].sel(psf_order=order, reading=reading)
-    return one["varied_measured"].sel(effects=ALL, drop=True) - one["varied_reference"]
-
-
-def _by_width(values: xr.DataArray) -> NDArray[np.float64]:
-    mean = values.mean(("exposure", "pixel_phase"), skipna=False)
-    return np.asarray(mean.values, np.float64)
-
-
-def _key(name: str) -> str:
-    """A name for a variable of NetCDF."""
-    return "_".join("".join(c if c.isalnum() else " " for c in name).split())
+def _by_width(values: xr.DataArray) -> Array:
+    return np.asarray(values.mean(("exposure", "pixel_phase"), skipna=False).values)

@@ -1,34 +1,42 @@
-"""Which bands to measure with: the error of one band, and of the ratio of two, side by side."""
+"""The error of one band and of the ratio of two against the true temperature, cause by cause."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
-from math import hypot, isfinite, log
-from typing import Final, TypeAlias
+from math import isfinite, log
+from typing import Final
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
-from chipglow.analysis.cut import Progress, find_segments, spread_starts
-from chipglow.analysis.looks import pixel_phases
+from chipglow.analysis.cut import Progress, find_cut, middle_frame, spread_starts
+from chipglow.analysis.images import Array, around, pixel_phases
 from chipglow.analysis.places import PointPlace
 from chipglow.analysis.plan import Plan
-from chipglow.analysis.ratio_error import ideal_image, true_temperature
-from chipglow.camera import Camera, Exposure, expose_views, frame_weights
+from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
 from chipglow.camera.ratio_camera import views_of
 from chipglow.radiometry import Band, RatioThermometer
-from chipglow.scene import Raster, Scene
+from chipglow.scene import Material, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
 
-Array: TypeAlias = NDArray[np.float64]
+CAUSES: Final = (
+    "emissivity",
+    "motion",
+    "footprint",
+    "optics",
+    "misregistration",
+    "delay",
+    "noise",
+)
+"""What makes the error, in the order in which they come one upon the other."""
 
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
-"""Causes of the mean error; each is the difference to the cause before it."""
+"""Causes of the mean error of a band or ratio; the others scatter."""
 
-_FOOTPRINT, _FORMED, _DELAYED, _SHIFTED = range(4)
+_IDEAL, _FORMED, _DELAYED, _SHIFTED = range(4)
 """Pixels read in every band; from the last on there is one for each of the directions."""
 
 _DIRECTIONS: Final = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
@@ -69,6 +77,11 @@ class WavelengthPlan:
         order = sorted(range(len(self.bands)), key=middles.__getitem__)
         return combinations(order, 2)
 
+    @property
+    def ratios(self) -> list[tuple[int, ...]]:
+        """Numbers of the bands that are compared: each alone, then the pairs."""
+        return [*((number,) for number in range(len(self.bands))), *self.pairs]
+
 
 @dataclass(frozen=True, eq=False)
 class Spot:
@@ -78,6 +91,84 @@ class Spot:
     surface: str
     start: float
     point: Array
+
+
+def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: float) -> xr.Dataset:
+    """Errors of the ratio temperature of one exposure, and what makes them.
+
+    Parameters
+    ----------
+    camera : RatioCamera
+        The camera.
+    scene : Scene
+        What is truly there.
+    surface : Surface
+        Its emissivity.
+    start : float
+        When the first channel begins to integrate in s.
+
+    Returns
+    -------
+    xarray.Dataset
+        In K over ``y`` and ``x`` of the pixels: ``truth``, the true temperature at every pixel's
+        centre, linear between the samples, in the middle of the first channel's exposure, NaN
+        where there is no material; ``measured``, the ratio temperature, whether a channel's lower
+        range limit flags it or not; ``step``, what each ``cause`` adds to the error:
+        ``emissivity`` where its ratio is another than it is taken to be, or something is
+        reflected; ``motion`` during the exposures; the pixels' ``footprint``; point spread
+        functions and the rest of the ``optics``; ``misregistration``; the ``delay``; and
+        ``noise`` with all that detectors do.
+
+    Raises
+    ------
+    ValueError
+        If an integration reaches beyond the scene, or the pixels do not fit it.
+
+    Notes
+    -----
+    Differences of ratio temperatures, each with one cause more than the one before: of the samples
+    at the pixel's centre in the middle of the exposure; of their means over the exposure; of ideal
+    pixels; with the optics; with the second channel's pixels where they truly are; with its
+    exposure when it truly is; and as the detectors read them.
+    """
+    first, second = camera.placed(scene.raster)
+    aligned = replace(second, offset=first.offset)
+    duration, of_second = first.integration_time, second.integration_time
+    views = views_of(surface, scene, (first, second))
+    one, two = alike = expose_views(scene, views, start, duration)
+    if of_second != duration:
+        (two,) = expose_views(scene, views[1:], start, of_second)
+    late = two
+    if camera.delay:
+        (late,) = expose_views(scene, views[1:], start + camera.delay, of_second)
+    formed, delayed = _image(first, one), _image(second, late)
+    pixels = first.pixels(scene.raster)
+    points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
+    temperature = camera.thermometer.temperature
+    chain = [
+        *(
+            sample(on_samples, scene.raster, points)
+            for on_samples in (
+                true_temperature(scene, start + duration / 2),
+                temperature(*(exposure.centre_radiance for exposure in alike)),
+                temperature(one.mean_radiance, two.mean_radiance),
+            )
+        ),
+        temperature(_image(_ideal(first), one), _image(_ideal(aligned), two)),
+        temperature(formed, _image(aligned, two)),
+        temperature(formed, _image(second, two)),
+        temperature(formed, delayed),
+        temperature(_read(first, formed, one.start), _read(second, delayed, late.start)),
+    ]
+    over, kelvin = ("y", "x"), {"units": "K"}
+    return xr.Dataset(
+        {
+            "truth": (over, chain[0], kelvin),
+            "measured": (over, chain[-1], kelvin),
+            "step": (("cause", *over), np.diff(chain, axis=0), kelvin),
+        },
+        coords={"cause": list(CAUSES), "y": pixels.y, "x": pixels.x},
+    )
 
 
 def wavelength_errors(
@@ -118,23 +209,31 @@ def wavelength_errors(
     as equal. Steps are differences like those of `ratio_errors`.
     """
     tell = progress or (lambda label, part: None)
-    cameras = [replace(camera.in_band(band), detector=None) for band in plan.bands]
+    cameras = [camera.in_band(band) for band in plan.bands]
     kept = [spot for spot in spots if _has_room(scene, camera, spot.start, plan.delay)]
     if not kept:
         raise ValueError(
             f"delay: {1e6 * plan.delay:g} us, expected so little that the scene lasts until the "
             "second channel's exposure ends"
         )
-    gathered: dict[str, list[_Readings]] = {}
+    draws: dict[str, list[xr.Dataset]] = {}
     for i, spot in enumerate(kept):
         tell("bands", i / len(kept))
         surface = surfaces[spot.surface]
         for number in range(textures if surface.redrawn(1) is not surface else 1):
-            readings = _read(scene, surface.redrawn(number), cameras, plan, spot, phases)
-            gathered.setdefault(spot.place, []).append(readings)
+            read = _draws(scene, surface.redrawn(number), cameras, plan, spot, phases)
+            draws.setdefault(spot.place, []).append(read)
     tell("bands", 1.0)
-    places = {name: _Readings.joined(name, parts) for name, parts in gathered.items()}
-    return _dataset(plan, camera, places)
+    places = [_of_place(name, parts, cameras, plan) for name, parts in draws.items()]
+    data = xr.concat(places, pd.Index(list(draws), name="place"), join="outer")
+    names = [[band_name(plan.bands[number]) for number in bands] for bands in plan.ratios]
+    for variable in data.data_vars.values():
+        variable.attrs["units"] = "K"
+    return data.drop_vars("draw").assign_coords(
+        cause=list(STEPS),
+        first_um=("ratio", [one[0] for one in names]),
+        second_um=("ratio", [one[1] if len(one) > 1 else "" for one in names]),
+    )
 
 
 def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
@@ -175,9 +274,9 @@ def cut_spots(
     Raises a ValueError if there is no band or no contact.
     """
     tell = progress or (lambda label, part: None)
-    found = find_segments(scene, camera.integration_time, plan.exposures, plan.touching, tell)
+    cut = find_cut(scene, camera.integration_time, plan.exposures, plan.touching, tell)
     spots = []
-    for segment in found.segments:
+    for segment in cut.segments:
         tool = segment.tool
         inside = camera.pitch / 2 * np.array(tool.rake_normal)
         face = tool.rake_point(segment.contact_length / 2) + inside
@@ -216,83 +315,142 @@ def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
     return True
 
 
-@dataclass(frozen=True, eq=False)
-class _Readings:
-    """What is read at one place, in K and W/(m² sr).
-
-    `weights` and `truth` are those of the four samples around the pixel's centre, shape (sample,
-    draw), and `local` their radiance in the middle of the exposure and on average, shape (band, 2,
-    sample, draw). `pixel` is the pixel's radiance, shape (band, step, draw).
-    """
-
-    weights: Array
-    truth: Array
-    local: Array
-    pixel: Array
-
-    @classmethod
-    def joined(cls, place: str, parts: Sequence["_Readings"]) -> "_Readings":
-        """All draws of a place but those with a pixel at whose centre there is no material."""
-        weights, truth, local, pixel = (
-            np.concatenate([getattr(one, name) for one in parts], axis=-1)
-            for name in ("weights", "truth", "local", "pixel")
-        )
-        known = np.isfinite(truth).all(axis=0)
-        if not known.any():
-            raise ValueError(f"{place}: no material is there, expected some in one draw or more")
-        return cls(weights[:, known], truth[:, known], local[..., known], pixel[..., known])
-
-    def at_centre(self, values: NDArray[np.floating]) -> Array:
-        """Values of the samples, shape (..., sample, draw), at the pixel's centre."""
-        return np.asarray((values * self.weights).sum(axis=-2), np.float64)
-
-
-def _read(
+def _draws(
     scene: Scene,
     surface: Surface,
     cameras: Sequence[Camera],
     plan: WavelengthPlan,
     spot: Spot,
     phases: int,
-) -> _Readings:
-    """Readings of one spot with one texture, at every phase of the pixels."""
+) -> xr.Dataset:
+    """Every band and ratio at one spot with one texture, a draw for each phase of the pixels.
+
+    Beside the variables of `wavelength_errors`, ``gain`` is the change of temperature in K by a
+    relative change of radiance, and ``radiance`` that of the pixels by band.
+    """
     duration = cameras[0].integration_time
     views = views_of(surface, scene, cameras)
     exposures = late = expose_views(scene, views, spot.start, duration)
     if plan.delay:
         late = expose_views(scene, views, spot.start + plan.delay, duration)
-    centres = [_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)]
-    rows, columns, weights = _around(scene.raster, np.array(centres))
-    truth = true_temperature(scene, spot.start + duration / 2)
-    local = [
-        [one.centre_radiance[rows, columns], one.mean_radiance[rows, columns]] for one in exposures
-    ]
-    pixel = [
-        [
-            _of_pixel(phase, exposure, later, centre, plan.misregistration)
-            for phase, centre in zip(pixel_phases(camera, phases), centres, strict=True)
-        ]
+    centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
+    pixels = [
+        np.transpose(
+            [
+                _of_pixel(phase, exposure, later, centre, plan.misregistration)
+                for phase, centre in zip(pixel_phases(camera, phases), centres, strict=True)
+            ]
+        )
         for camera, exposure, later in zip(cameras, exposures, late, strict=True)
     ]
-    return _Readings(
-        weights, truth[rows, columns], np.array(local), np.moveaxis(np.array(pixel), 1, 2)
+    part, window = around(scene.raster, centres)
+    at_centres = partial(sample, raster=window, points=centres)
+    local = [np.stack([one.centre_radiance[part], one.mean_radiance[part]]) for one in exposures]
+    truth = true_temperature(scene, spot.start + duration / 2)[part]
+    steps, misregistration, gains, uncertainties = zip(
+        *(
+            _ratio(plan, bands, truth, local, pixels, at_centres)
+            if len(bands) > 1
+            else _alone(
+                plan, cameras[bands[0]], truth, local[bands[0]], pixels[bands[0]], at_centres
+            )
+            for bands in plan.ratios
+        ),
+        strict=True,
+    )
+    return xr.Dataset(
+        {
+            "truth": ("draw", at_centres(truth)),
+            "step": (("ratio", "cause", "draw"), np.stack(steps)),
+            "misregistration": (("ratio", "direction", "draw"), np.stack(misregistration)),
+            "gain": (("ratio", "draw"), np.stack(gains)),
+            "emissivity_uncertainty": (("ratio", "draw"), np.stack(uncertainties)),
+            "radiance": (("band", "draw"), np.stack(pixels)[:, _FORMED]),
+        }
     )
 
 
-def _around(raster: Raster, points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Rows, columns and weights of the four samples around points, each of shape (4, point)."""
-    column = (points[:, 0] - raster.x[0]) / raster.spacing
-    row = (raster.y[0] - points[:, 1]) / raster.spacing
-    left = np.clip(np.floor(column), 0, max(raster.columns - 2, 0)).astype(np.intp)
-    upper = np.clip(np.floor(row), 0, max(raster.rows - 2, 0)).astype(np.intp)
-    right, lower = np.minimum(left + 1, raster.columns - 1), np.minimum(upper + 1, raster.rows - 1)
-    across, down = np.clip(column - left, 0.0, 1.0), np.clip(row - upper, 0.0, 1.0)
+_Result = tuple[Array, Array, Array, Array]
+"""Steps, errors by misregistration, gain and uncertainty by the emissivity, all by draw."""
+
+
+def _alone(
+    plan: WavelengthPlan,
+    camera: Camera,
+    truth: Array,
+    local: Array,
+    pixels: Array,
+    at_centres: Callable[[Array], Array],
+) -> _Result:
+    """One band, by the emissivity that is at the pixel's centre."""
+    band = camera.band
+    environment = 0.0 if camera.reflected is None else float(band.radiance(camera.reflected))
+    emitted = np.asarray(band.radiance(truth)) - environment
+    of_samples = (local[0] - environment) / emitted
+    emissivity, own = at_centres(of_samples), at_centres(truth)
+
+    def temperature(radiance: Array, by: Array) -> Array:
+        return np.asarray(band.temperature((radiance - environment) / by + environment))
+
+    chain = [
+        own,
+        *(at_centres(temperature(one, of_samples)) for one in local),
+        temperature(pixels[_IDEAL], emissivity),
+        *2 * [temperature(pixels[_FORMED], emissivity)],
+    ]
+    slope = np.asarray(band.slope(own))
     return (
-        np.stack([upper, upper, lower, lower]),
-        np.stack([left, right, left, right]),
-        np.stack(
-            [(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across]
-        ),
+        np.diff(chain, axis=0),
+        np.zeros((len(_DIRECTIONS), own.size)),
+        pixels[_FORMED] / (emissivity * slope),
+        plan.emissivity_uncertainty * (np.asarray(band.radiance(own)) - environment) / slope,
+    )
+
+
+def _ratio(
+    plan: WavelengthPlan,
+    pair: Sequence[int],
+    truth: Array,
+    local: Sequence[Array],
+    pixels: Sequence[Array],
+    at_centres: Callable[[Array], Array],
+) -> _Result:
+    """The ratio of two bands, as of a grey body."""
+    bands = [plan.bands[number] for number in pair]
+    middles = [band.lower + band.upper for band in bands]
+    uncertainty = plan.exponent_uncertainty * log(middles[1] / middles[0])
+    thermometer = RatioThermometer(bands[0], bands[1], 1.0, uncertainty)
+    (here, there), own = (pixels[number] for number in pair), at_centres(truth)
+    formed = thermometer.temperature(here[_FORMED], there[_FORMED])
+    chain = [
+        own,
+        *map(at_centres, thermometer.temperature(local[pair[0]], local[pair[1]])),
+        thermometer.temperature(here[_IDEAL], there[_IDEAL]),
+        formed,
+        thermometer.temperature(here[_FORMED], there[_DELAYED]),
+    ]
+    return (
+        np.diff(chain, axis=0),
+        thermometer.temperature(here[_FORMED], there[_SHIFTED:]) - formed,
+        1 / thermometer.sensitivity(own),
+        thermometer.uncertainty(own),
+    )
+
+
+def _of_place(
+    name: str, parts: Sequence[xr.Dataset], cameras: Sequence[Camera], plan: WavelengthPlan
+) -> xr.Dataset:
+    """All draws of a place but those with a pixel at whose centre there is no material."""
+    data = xr.concat(parts, "draw").dropna("draw", subset=["truth"])
+    if not data.sizes["draw"]:
+        raise ValueError(f"{name}: no material is there, expected some in one draw or more")
+    radiances = data.radiance.mean("draw").values
+    relative = [_noise(camera, one) for camera, one in zip(cameras, radiances, strict=True)]
+    noise = [np.linalg.norm([relative[number] for number in bands]) for bands in plan.ratios]
+    return data.drop_vars(["gain", "radiance"]).assign(
+        noise=data.gain.mean("draw") * xr.DataArray(noise, dims="ratio"),
+        emissivity_uncertainty=data.emissivity_uncertainty.mean("draw"),
+        draw=np.arange(data.sizes["draw"]),
     )
 
 
@@ -314,140 +472,55 @@ def _of_pixel(
     distance: float,
 ) -> list[float]:
     """Radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
-    raster, pixels = exposure.raster, camera.pixels(exposure.raster)
+    raster = exposure.raster
 
-    def formed(of: Exposure, shift: tuple[float, float] = (0.0, 0.0)) -> float:
+    def read(camera: Camera, of: Exposure, shift: tuple[float, float] = (0.0, 0.0)) -> float:
         # The pixel that looks elsewhere is one of a grid that begins within the first pixel.
         corner = np.mod(np.array(camera.offset) + np.multiply(shift, [1, -1]), camera.pitch)
         moved = replace(camera, offset=(float(corner[0]), float(corner[1])))
-        image = moved.form_image(of.mean_radiance, raster)
-        return float(nearest(image, moved.pixels(raster), centre + shift))
+        return float(nearest(_image(moved, of), moved.pixels(raster), centre + shift))
 
-    own = formed(exposure)
+    own = read(camera, exposure)
     return [
-        float(nearest(ideal_image(camera, exposure), pixels, centre)),
+        read(_ideal(camera), exposure),
         own,
-        own if late is exposure else formed(late),
+        own if late is exposure else read(camera, late),
         *(
-            formed(exposure, (distance * x, distance * y)) if distance else own
+            read(camera, exposure, (distance * x, distance * y)) if distance else own
             for x, y in _DIRECTIONS
         ),
     ]
 
 
-def _noise(camera: Camera, radiance: Array) -> float:
+def _image(camera: Camera, exposure: Exposure) -> Array:
+    """Radiance of a camera's pixels before its detector in W/(m² sr), shape (y, x)."""
+    return camera.form_image(exposure.mean_radiance, exposure.raster)
+
+
+def _ideal(camera: Camera) -> Camera:
+    """The camera without its optics."""
+    return replace(camera, psf=None, optics=())
+
+
+def _read(camera: Camera, image: Array, start: float) -> Array:
+    """What the camera's detector makes of an image."""
+    return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)
+
+
+def true_temperature(scene: Scene, time: float) -> Array:
+    """True temperature of a scene's samples at a time in K, shape (y, x); NaN in the void."""
+    frame = scene.frame(middle_frame(scene, time, 0.0), ())
+    void = frame.material == Material.VOID
+    return np.where(void, np.nan, np.asarray(frame.temperature, np.float64))
+
+
+def _noise(camera: Camera, radiance: float) -> float:
     """Standard deviation of the radiance that a camera reads of such pixels, relative to it."""
     calibration = camera.calibration(_NOISE_SHAPE)
     if calibration is None:
         return 0.0
-    mean = float(radiance.mean())
-    temperature = float(camera.band.temperature(mean))
-    return float(calibration.netd(temperature) * camera.band.slope(temperature)) / mean
-
-
-@dataclass(frozen=True, eq=False)
-class _Error:
-    """What a band or a ratio makes of one place, by draw, and its standard uncertainties in K."""
-
-    steps: Array
-    misregistration: Array
-    noise: float
-    emissivity: float
-
-
-def _dataset(plan: WavelengthPlan, camera: Camera, places: Mapping[str, _Readings]) -> xr.Dataset:
-    ratios: list[tuple[int, ...]] = [(i,) for i in range(len(plan.bands))]
-    ratios += list(plan.pairs)
-    draws = max(one.truth.shape[1] for one in places.values())
-    shape = len(places), len(ratios)
-    truth = np.full((shape[0], draws), np.nan)
-    steps = np.full((*shape, len(STEPS), draws), np.nan)
-    shifts = np.full((*shape, len(_DIRECTIONS), draws), np.nan)
-    noise, emissivity = np.empty(shape), np.empty(shape)
-    for i, readings in enumerate(places.values()):
-        own = readings.at_centre(readings.truth)
-        truth[i, : own.size] = own
-        noises = [
-            _noise(camera.in_band(band), readings.pixel[number, _FORMED])
-            for number, band in enumerate(plan.bands)
-        ]
-        for j, bands in enumerate(ratios):
-            if len(bands) == 1:
-                one = _alone(plan, camera.reflected, bands[0], readings, noises[bands[0]])
-            else:
-                one = _ratio(plan, (bands[0], bands[1]), readings, noises)
-            steps[i, j, :, : own.size] = one.steps
-            shifts[i, j, :, : own.size] = one.misregistration
-            noise[i, j], emissivity[i, j] = one.noise, one.emissivity
-    names = [[band_name(plan.bands[number]) for number in bands] for bands in ratios]
-    kelvin, over = {"units": "K"}, ("place", "ratio")
-    return xr.Dataset(
-        {
-            "truth": (("place", "draw"), truth, kelvin),
-            "step": ((*over, "cause", "draw"), steps, kelvin),
-            "misregistration": ((*over, "direction", "draw"), shifts, kelvin),
-            "noise": (over, noise, kelvin),
-            "emissivity_uncertainty": (over, emissivity, kelvin),
-        },
-        coords={
-            "place": list(places),
-            "cause": list(STEPS),
-            "first_um": ("ratio", [one[0] for one in names]),
-            "second_um": ("ratio", [one[1] if len(one) > 1 else "" for one in names]),
-        },
-    )
-
-
-def _alone(
-    plan: WavelengthPlan, reflected: float | None, number: int, readings: _Readings, noise: float
-) -> _Error:
-    """One band, by the emissivity that is at the pixel's centre."""
-    band, truth = plan.bands[number], readings.at_centre(readings.truth)
-    environment = 0.0 if reflected is None else float(band.radiance(reflected))
-    of_samples = (readings.local[number, 0] - environment) / (
-        band.radiance(readings.truth) - environment
-    )
-    emissivity = readings.at_centre(of_samples)
-
-    def told(radiance: Array, by: Array) -> Array:
-        own = (radiance - environment) / by + environment
-        return np.asarray(band.temperature(own), np.float64)
-
-    centre, mean = (readings.at_centre(told(one, of_samples)) for one in readings.local[number])
-    ideal, formed = (told(one, emissivity) for one in readings.pixel[number, : _FORMED + 1])
-    slope = band.slope(truth)
-    uncertain = plan.emissivity_uncertainty * (band.radiance(truth) - environment) / slope
-    return _Error(
-        steps=np.diff([truth, centre, mean, ideal, formed, formed], axis=0),
-        misregistration=np.zeros((len(_DIRECTIONS), truth.size)),
-        noise=float(np.mean(noise * readings.pixel[number, _FORMED] / (emissivity * slope))),
-        emissivity=float(np.mean(uncertain)),
-    )
-
-
-def _ratio(
-    plan: WavelengthPlan, pair: tuple[int, int], readings: _Readings, noise: Sequence[float]
-) -> _Error:
-    """The ratio of two bands, as of a grey body."""
-    first, second = (plan.bands[number] for number in pair)
-    one, other = (readings.pixel[number] for number in pair)
-    middles = first.lower + first.upper, second.lower + second.upper
-    uncertainty = plan.exponent_uncertainty * log(middles[1] / middles[0])
-    thermometer = RatioThermometer(first, second, 1.0, uncertainty)
-    centre, mean = readings.at_centre(
-        thermometer.temperature(readings.local[pair[0]], readings.local[pair[1]])
-    )
-    ideal, formed = thermometer.temperature(one[: _FORMED + 1], other[: _FORMED + 1])
-    delayed = thermometer.temperature(one[_FORMED], other[_DELAYED])
-    shifted = thermometer.temperature(one[_FORMED], other[_SHIFTED:])
-    truth = readings.at_centre(readings.truth)
-    relative = hypot(*(noise[number] for number in pair))
-    return _Error(
-        steps=np.diff([truth, centre, mean, ideal, formed, delayed], axis=0),
-        misregistration=shifted - formed,
-        noise=float(np.mean(relative / thermometer.sensitivity(truth))),
-        emissivity=float(np.mean(thermometer.uncertainty(truth))),
-    )
+    temperature = float(camera.band.temperature(radiance))
+    return float(calibration.netd(temperature) * camera.band.slope(temperature)) / radiance
 
 
 def band_name(band: Band) -> str:

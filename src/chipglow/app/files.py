@@ -53,9 +53,9 @@ def measurement_file(picture: Picture, model: SceneModel) -> bytes:
         measurement = measurement.with_tool(model.opened.scene.tool)
     place, units = ("time", "y", "x"), {"units": "K"}
     data = measurement.data.assign(
-        reference_temperature=(place, picture.errors.reference[None], units),
-        error=(place, picture.errors.case_1[None], units),
-        error_without_psf=(place, picture.errors.case_2[None], units),
+        reference_temperature=(place, picture.errors.reference.values[None], units),
+        error=(place, picture.errors.case_1.values[None], units),
+        error_without_psf=(place, picture.errors.case_2.values[None], units),
     )
     with TemporaryDirectory() as folder:
         path = Path(folder, "measurement.nc")

@@ -12,16 +12,15 @@ from threading import Lock
 from typing import Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import (
+    ALL,
+    CASES,
     Distribution,
-    ErrorImages,
-    ErrorParts,
+    ExposureImages,
     LinePlace,
-    Unblurred,
-    error_images,
-    error_parts,
     pixel_phases,
 )
 from chipglow.app.controls import LINES, SCENE_IMAGES, Controls, Stage, State
@@ -98,7 +97,8 @@ class Picture:
     lines: dict[str, LineValues]
     quick: bool = False
     scene: SceneImage | None = None
-    errors: ErrorImages | None = None
+    images: ExposureImages | None = None
+    errors: xr.Dataset | None = None
     error: Array | None = None
     camera: Camera | None = None
     exposures: tuple[Exposure, ...] = ()
@@ -115,7 +115,7 @@ class Readout:
     true: float = nan
     emissivity: float = nan
     reference: float = nan
-    parts: ErrorParts | None = None
+    parts: xr.Dataset | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,10 +160,9 @@ class SceneModel:
         self._fields: _Cache[list[EmissivityField]] = _Cache(4)
         self._exposures: _Cache[tuple[Exposure, ...]] = _Cache(2)
         self._quick_exposures: _Cache[tuple[Exposure, ...]] = _Cache(24)
-        self._unblurred: _Cache[Unblurred] = _Cache(8)
-        self._formed: _Cache[Array] = _Cache(8)
-        self._errors: _Cache[ErrorImages] = _Cache(8)
-        self._parts: _Cache[ErrorParts] = _Cache(2)
+        self._exposure_images: _Cache[ExposureImages] = _Cache(4)
+        self._errors: _Cache[xr.Dataset] = _Cache(8)
+        self._parts: _Cache[xr.Dataset] = _Cache(2)
         self._images: _Cache[SceneImage] = _Cache(4)
         self._frames: _Cache[list[NDArray[np.float32]]] = _Cache(1)
         self._displayed = with_samples(opened.scene, DISPLAYED)
@@ -210,52 +209,60 @@ class SceneModel:
         scene, surface = self._on(state, quick)
         camera = self._camera(state, scene, quick)
         exposures = self._exposed(scene, surface, camera, state, quick, check)
-        errors = self._error_images(camera, exposures[0], state, quick)
+        images: ExposureImages = self._exposure_images.get(
+            (self._exposure_key(state), state.study.analysis.reference, quick),
+            lambda: ExposureImages(exposures[0], state.study.analysis.reference),
+        )
+        errors = self._errors.get(
+            (self._key(state, "reading"), quick), lambda: images.errors(camera)
+        )
+        raster = camera.pixels(scene.raster)
+        measured, reference = errors.measured.values, errors.reference.values
         picture = Picture(
             state=state,
-            raster=errors.raster,
-            measured=errors.measured,
-            flagged=errors.flagged,
-            lines=line_values(errors, state),
+            raster=raster,
+            measured=measured,
+            flagged=errors.flagged.values,
+            lines=line_values(raster, measured, reference, state),
             quick=quick,
             scene=self._scene_image(state, exposures[0], quick),
+            images=images,
             errors=errors,
-            error=errors.case_1,
+            error=errors.case_1.values,
             camera=camera,
             exposures=exposures,
         )
         if state.error_image == "total":
             return picture
-        part = getattr(self.parts(picture), state.error_image)
-        return replace(picture, error=np.zeros_like(errors.case_1) if part is None else part)
+        part = self.parts(picture).get(state.error_image)
+        return replace(picture, error=np.zeros_like(measured) if part is None else part.values)
 
-    def parts(self, picture: Picture) -> ErrorParts:
+    def parts(self, picture: Picture) -> xr.Dataset:
         """Return the parts of the error of a picture."""
-        assert picture.camera is not None
-        camera, (exposure, *others) = picture.camera, picture.exposures
-        reference, plain = picture.state.study.analysis.reference, others[0] if others else None
+        assert picture.camera is not None and picture.images is not None
+        camera, images, (_, *plain) = picture.camera, picture.images, picture.exposures
         return self._parts.get(
             (self._key(picture.state, "reading"), picture.quick, len(picture.exposures)),
-            lambda: error_parts(camera, exposure, reference, plain),
+            lambda: images.parts(camera, *plain),
         )
 
     def readout(self, picture: Picture) -> Readout:
         """Return the numbers at the cursor of a picture."""
         assert picture.errors is not None and picture.camera is not None
-        state, errors, raster = picture.state, picture.errors, self.opened.scene.raster
+        state, pixels, raster = picture.state, picture.raster, self.opened.scene.raster
         temperature, emissivity = self._middle(state)
         at = state.cursor
-        measured = float(nearest(errors.measured, errors.raster, at))
-        calibration = picture.camera.calibration(errors.raster.shape)
+        measured = float(nearest(picture.measured, pixels, at))
+        calibration = picture.camera.calibration(pixels.shape)
         noisy = calibration is not None and np.isfinite(measured)
         return Readout(
             measured=measured,
             uncertainty=calibration.netd(measured) if calibration and noisy else nan,
             source="noise of one frame" if noisy else "",
-            flagged=bool(nearest(errors.flagged, errors.raster, at) == 1.0),
+            flagged=bool(nearest(picture.flagged, pixels, at) == 1.0),
             true=float(nearest(temperature, raster, at)),
             emissivity=float(nearest(emissivity, raster, at)),
-            reference=float(nearest(errors.reference, errors.raster, at)),
+            reference=float(nearest(picture.errors.reference.values, pixels, at)),
             parts=self.parts(picture),
         )
 
@@ -279,12 +286,13 @@ class SceneModel:
             (exposure,) = camera.expose_fields(
                 scene, (field,), state.start, lambda done=done: progress(done)  # type: ignore[misc]
             )  # fmt: skip
+            images = ExposureImages(exposure, state.study.analysis.reference, shares_blur=True)
             for phase in cameras:
-                looking = phase.redrawn(len(at_cursor))
-                errors = error_images(looking, exposure, state.study.analysis.reference)
-                for name, values in line_values(errors, state).items():
+                reference, measured = images.stack(phase.redrawn(len(at_cursor)), {ALL: CASES[ALL]})
+                pixels = phase.pixels(scene.raster)
+                for name, values in line_values(pixels, measured, reference, state).items():
                     lines[name].append(values.measured)
-                at_cursor.append(float(nearest(errors.case_1, errors.raster, state.cursor)))
+                at_cursor.append(float(nearest(measured - reference, pixels, state.cursor)))
                 progress(len(at_cursor) / total)
         error = np.array(at_cursor).reshape(count, len(cameras))
         known = bool(np.isfinite(error).all())
@@ -360,23 +368,6 @@ class SceneModel:
         if quick:
             return self._quick_exposures.get((key, both), make)
         return self._exposures.get(key, make)
-
-    def _error_images(
-        self, camera: Camera, exposure: Exposure, state: State, quick: bool
-    ) -> ErrorImages:
-        """Return the error images, of which the stages before the changed control are kept."""
-        reference = state.study.analysis.reference
-        unblurred: Unblurred = self._unblurred.get(
-            (self._key(state, "pixels"), quick), lambda: Unblurred.of(camera, exposure, reference)
-        )
-        formed: Array = self._formed.get(
-            (self._key(state, "optics"), quick),
-            lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
-        )
-        return self._errors.get(
-            (self._key(state, "reading"), quick),
-            lambda: replace(unblurred, camera=camera).errors(formed),
-        )
 
     def _scene_image(self, state: State, exposure: Exposure, quick: bool) -> SceneImage:
         """Return the image of the scene in the middle of the exposure."""
@@ -478,16 +469,15 @@ def model_of(opened: Opened) -> Model:
     return SceneModel(opened)
 
 
-def line_values(errors: ErrorImages, state: State) -> dict[str, LineValues]:
+def line_values(
+    raster: Raster, measured: Array, reference: Array, state: State
+) -> dict[str, LineValues]:
     """Return the temperatures along both lines."""
     values = {}
     for name in LINES:
-        line = LinePlace(name, state.line(name)).line(errors.raster.spacing)
-        measured, reference = (
-            sample(image, errors.raster, line.points)
-            for image in (errors.measured, errors.reference)
-        )
-        values[name] = LineValues(line.distance, measured, reference)
+        line = LinePlace(name, state.line(name)).line(raster.spacing)
+        along = (sample(image, raster, line.points) for image in (measured, reference))
+        values[name] = LineValues(line.distance, *along)
     return values
 
 

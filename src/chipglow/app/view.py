@@ -233,11 +233,11 @@ class View:
         ]
         parts = []
         for name, label, tip, kind in _PARTS:
-            image = getattr(found.parts, name)
+            image = found.parts.get(name)
             without = name == "detector" and picture.camera and not picture.camera.detector
             if image is None or without:
                 continue
-            value = float(nearest(image, picture.raster, picture.state.cursor))
+            value = float(nearest(image.values, picture.raster, picture.state.cursor))
             kelvin = value if isfinite(value) else None
             parts.append(
                 {

@@ -87,7 +87,10 @@ def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     if is_intact(path) is False:
-        check_file(path)
+        try:
+            check_file(path)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
     try:
         with h5py.File(path, "r") as file:
             return set(names) <= set(file)

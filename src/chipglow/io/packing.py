@@ -28,6 +28,12 @@ class Packing:
             return {}
         return {"scale_factor": np.float32(self.step), "add_offset": np.float32(self.offset)}
 
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value that integers reach."""
+        limits = np.iinfo(np.dtype(self.dtype))
+        return self.offset + self.step * limits.min, self.offset + self.step * limits.max
+
     def pack(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values as they are stored; raise ValueError if one is beyond the range."""
         if self.step:
@@ -39,8 +45,7 @@ class Packing:
         return values
 
     def _counts(self, values: NDArray[Any]) -> NDArray[Any]:
-        limits = np.iinfo(np.dtype(self.dtype))
-        lowest, highest = (self.offset + self.step * end for end in (limits.min, limits.max))
+        lowest, highest = self.range
         least, greatest = float(values.min()), float(values.max())
         if not (lowest <= least and greatest <= highest):
             wrong = greatest if lowest <= least else least

@@ -79,7 +79,6 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
 # program reads yet.
 _VERSION: Final = "v110"
 
-
 CACHED_BYTES: Final = 512 * 1024**2
 """Size of the part of a scene that stays decompressed in memory: of a cut's splines all of it."""
 
@@ -343,10 +342,8 @@ class StoredScene(Scene):
         self.lattice = spline_file.stored_lattice(self._file, data)
         if self.lattice is not None:
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
-        samples = (
-            data.sizes["y"] * data.sizes["x"] if self.lattice is None else prod(self.lattice.shape)
-        )
-        chunks = CACHED_BYTES // (samples * np.dtype(np.float32).itemsize)
+        shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
+        chunks = CACHED_BYTES // max(prod(shape) * np.dtype(np.float32).itemsize, 1)
         self._chunk = lru_cache(chunks)(partial(_read_chunk, path, self._datasets))
         super().__init__(data)
 

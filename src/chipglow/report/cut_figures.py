@@ -7,11 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.analysis import Analysis, Cut
+from chipglow.analysis import Analysis, Cut, HeatedObject
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
-from chipglow.laboratory.emissivity import HeatedObject
 from chipglow.report.facts import Facts
 from chipglow.report.visible import visible_picture
 from chipglow.scene import Material

@@ -1,0 +1,207 @@
+"""Heated chips and a heated tool, and the emissivity that an image of them gives back.
+
+The paper's Figures 3 and 4 and its Table 1: the laboratory's procedure on objects of which the
+emissivity is known.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera import Camera
+from chipglow.laboratory.emissivity import (
+    EmissivityMap,
+    Heating,
+    RegionEmissivity,
+    determine_emissivity,
+)
+from chipglow.laboratory.emissivity.emissivity import LABORATORY
+from chipglow.scene import Area, Material, Polygon, Raster, Region, Scene, Tool, areas
+from chipglow.surface import Emissivity, FeatureSurface, Surface
+
+CHIP_TEMPERATURES: Final[Mapping[str, float]] = {"chip 1": 664.15, "chip 2": 843.15}
+"""True temperatures of the paper's heated chips in K (Figure 3); of others the first."""
+
+TOOL_TEMPERATURE: Final = 565.15
+"""True temperature of the paper's heated tool in K (its section Tool emissivity)."""
+
+THERMOCOUPLE: Final = 2.0
+"""Standard uncertainty of the true temperature in K: an assumption, the paper gives none."""
+
+_SAMPLES: Final = 3
+"""Samples along a pixel."""
+
+_ROWS: Final = 50
+_COLUMNS: Final = 80
+"""Pixels of an image, which is wider where a chip's regions are."""
+
+_CHIP_ROWS: Final = (8, 42)
+_MARGIN: Final = 2
+_TOOL_MARGIN: Final = 3.0
+"""Pixels at the edge of chip and tool that are not read."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeatedRow:
+    """Emissivity of one feature, as it was put in and as it comes back: a row of Table 1.
+
+    `found` is that of the first texture with its uncertainty; `means` and `deviations` are those
+    over the pixels of every texture, shape (textures,).
+    """
+
+    feature: str
+    true: Emissivity
+    found: RegionEmissivity
+    means: NDArray[np.float64]
+    deviations: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HeatedObject:
+    """A heated chip or tool by name, its image of the first texture and what comes back.
+
+    There are no `regions` of the tool, which is read as a whole.
+    """
+
+    name: str
+    map: EmissivityMap
+    regions: tuple[Region, ...]
+    rows: tuple[HeatedRow, ...]
+
+
+def heated_objects(
+    camera: Camera,
+    surfaces: Mapping[str, Surface],
+    tool: Tool,
+    band_width: float,
+    band_spacing: float,
+    textures: int,
+) -> tuple[HeatedObject, ...]:
+    """Heat a chip of each `FeatureSurface`, then a tool, and determine their emissivity.
+
+    The chip is a strip of one temperature with straight bands across it, `band_width` wide and
+    `band_spacing` apart in m. It reflects the paper's laboratory of 293 K (Equation 2), which the
+    procedure takes into account. As in the laboratory, the camera has neither the lower limit of
+    its range at the exposure of the cut nor its detector, which may saturate.
+    """
+    oven = replace(
+        camera,
+        lower_limit=None,
+        reflected=LABORATORY,
+        shape=None,
+        offset=(0.0, 0.0),
+        detector=None,
+    )
+    known = {name: s for name, s in surfaces.items() if isinstance(s, FeatureSurface)}
+    width = max(band_width, camera.pitch)
+    chips = [
+        _heated_chip(oven, name, surface, width, band_spacing, textures)
+        for name, surface in known.items()
+    ]
+    tools = [_heated_tool(oven, surface, tool, textures) for surface in known.values()]
+    return (*chips, *tools[:1])
+
+
+def _heated_chip(
+    camera: Camera, name: str, surface: FeatureSurface, width: float, spacing: float, textures: int
+) -> HeatedObject:
+    pitch, (first, last) = camera.pitch, _CHIP_ROWS
+    between, half_band = 0.5 * spacing / pitch, 0.5 * width / pitch
+    half_body = min(0.3 * spacing / pitch, _COLUMNS / 4)
+    columns = max(_COLUMNS, 2 * ceil(max(between + half_body, half_band)))
+    raster = _raster(pitch, columns)
+    away = np.abs(raster.x - spacing * np.round(raster.x / spacing))
+    inside = np.abs(raster.y - (raster.top - pitch * _ROWS / 2)) < pitch * (last - _ROWS / 2)
+    material = np.where(inside, Material.WORKPIECE, Material.VOID)[:, None]
+    # Wholly shear band within its width: the rate says so, as in the developing band.
+    rate = np.where(away < width / 2, 1e6, 0.0)
+    temperature = CHIP_TEMPERATURES.get(name, CHIP_TEMPERATURES["chip 1"])
+    scene = _scene(raster, temperature, material, rate)
+    images = _images(camera, scene, surface, textures, temperature)
+    regions = tuple(
+        Region(
+            f"{name} {title}",
+            Polygon.rectangle((at - half, first + _MARGIN), (at + half, last - _MARGIN)),
+            feature,
+        )
+        for title, feature, at, half in (
+            ("body", "chip body", columns / 2 + between, half_body),
+            ("shear band", "shear band", columns / 2, half_band),
+        )
+    )
+    true = {"chip body": surface.chip, "shear band": surface.shear_band}
+    rows = tuple(
+        _row(f"{name} {area.feature}", true[area.feature], images, area)
+        for area in areas(regions, images[0].raster)
+    )
+    return HeatedObject(name, images[0], regions, rows)
+
+
+def _heated_tool(
+    camera: Camera, surface: FeatureSurface, tool: Tool, textures: int
+) -> HeatedObject:
+    pitch, (x, y) = camera.pitch, tool.edge_point
+    raster = _raster(pitch, _COLUMNS, (x - 0.3 * _COLUMNS * pitch, y + 0.9 * _ROWS * pitch))
+
+    def depth(of: Raster) -> NDArray[np.float64]:
+        return tool.signed_distance(*np.meshgrid(of.x, of.y))
+
+    material = np.where(depth(raster) < 0, Material.TOOL, Material.VOID)
+    scene = _scene(raster, TOOL_TEMPERATURE, material, 0.0)
+    images = _images(camera, scene, surface, textures, TOOL_TEMPERATURE)
+    inside = depth(images[0].raster) < -_TOOL_MARGIN * pitch
+    area = Area("tool", "tool", inside, whole=True)
+    return HeatedObject("tool", images[0], (), (_row("tool", surface.tool, images, area),))
+
+
+def _raster(pitch: float, columns: int, corner: tuple[float, float] | None = None) -> Raster:
+    """Samples of pixels around the origin, or from an upper left corner on."""
+    spacing, rows, columns = pitch / _SAMPLES, _SAMPLES * _ROWS, _SAMPLES * columns
+    left, top = corner or (-columns * spacing / 2, rows * spacing / 2)
+    return Raster(left, top, spacing, rows, columns)
+
+
+def _scene(
+    raster: Raster,
+    temperature: float,
+    material: NDArray[np.integer],
+    rate: NDArray[np.float64] | float,
+) -> Scene:
+    """One frame of one temperature, at rest."""
+    x, y = np.meshgrid(raster.x, raster.y)
+    fields = {
+        "temperature": temperature,
+        "plastic_strain": 1.0,
+        "plastic_strain_rate": rate,
+        "velocity_x": 0.0,
+        "velocity_y": 0.0,
+        "material": material.astype(np.uint8),
+        "material_x": x,
+        "material_y": y,
+    }
+    frames = {name: np.broadcast_to(of, (1, *raster.shape)) for name, of in fields.items()}
+    return Scene.from_fields(raster, [0.0], frames)
+
+
+def _images(
+    camera: Camera, scene: Scene, surface: FeatureSurface, textures: int, temperature: float
+) -> list[EmissivityMap]:
+    """Emissivity maps of the object with each texture."""
+    heating = Heating(temperature, reference_uncertainty=THERMOCOUPLE)
+    at_rest = [replace(surface.redrawn(k), follow="material") for k in range(textures)]
+    return [determine_emissivity([camera.measure(scene, one, 0.0)], heating) for one in at_rest]
+
+
+def _row(feature: str, true: Emissivity, images: list[EmissivityMap], area: Area) -> HeatedRow:
+    rows = [image.of(area) for image in images]
+    return HeatedRow(
+        feature=feature,
+        true=true,
+        found=rows[0],
+        means=np.array([row.mean for row in rows]),
+        deviations=np.array([row.standard_deviation for row in rows]),
+    )

@@ -1,0 +1,301 @@
+"""Images of one exposure, their errors and what causes these (the paper's Figure 10)."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache, partial
+from math import ceil, floor, sqrt
+from typing import Final, Literal, TypeAlias, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chipglow.camera import UNUSABLE, Camera, Exposure, PointSpreadFunction, blur
+from chipglow.camera.optics.sampling import integrate, overlap_lengths
+from chipglow.scene import Raster
+from chipglow.scene.lines import nearest
+
+Array: TypeAlias = NDArray[np.float64]
+Stack: TypeAlias = NDArray[np.float64]
+"""Images of one exposure: the reference, then one for each effect; shape (row, y, x)."""
+
+Effect: TypeAlias = Callable[[Camera, Exposure], tuple[Camera, Exposure]]
+"""Changes the camera or what reaches it, such as to switch an effect off."""
+
+ReferenceKind: TypeAlias = Literal["maximum", "mean", "centre", "true"]
+"""What the measured radiance temperature is compared with.
+
+``maximum`` (the paper's): the greatest radiance temperature, emissivity included, of any scene
+sample in the pixel's square during the exposure; ``mean``: that of the mean radiance over square
+and exposure; ``centre``: that of the sample under the pixel's centre in the middle of the
+exposure; ``true``: the greatest true temperature in the square during the exposure.
+"""
+
+LEAST_COVERED: Final = 0.05
+"""Part of a sample's width that a pixel must cover for the sample to count in its maximum.
+
+Where a whole number of samples makes a pixel, a pitch that was rounded adds up to slivers of the
+neighbours' samples. A single hot one would be the reference of the whole pixel.
+"""
+
+
+PARTS: Final = ("emissivity", "motion", "footprint", "psf", "detector")
+"""Causes of the error in the order of the light; the parts that they contribute sum to it."""
+
+ALL: Final = "all"
+WITHOUT_PSF: Final = "without psf"
+
+
+def _without_psf(camera: Camera, exposure: Exposure) -> tuple[Camera, Exposure]:
+    # Without a PSF its order does not matter; one value lets cameras share the image.
+    return replace(camera, psf=None, psf_order="optics"), exposure
+
+
+CASES: Final[Mapping[str, Effect]] = {
+    ALL: lambda camera, exposure: (camera, exposure),
+    WITHOUT_PSF: _without_psf,
+}
+"""The paper's case 1 and case 2."""
+
+
+def error_images(
+    camera: Camera, exposure: Exposure, reference: ReferenceKind = "maximum"
+) -> xr.Dataset:
+    """Error images of one exposure, with and without the point spread function.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera, with its point spread function.
+    exposure : Exposure
+        What reached it.
+    reference : {"maximum", "mean", "centre", "true"}
+        What to compare with; the paper's is the maximum.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``y`` and ``x`` of the pixels, in K: ``reference`` and ``measured`` radiance
+        temperature, NaN where nothing radiates; ``case_1``, the error with all effects;
+        ``case_2``, that without the point spread function and with the same noise;
+        ``psf_portion``, their difference. Pixels that the camera marks as unusable are
+        ``flagged``; their errors follow from the radiance nevertheless.
+    """
+    return ExposureImages(exposure, reference).errors(camera)
+
+
+def error_parts(
+    camera: Camera,
+    exposure: Exposure,
+    reference: ReferenceKind = "maximum",
+    untextured: Exposure | None = None,
+) -> xr.Dataset:
+    """Error images of one exposure with the contributions of their causes.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    exposure : Exposure
+        What reached it.
+    reference : {"maximum", "mean", "centre", "true"}
+        What to compare with; the paper's is the maximum.
+    untextured : Exposure, optional
+        The same exposure with the surface's `Surface.without_texture`.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables of `error_images`, and parts of the error in K: ``emissivity``, radiance
+        temperature less true temperature if the reference is the true one; ``motion``, the mean
+        over the exposure less its greatest, at the samples that make the reference;
+        ``footprint``, the mean over the pixel's area less the reference of a scene that stands
+        still; ``psf``; ``detector``. Their sum is ``case_1``. They include ``texture``, which is
+        there with `untextured`: the error less that of the surface without texture.
+
+    Notes
+    -----
+    Heigel and Whitenton (2010) separate the point spread function's part from the rest (case 1 and
+    case 2, their Figure 10); motion and footprint continue that within case 2.
+    """
+    return ExposureImages(exposure, reference).parts(camera, untextured)
+
+
+class ExposureImages:
+    """Images of one exposure by cameras that differ in pixels, PSF or detector; the last are kept.
+
+    With `shares_blur` the samples are blurred once for all positions of the pixels.
+    """
+
+    def __init__(
+        self, exposure: Exposure, kind: ReferenceKind = "maximum", shares_blur: bool = False
+    ) -> None:
+        self.exposure, self.kind = exposure, kind
+        blurred = lru_cache(1)(partial(_blurred, exposure)) if shares_blur else None
+        self._formed = lru_cache(8)(partial(_formed, exposure, blurred))
+        self._read = lru_cache(32)(partial(_read, self._formed, exposure.start))
+        self._reference = lru_cache(32)(
+            lambda pixels: reference_temperature(pixels, exposure, kind)
+        )
+
+    def reference(self, camera: Camera) -> Array:
+        """Reference temperature of a camera's pixels; see `reference_temperature`."""
+        return self._reference(replace(camera, psf=None, detector=None))
+
+    def radiance(self, camera: Camera) -> Array:
+        """Radiance of a camera's pixels before its detector in W/(m² sr)."""
+        return self._formed(replace(camera, detector=None))
+
+    def measured(self, camera: Camera) -> Array:
+        """Measured radiance temperature in K, whether flagged or not."""
+        return self._read(camera)[0]
+
+    def stack(self, camera: Camera, effects: Mapping[str, Effect]) -> Stack:
+        """Reference, then what is measured with each of the effects, NaN where it is."""
+        reference = self.reference(camera)
+        rows = [reference]
+        for effect in effects.values():
+            changed, exposure = effect(camera, self.exposure)
+            images = self if exposure is self.exposure else ExposureImages(exposure)
+            rows.append(np.where(np.isnan(reference), np.nan, images.measured(changed)))
+        return np.stack(rows)
+
+    def errors(self, camera: Camera) -> xr.Dataset:
+        """See `error_images`."""
+        reference, measured, ideal = self.stack(camera, CASES)
+        limit, unusable = camera.lower_limit or 0.0, self._read(camera)[1]
+        images = {
+            "reference": reference,
+            "measured": measured,
+            "case_1": measured - reference,
+            "case_2": ideal - reference,
+            "psf_portion": measured - ideal,
+        }
+        pixels = camera.pixels(self.exposure.raster)
+        return xr.Dataset(
+            {name: (("y", "x"), image, {"units": "K"}) for name, image in images.items()}
+            | {"flagged": (("y", "x"), ~(measured >= limit) | unusable, {"units": "1"})},
+            coords={name: (name, getattr(pixels, name), {"units": "m"}) for name in "yx"},
+        )
+
+    def parts(self, camera: Camera, untextured: Exposure | None = None) -> xr.Dataset:
+        """See `error_parts`."""
+        errors, quiet = self.errors(camera), replace(camera, detector=None)
+        kind = "maximum" if self.kind == "true" else self.kind
+        mean = self.exposure.mean_radiance
+        still = replace(self.exposure, peak_radiance=mean.astype(np.float32), centre_radiance=mean)
+        chain = (
+            self.reference(camera),
+            reference_temperature(camera, self.exposure, kind),
+            reference_temperature(camera, still, kind),
+            self.measured(replace(quiet, psf=None)),
+            self.measured(quiet),
+            self.measured(camera),
+        )
+        parts = dict(zip(PARTS, np.diff(chain, axis=0), strict=True))
+        if untextured is not None:
+            plain = ExposureImages(untextured, self.kind)
+            error = plain.measured(camera) - plain.reference(camera)
+            parts["texture"] = chain[-1] - chain[0] - error
+        return errors.assign(
+            {name: (("y", "x"), part, {"units": "K"}) for name, part in parts.items()}
+        )
+
+
+def around(raster: Raster, points: Array) -> tuple[tuple[slice, slice], Raster]:
+    """The samples around points, shape (n, 2), as a part of the rows and columns of a raster."""
+    columns, rows = ((points - [raster.left, raster.top]) * [1, -1] / raster.spacing).T
+    above, left = (
+        min(max(floor(places.min()) - 2, 0), count - 1)
+        for places, count in zip((rows, columns), raster.shape, strict=True)
+    )
+    below, right = (max(ceil(places.max()) + 2, 1) for places in (rows, columns))
+    part = slice(above, max(below, above + 1)), slice(left, max(right, left + 1))
+    shape = (len(range(*one.indices(count))) for one, count in zip(part, raster.shape, strict=True))
+    corner = raster.left + left * raster.spacing, raster.top - above * raster.spacing
+    return part, Raster(*corner, raster.spacing, *shape)
+
+
+def pixel_phases(camera: Camera, count: int) -> list[Camera]:
+    """The camera with its pixels at other places of the scene, spread evenly over a pixel.
+
+    `count` is the number of places along each axis: `count`² cameras, each with as many whole
+    pixels as fit the scene. The first phase is the camera's own.
+    """
+    right, down = camera.offset
+    steps = camera.pitch * np.arange(count) / count
+    return [
+        replace(camera, shape=None, offset=(right + float(x), down + float(y)))
+        for y in steps
+        for x in steps
+    ]
+
+
+def _blurred(exposure: Exposure, psf: PointSpreadFunction) -> Array:
+    """Radiance of the samples behind the optics."""
+    return blur(exposure.mean_radiance, psf, exposure.raster.spacing)
+
+
+def _formed(
+    exposure: Exposure, blurred: Callable[[PointSpreadFunction], Array] | None, camera: Camera
+) -> Array:
+    """Radiance of the pixels."""
+    radiance, psf = exposure.mean_radiance, camera.psf
+    if blurred and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
+        radiance, camera = blurred(psf), replace(camera, psf=None)
+    return camera.form_image(radiance, exposure.raster)
+
+
+def _read(
+    formed: Callable[[Camera], Array], start: float, camera: Camera
+) -> tuple[Array, NDArray[np.bool_] | bool]:
+    """Temperatures that a camera reads, and which its detector marks as unusable."""
+    radiance = formed(replace(camera, detector=None))
+    read, flags = camera.read(radiance[None], np.array([start]))
+    kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
+    return kelvins, False if flags is None else flags[0] & UNUSABLE != 0
+
+
+def reference_temperature(
+    camera: Camera, exposure: Exposure, kind: ReferenceKind = "maximum"
+) -> NDArray[np.float64]:
+    """Temperature in K that a pixel without error would read; NaN where nothing radiates."""
+    pixels = camera.pixels(exposure.raster)
+    if kind == "maximum":
+        return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, pixels))
+    if kind == "mean":
+        mean = integrate(exposure.mean_radiance, exposure.raster, pixels, camera.fill_factor)
+        return _temperature(camera, mean)
+    if kind == "centre":
+        points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
+        return _temperature(camera, nearest(exposure.centre_radiance, exposure.raster, points))
+    if kind == "true":
+        return _maximum(exposure.peak_temperature, camera, exposure, pixels)
+    raise ValueError(f"reference: unknown {kind!r}, expected one of {get_args(ReferenceKind)}")
+
+
+def _maximum(
+    values: NDArray[np.floating], camera: Camera, exposure: Exposure, pixels: Raster
+) -> NDArray[np.float64]:
+    """Greatest value of the samples in every pixel's sensitive square; NaN for none."""
+    grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
+    known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
+    columns = _covered(pixels.x - grid.left, side, grid.columns, grid.spacing)
+    rows = _covered(grid.top - pixels.y, side, grid.rows, grid.spacing)
+    down = np.stack([known[part].max(axis=0) for part in rows])
+    greatest = np.stack([down[:, part].max(axis=1) for part in columns], axis=1)
+    return np.where(np.isfinite(greatest), greatest, np.nan).astype(np.float64)
+
+
+def _covered(
+    centres: NDArray[np.float64], side: float, samples: int, spacing: float
+) -> list[slice]:
+    """Samples under each pixel along a line; slivers under `LEAST_COVERED` do not count."""
+    least = LEAST_COVERED * min(spacing, side)
+    covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
+    first = covered.argmax(axis=1)
+    return [slice(i, i + n) for i, n in zip(first, covered.sum(axis=1), strict=True)]
+
+
+def _temperature(camera: Camera, radiance: NDArray[np.floating]) -> NDArray[np.float64]:
+    return np.asarray(camera.band.temperature(radiance.astype(np.float64)), dtype=np.float64)
