@@ -51,7 +51,7 @@ def read_chunk(dataset: h5py.Dataset, index: int) -> NDArray[Any]:
     try:
         # A buffer of just the right size would be doubled before the end of the data is seen.
         shuffled = isal_zlib.decompress(compressed, bufsize=values.nbytes + 1)
-    except isal_zlib.error as error:
+    except isal_zlib.error as error:  # type: ignore[misc]  # its stub declares an instance
         raise OSError(f"its compressed data are damaged: {error}") from None
     if len(shuffled) != values.nbytes:
         raise OSError(f"it has {len(shuffled)} bytes, expected {values.nbytes}")
