@@ -307,6 +307,7 @@ def write_foreign_chip(path, scene):
     np.savez(path, material=material, **fields)
 
 
+@pytest.mark.slow
 def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(
     folder, runs, chip_scene, read_here
 ):
