@@ -47,9 +47,9 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
         within.append(abs(found.fwhm - fwhm) < 1.96 * found.fwhm_uncertainty)
         uncertainty.append(found.fwhm_uncertainty)
         if gaussian:
-            transfer = found.edges[0].transfer
-            true = gaussian_transfer(transfer.frequency, fwhm, normal)
-            apart = np.abs(transfer.value - true) < 1.96 * transfer.uncertainty
+            curves = found.edges[0].curves
+            true = gaussian_transfer(curves["frequency"].values, fwhm, normal)
+            apart = np.abs(curves["mtf"].values - true) < 1.96 * curves["mtf_uncertainty"].values
             held.append(apart[UP_TO_NYQUIST])
     mtf = f", MTF {100 * np.mean(held):.0f} %" if held else ""
     width = f"u = {1e6 * np.mean(uncertainty):.2g} um"

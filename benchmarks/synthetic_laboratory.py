@@ -52,7 +52,7 @@ from chipglow.camera import (
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
-    KnownEmissivity,
+    EmissivityLine,
     ReflectedTemperature,
     determine_emissivity,
     load_regions,
@@ -418,11 +418,11 @@ class Evaluation:
         found = {area.name: area for area in areas(regions, heated[0].raster)}
         emissivity = determine_emissivity(heated, heating)
         body, shear_band = emissivity.of(found["body"]), emissivity.of(found["shear band"])
-        hot = true_temperature(chip, found["shear band"], shear_band, calibration=calibration)
+        hot = true_temperature(chip, found["shear band"], shear_band.line, calibration=calibration)
         unknown = true_temperature(
             self.images("unknown-*.hcc"),
             found["shear band"],
-            KnownEmissivity(1.0),
+            EmissivityLine.constant(1.0),
             ReflectedTemperature(293.0, ROOM),
         )
         return {
@@ -438,12 +438,12 @@ class Evaluation:
         factor = NormalDist().inv_cdf(0.975)
         images = self.images("edge-*")
         result = knife_edge([edge_image(image, f"edge {k}") for k, image in enumerate(images, 1)])
-        transfer = result.edges[0].transfer
-        at = int(np.argmin(np.abs(transfer.frequency - FREQUENCY)))
+        curves = result.edges[0].curves
+        at = int(np.argmin(np.abs(curves["frequency"].values - FREQUENCY)))
         return {
             "PSF, full width": Found(result.fwhm, factor * result.fwhm_uncertainty),
             "MTF at 31 /mm": Found(
-                float(transfer.value[at]), factor * float(transfer.uncertainty[at])
+                float(curves["mtf"][at]), factor * float(curves["mtf_uncertainty"][at])
             ),
         }
 

@@ -20,10 +20,10 @@ from chipglow.laboratory.emissivity import (
     determine_emissivity,
     emissivity_covariance,
     emissivity_line,
+    emissivity_trend,
     load_regions,
+    read_emissivity_lines,
     read_emissivity_map,
-    read_measured_areas,
-    read_region_emissivity,
     write_emissivity,
 )
 from chipglow.laboratory.emissivity.emissivity import COMMON
@@ -83,12 +83,12 @@ def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, band, ce
     parts = {"chip body": put_in[:, np.r_[:16, 24:40]], "shear band": put_in[:, 17:23]}
     for name, (mean, standard_deviation) in (("chip body", body), ("shear band", band)):
         row = rows[name]
-        assert row.pixels == parts[name].size
+        assert row.used.count == parts[name].size
         assert row.mean == pytest.approx(parts[name].mean(), abs=1e-6)
         assert row.standard_deviation == pytest.approx(parts[name].std(ddof=1), abs=1e-6)
         # And so the table's, but for drawing 960 and 180 pixels: four standard deviations of both.
-        assert row.mean == pytest.approx(mean, abs=4 * standard_deviation / row.pixels**0.5)
-        error = 4 / (2 * row.pixels) ** 0.5
+        assert row.mean == pytest.approx(mean, abs=4 * standard_deviation / row.used.count**0.5)
+        error = 4 / (2 * row.used.count) ** 0.5
         assert row.standard_deviation == pytest.approx(standard_deviation, rel=error)
 
 
@@ -274,7 +274,7 @@ def heated_series(generator, temperatures, errors=(0.0, 0.0), frames=4):
         radiance = BAND.radiance(BAND.temperature(image.radiance) + errors[1])
         image.data["radiance"].values[:] = radiance
         heating = Heating(temperature + errors[0], 293.0, 2.0, 0.0, 1.0)
-        rows.append(determine_emissivity([image], heating).of(WHOLE))
+        rows.append(determine_emissivity([image], heating).of(WHOLE).line)
     return emissivity_line(rows)
 
 
@@ -307,7 +307,7 @@ def test_the_line_is_as_uncertain_as_it_says(temperatures):
 
 def test_scatter_about_the_line_counts():
     rows = [
-        determine_emissivity([measured(np.full(RASTER.shape, e), t)], Heating(t)).of(WHOLE)
+        determine_emissivity([measured(np.full(RASTER.shape, e), t)], Heating(t)).of(WHOLE).line
         for e, t in ((0.4, 600.0), (0.5, 700.0), (0.4, 800.0))
     ]
     line = emissivity_line(rows)
@@ -332,8 +332,8 @@ def test_flagged_pixels_are_left_out_counted_and_doubted():
     row = found.of(WHOLE)
     out = (flags & (Flag.DEAD | Flag.SATURATED)).any(axis=0)
     np.testing.assert_array_equal(np.isnan(found.emissivity), out)
-    assert (row.pixels, row.left_out) == (1150, 50)
-    assert row.flagged == {Flag.UNDER_RANGE: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
+    assert (row.used.count, row.used.left_out) == (1150, 50)
+    assert row.used.flagged == {Flag.UNDER_RANGE: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
     assert row.mean == pytest.approx(put_in[~out].mean(), rel=1e-12)
     assert row.estimate.warnings == ()
     flags[0, 5, :20] = Flag.SATURATED
@@ -408,8 +408,10 @@ def test_a_truth_under_the_floor_and_images_that_do_not_fit_are_refused():
     other = measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
     with pytest.raises(ValueError, match="image 2: has other pixels"):
         determine_emissivity([measured(table_1()), other], HEATING)
-    with pytest.raises(ValueError, match="expected 2 temperatures"):
-        emissivity_line([determine_emissivity([measured(table_1())], HEATING).of(WHOLE)])
+    line = determine_emissivity([measured(table_1())], HEATING).of(WHOLE).line
+    assert emissivity_line([line]) is line
+    with pytest.raises(ValueError, match="the temperatures are all the same"):
+        emissivity_line([line, line])
 
 
 # The map as a surface, the regions as a study
@@ -645,10 +647,10 @@ def even_scene(temperature, strain=1.0, rate=0.0, material=1):
 
 def test_a_study_takes_the_line_of_a_region(folder):
     two_temperatures(folder)
-    line = read_region_emissivity("e.nc")["chip body"]
-    area = read_measured_areas("e.nc")["chip body"]
-    np.testing.assert_allclose(area.trend.covariance, line.estimate.covariance(), rtol=1e-9)
-    assert area.trend.measured == line.temperatures
+    line = read_emissivity_lines("e.nc")["chip body"]
+    trend = emissivity_trend(line)
+    np.testing.assert_allclose(trend.covariance, line.estimate.covariance(), rtol=1e-9)
+    assert trend.measured == line.temperatures
     study = Study(surface={"kind": "measured", "file": "e.nc", "region": "chip body"})
     (surface,) = surfaces_of(study.surface, 1).values()
     for kelvins in (600.0, 700.0, 900.0):
@@ -661,8 +663,8 @@ def test_a_study_takes_the_line_of_a_region(folder):
 
 def test_draws_of_a_line_have_its_covariance(folder):
     two_temperatures(folder)
-    areas_of = read_measured_areas("e.nc")
-    body, band = (areas_of[name].trend for name in ("chip body", "shear band"))
+    areas_of = read_emissivity_lines("e.nc")
+    body, band = (emissivity_trend(areas_of[name]) for name in ("chip body", "shear band"))
     surface = TrendSurface(body)
     assert surface.redrawn(0) is surface
     assert surface.redrawn(3).redrawn(2) == surface.redrawn(5)
@@ -687,7 +689,7 @@ def test_a_measured_chip_is_its_features_by_their_lines(folder, strain, rate, pa
     section = {"measured": {"heated": "e.nc"}, "follow": "none"}
     study = Study(surface=section, analysis={"rake_chip": "heated", "band_chip": "heated"})
     surface = surfaces_of(study.surface, 1)["heated"]
-    lines = read_region_emissivity("e.nc")
+    lines = read_emissivity_lines("e.nc")
     found = {}
     for kelvins in (664.15, 850.0):
         scene = even_scene(kelvins, strain, rate)
@@ -698,7 +700,7 @@ def test_a_measured_chip_is_its_features_by_their_lines(folder, strain, rate, pa
         for name, part in parts.items()
     )
     np.testing.assert_allclose(found[850.0] - found[664.15], expected, atol=1e-6)
-    assert read_measured_areas("e.nc")["chip body"].standard_deviation == pytest.approx(
+    assert read_emissivity_lines("e.nc")["chip body"].standard_deviation == pytest.approx(
         0.07, abs=0.01
     )
 

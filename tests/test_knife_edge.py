@@ -183,10 +183,13 @@ def test_stated_intervals_hold_the_truth():
         place = float(generator.uniform(-6e-6, 6e-6))
         found = knife_edge([an_image(normal, noise=0.1, seed=seed, side=32, position=place)])
         within += abs(found.fwhm - FWHM) < 1.96 * found.fwhm_uncertainty
-        transfer = found.edges[0].transfer
+        curves = found.edges[0].curves
         some = np.array([4, 10, 16, 24, 32])
-        true = gaussian_transfer(transfer.frequency[some], FWHM, normal)
-        covered.append(np.abs(transfer.value[some] - true) < 1.96 * transfer.uncertainty[some])
+        frequency, mtf, uncertainty = (
+            curves[name].values[some] for name in ("frequency", "mtf", "mtf_uncertainty")
+        )
+        true = gaussian_transfer(frequency, FWHM, normal)
+        covered.append(np.abs(mtf - true) < 1.96 * uncertainty)
     assert within >= 0.9 * repeats
     assert np.mean(covered) >= 0.9
     # An uncertainty that is much too large would hold the truth as well: of the noise it is 1.5 %,
@@ -196,18 +199,19 @@ def test_stated_intervals_hold_the_truth():
 
 def test_edge_line_and_mtf_of_the_bins_are_those_that_made_the_edge(clean):
     edge = clean.edges[0]
-    spread = edge.spread
-    assert spread.width == pytest.approx(PITCH / 4)
-    assert spread.count.sum() == 40 * 40
-    assert np.mean(np.abs(spread.residual) < 2 * spread.uncertainty) > 0.9
-    frequency = edge.transfer.frequency
+    curves = {name: curve.values for name, curve in edge.curves.items()}
+    assert np.median(np.diff(curves["distance"])) == pytest.approx(PITCH / 4, rel=0.02)
+    assert curves["pixels"].sum() == 40 * 40
+    assert np.mean(np.abs(curves["esf_residual"]) < 2 * curves["esf_uncertainty"]) > 0.9
+    frequency = curves["frequency"]
     true = gaussian_transfer(frequency, FWHM, 5.0)
-    assert edge.transfer.value[0] == pytest.approx(1.0)
-    assert (np.abs(edge.transfer.value - true) < 4 * edge.transfer.uncertainty + 1e-9)[1:33].all()
+    assert curves["mtf"][0] == pytest.approx(1.0)
+    away = np.abs(curves["mtf"] - true)
+    assert (away < 4 * curves["mtf_uncertainty"] + 1e-9)[1:33].all()
     sigma = sqrt((FWHM / FWHM_PER_SIGMA) ** 2 + PITCH**2 / 12)
     # Of a Gaussian and a square, nearly a Gaussian; the square alone would have 6 um.
     assert edge.line_fwhm == pytest.approx(sigma * FWHM_PER_SIGMA, rel=0.02)
-    light = np.sum(edge.line.value * np.diff(spread.distance))
+    light = np.sum(curves["lsf"] * np.diff(curves["distance"]))
     assert light == pytest.approx(1.0, abs=0.02)
 
 
@@ -234,9 +238,10 @@ def test_an_elliptical_spread_is_told_from_a_round_one():
     images = [an_image(n, gaussian_edge(width(n)), seed=k) for k, n in enumerate(normals)]
     found = knife_edge(images)
     assert found.best.model.name == "elliptical gaussian"
-    axes = found.best.model.axes(found.best.values)
-    assert axes[:2] == pytest.approx((greatest, least), rel=0.03)
-    assert degrees(axes[2]) == pytest.approx(30.0, abs=1.5)
+    x, y, both = found.best.values
+    squares, axes = np.linalg.eigh([[x**2, both * x * y], [both * x * y, y**2]])
+    assert np.sqrt(squares) == pytest.approx((least, greatest), rel=0.03)
+    assert degrees(np.arctan(axes[1, 1] / axes[0, 1])) == pytest.approx(30.0, abs=1.5)
     for edge, normal in zip(found.edges, normals, strict=True):
         assert abs(edge.fwhm - width(normal)) < 3 * edge.fwhm_uncertainty
     kernel = found.psf().kernel(1e-6)

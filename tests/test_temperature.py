@@ -12,13 +12,13 @@ from chipglow.camera import CalibrationErrors, Flag, Measurement, fit_linear
 from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
+    EmissivityLine,
     Heating,
-    KnownEmissivity,
     ReflectedTemperature,
     RegionEmissivities,
     determine_emissivity,
     emissivity_line,
-    read_region_emissivity,
+    read_emissivity_lines,
     true_temperature,
     write_emissivity,
 )
@@ -64,7 +64,7 @@ def developed(calibration, kelvins, emissivity, frames=1, noise=0.0, seed=0, roo
 @pytest.mark.parametrize("celsius", [60.0, 391.0, 1200.0])
 def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius):
     found = true_temperature(
-        [image(emissivity, celsius + CELSIUS)], WHOLE, KnownEmissivity(emissivity)
+        [image(emissivity, celsius + CELSIUS)], WHOLE, EmissivityLine.constant(emissivity)
     )
     assert found.estimate.values == pytest.approx(celsius + CELSIUS, abs=1e-3)
     assert found.mean_of_pixels == pytest.approx(found.estimate.values, abs=1e-6)
@@ -73,10 +73,14 @@ def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius
 
 def test_parts_of_the_uncertainty_are_those_of_small_changes():
     """Each part is the change of the result when its cause changes by its uncertainty."""
-    seen, known = [image()], KnownEmissivity(0.42, 1e-4)
+    seen, known = [image()], EmissivityLine.constant(0.42, 1e-4)
     found = true_temperature(seen, WHOLE, known, ReflectedTemperature(ROOM, 0.01))
-    more = true_temperature(seen, WHOLE, KnownEmissivity(0.4201), ReflectedTemperature(ROOM))
-    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.42), ReflectedTemperature(ROOM + 0.01))
+    more = true_temperature(
+        seen, WHOLE, EmissivityLine.constant(0.4201), ReflectedTemperature(ROOM)
+    )
+    warmer = true_temperature(
+        seen, WHOLE, EmissivityLine.constant(0.42), ReflectedTemperature(ROOM + 0.01)
+    )
     assert found.estimate.contribution("emissivity") == pytest.approx(
         found.estimate.values - more.estimate.values, rel=1e-2
     )
@@ -88,8 +92,8 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
     errors = CalibrationErrors(np.array([0.0, 2 * mean]), np.array([[0.0, 2e-4 * mean]]))
     seen = [Measurement.from_radiance(radiance, BAND, np.zeros(1), RASTER, None, None, errors)]
     high = image(gain=1.0001)
-    found = true_temperature(seen, WHOLE, KnownEmissivity(0.42))
-    shifted = true_temperature([high], WHOLE, KnownEmissivity(0.42))
+    found = true_temperature(seen, WHOLE, EmissivityLine.constant(0.42))
+    shifted = true_temperature([high], WHOLE, EmissivityLine.constant(0.42))
     expected = shifted.estimate.values - found.estimate.values
     assert found.estimate.contribution("calibration") == pytest.approx(expected, rel=1e-2)
 
@@ -98,7 +102,7 @@ def test_errors_that_emissivity_and_image_share_cancel():
     """At the temperature of the heating itself, only the thermocouple's error is left."""
     calibration = fitted(common=1.0)
     heated = developed(calibration, HEATING.reference, 0.42)
-    emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
+    emissivity = determine_emissivity([heated], HEATING).of(WHOLE).line
     found = true_temperature([heated], WHOLE, emissivity, calibration=calibration)
     assert found.estimate.values == pytest.approx(HEATING.reference, abs=1e-4)
     assert found.correlation == pytest.approx(1.0)
@@ -131,7 +135,7 @@ def test_stated_intervals_hold_the_truth():
         seed = int(generator.integers(1 << 30))
         heated = developed(calibration, oven, 0.42, 4, 5.0, seed, room)
         hot = developed(calibration, HOT, 0.42, 4, 5.0, seed + 1, room)
-        emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
+        emissivity = determine_emissivity([heated], HEATING).of(WHOLE).line
         found = true_temperature([hot], WHOLE, emissivity, calibration=calibration)
         within += abs(found.estimate.values - HOT) <= found.estimate.expanded_uncertainty()
         scores.append((found.estimate.values - HOT) / found.estimate.standard_uncertainty)
@@ -144,8 +148,10 @@ def test_cold_surroundings_are_part_of_the_uncertainty():
     """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
     cold = ReflectedTemperature(190.0, 1.0)
     seen = [image(0.05, 330.0, reflected=190.0)]
-    found = true_temperature(seen, WHOLE, KnownEmissivity(0.05), cold)
-    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), ReflectedTemperature(191.0))
+    found = true_temperature(seen, WHOLE, EmissivityLine.constant(0.05), cold)
+    warmer = true_temperature(
+        seen, WHOLE, EmissivityLine.constant(0.05), ReflectedTemperature(191.0)
+    )
     assert found.estimate.values == pytest.approx(330.0, abs=1e-3)
     assert found.estimate.contribution("reflected") == pytest.approx(
         found.estimate.values - warmer.estimate.values, rel=0.1
@@ -156,7 +162,7 @@ def test_cold_surroundings_are_part_of_the_uncertainty():
 
 
 def test_few_images_widen_the_interval():
-    emissivity = KnownEmissivity(0.42)
+    emissivity = EmissivityLine.constant(0.42)
     images = [image(drift=2.0, seed=seed) for seed in range(3)]
     found = true_temperature(images, WHOLE, emissivity)
     # Three repetitions, two degrees of freedom: Student's 4.3.
@@ -185,7 +191,7 @@ def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most)
         read = replace(heating, reference=HEATING.reference + 0.5 * generator.standard_normal(),
                        reference_uncertainty=0.5, reflected_uncertainty=0.0)  # fmt: skip
         row = determine_emissivity([heated], read).of(WHOLE)
-        found = true_temperature([hot], WHOLE, row, drift=stated)
+        found = true_temperature([hot], WHOLE, row.line, drift=stated)
         within += abs(found.estimate.values - HOT) < found.estimate.expanded_uncertainty()
     assert least <= within / 60 <= most
     assert np.isnan(row.estimate.contribution("drift")) is np.bool_(stated is None)
@@ -210,6 +216,11 @@ def test_several_recordings_show_the_drift_themselves():
         replace(HEATING, drift=2)
 
 
+def own(line):
+    """Emissivity of a constant line."""
+    return line.at(line.middle).reshape()
+
+
 def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     calibration = fitted(common=0.5)
     heated = developed(calibration, HEATING.reference, 0.42, 5, 20.0)
@@ -217,14 +228,14 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     found = determine_emissivity([heated], HEATING)
     row = found.of(WHOLE)
     write_emissivity(RegionEmissivities((found,), ((row,),)), tmp_path / "emissivity.nc")
-    stored = read_region_emissivity(tmp_path / "emissivity.nc")["chip"]
-    assert stored.heating == replace(HEATING, camera_uncertainty=None)
+    stored = read_emissivity_lines(tmp_path / "emissivity.nc")["chip"]
+    assert stored.heatings[0] == replace(HEATING, camera_uncertainty=None)
     for cause in ("reference", "reflected", "calibration"):
         # Signs are kept, also where Equation 2 would have them otherwise.
-        assert stored.estimate.effect(cause) == pytest.approx(row.estimate.effect(cause))
+        assert own(stored).effect(cause) == pytest.approx(row.estimate.effect(cause))
     assert stored.estimate.warnings == row.estimate.warnings
     first, second = (
-        true_temperature([hot], WHOLE, one, calibration=calibration) for one in (row, stored)
+        true_temperature([hot], WHOLE, one, calibration=calibration) for one in (row.line, stored)
     )
     assert second.estimate.values == pytest.approx(first.estimate.values, abs=1e-9)
     for cause in TEMPERATURE_BUDGET:
@@ -233,7 +244,7 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
         )
     (tmp_path / "none.nc").write_bytes(b"")
     with pytest.raises(ValueError, match=r"none.nc: not an emissivity map"):
-        read_region_emissivity(tmp_path / "none.nc")
+        read_emissivity_lines(tmp_path / "none.nc")
 
 
 # A line over the temperature
@@ -255,7 +266,7 @@ def rows_of_line(slope=SLOPE, temperatures=HEATED, **errors):
 
 
 def line_of(*arguments, **more):
-    return emissivity_line([row for _, row in rows_of_line(*arguments, **more)])
+    return emissivity_line([row.line for _, row in rows_of_line(*arguments, **more)])
 
 
 @pytest.mark.parametrize("kelvins", [650.0, 823.0, 1000.0])
@@ -279,7 +290,9 @@ def test_the_budget_by_a_line_is_that_of_small_changes(kelvins):
         rows = [
             determine_emissivity(
                 [image(on_the_line(one), one)], replace(HEATING, reference=one + 2.0 * sign)
-            ).of(WHOLE)
+            )
+            .of(WHOLE)
+            .line
             for one in HEATED
         ]
         shifted.append(true_temperature([seen], WHOLE, emissivity_line(rows)).estimate.values)
@@ -288,16 +301,19 @@ def test_the_budget_by_a_line_is_that_of_small_changes(kelvins):
         (shifted[1] - shifted[0]) / 2, rel=1e-3
     )
     # By a constant emissivity the same error would be read as more.
-    same = true_temperature([seen], WHOLE, line.area(kelvins))
+    constant = replace(
+        line, estimate=line.at(kelvins).linear(np.array([[1.0], [0.0]])), heatings=line.heatings[:1]
+    )
+    same = true_temperature([seen], WHOLE, constant)
     assert same.estimate.values == pytest.approx(found.estimate.values, abs=1e-6)
     assert 0 < found.estimate.effect("reference") / same.estimate.effect("reference") < 0.97
 
 
 def test_a_line_comes_back_from_its_file_with_its_covariance(tmp_path):
     maps, rows = zip(*rows_of_line(drift=0.01, reference_uncertainty=2.0), strict=True)
-    line = emissivity_line(rows)
+    line = emissivity_line([row.line for row in rows])
     write_emissivity(RegionEmissivities(maps, tuple((r,) for r in rows)), tmp_path / "e.nc")
-    stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
+    stored = read_emissivity_lines(tmp_path / "e.nc")["chip"]
     assert stored.heatings == tuple(replace(one, drift=None) for one in line.heatings)
     np.testing.assert_allclose(stored.estimate.values, line.estimate.values, rtol=1e-12)
     np.testing.assert_allclose(stored.estimate.covariance(), line.estimate.covariance(), rtol=1e-9)
@@ -311,7 +327,9 @@ def test_the_error_of_a_calibration_cancels_by_a_line_too():
     rows = [
         determine_emissivity(
             [developed(calibration, one, on_the_line(one))], replace(HEATING, reference=one)
-        ).of(WHOLE)
+        )
+        .of(WHOLE)
+        .line
         for one in HEATED
     ]
     line, seen = emissivity_line(rows), developed(calibration, 750.0, on_the_line(750.0))
@@ -325,7 +343,7 @@ def test_the_error_of_a_calibration_cancels_by_a_line_too():
 
 def test_an_emissivity_that_falls_too_steeply_is_refused():
     line = line_of(-1.6e-3, (600.0, 800.0))
-    with pytest.raises(ValueError, match="expected an emissivity that falls less"):
+    with pytest.raises(ValueError, match="expected one that falls less"):
         true_temperature([image(0.9, 1000.0)], WHOLE, line)
     with pytest.raises(ValueError, match="is darker than what it reflects"):
         true_temperature([image(0.4, ROOM - 10.0)], WHOLE, line)
@@ -352,10 +370,10 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     expected = Estimate.stack([row.estimate for row in rows])
     np.testing.assert_allclose(estimate.covariance(), expected.covariance(), rtol=1e-9, atol=1e-18)
     # A hotter room makes a grey surface darker, and one that is over 1 brighter.
-    stored = read_region_emissivity(tmp_path / "e.nc")
-    signs = [np.sign(one.estimate.effect("reflected")) for one in stored.values()]
+    stored = read_emissivity_lines(tmp_path / "e.nc")
+    signs = [np.sign(own(one).effect("reflected")) for one in stored.values()]
     assert signs == [-1.0, 1.0]
-    both = stored["left"].estimate - rows[0].estimate
+    both = own(stored["left"]) - rows[0].estimate
     assert both.standard_uncertainty == pytest.approx(0.0, abs=1e-12)
 
 
@@ -364,14 +382,14 @@ def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
     flags[:, :, :10] = Flag.SATURATED
     found = determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
     write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
-    stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
-    for emissivity in (found.of(WHOLE), stored):
+    stored = read_emissivity_lines(tmp_path / "e.nc")["chip"]
+    for emissivity in (found.of(WHOLE).line, stored):
         (warning,) = true_temperature([image()], WHOLE, emissivity).estimate.warnings
         assert warning.startswith("Emissivity: chip: 300 of 1200 pixels are left out")
 
 
 def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
-    emissivity = KnownEmissivity(0.42, 0.05)
+    emissivity = EmissivityLine.constant(0.42, 0.05)
     one, other = (true_temperature([image(seed=n)], WHOLE, emissivity).estimate for n in range(2))
     assert (one - other).standard_uncertainty < 1e-6 * one.standard_uncertainty
 
@@ -382,27 +400,27 @@ def test_a_file_of_an_earlier_version_is_refused(tmp_path):
     with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
         data.load().drop_vars("observations").to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match="of an earlier version"):
-        read_region_emissivity(tmp_path / "old.nc")
+        read_emissivity_lines(tmp_path / "old.nc")
 
 
 def test_what_cannot_be_trusted_is_said():
     half = np.where(np.arange(RASTER.columns) < 20, HOT, HOT + 300.0)
     uneven = measured(np.full(RASTER.shape, 0.42), reference=HOT)
     uneven.data["radiance"].values[:] = 0.42 * BAND.radiance(half) + 0.58 * BAND.radiance(ROOM)
-    found = true_temperature([uneven], WHOLE, KnownEmissivity(0.42, 0.01))
+    found = true_temperature([uneven], WHOLE, EmissivityLine.constant(0.42, 0.01))
     assert any("is uneven" in warning for warning in found.estimate.warnings)
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[:, :, :10] = Flag.SATURATED
-    found = true_temperature([image(flags=flags)], WHOLE, KnownEmissivity(0.42))
-    assert found.left_out == 300
+    found = true_temperature([image(flags=flags)], WHOLE, EmissivityLine.constant(0.42))
+    assert found.used.left_out == 300
     assert any(
         "300 of 1200 pixels are left out (300 saturated)" in one for one in found.estimate.warnings
     )
-    assert true_temperature([image()], WHOLE, KnownEmissivity(0.42)).estimate.warnings == ()
+    assert true_temperature([image()], WHOLE, EmissivityLine.constant(0.42)).estimate.warnings == ()
 
 
 def test_impossible_input_is_one_clear_error():
-    known = KnownEmissivity(0.42)
+    known = EmissivityLine.constant(0.42)
     with pytest.raises(ValueError, match="temperature: there is no image"):
         true_temperature([], WHOLE, known)
     with pytest.raises(ValueError, match=r"darker than what it reflects at 626\.85 °C"):
@@ -412,9 +430,9 @@ def test_impossible_input_is_one_clear_error():
         true_temperature([image(flags=flags)], WHOLE, known)
     for value in (0.0, 1.2, float("nan")):
         with pytest.raises(ValueError, match=r"emissivity: is .*, expected over 0 to 1"):
-            KnownEmissivity(value)
+            EmissivityLine.constant(value)
     with pytest.raises(ValueError, match="standard uncertainty is -1"):
-        KnownEmissivity(0.5, -1.0)
+        EmissivityLine.constant(0.5, -1.0)
     with pytest.raises(ValueError, match="reflected: is 0"):
         ReflectedTemperature(0.0)
     with pytest.raises(ValueError, match="reflected: standard uncertainty"):
@@ -479,7 +497,7 @@ def test_the_command_takes_the_line_of_several_temperatures(folder):
         assert code == 0, output
         assert "Assumed: The emissivity is a straight line over the temperature" in output
         assert "is the same at all temperatures" not in output
-        assert ("K beyond the 287 °C to 387 °C" in output) == beyond, output
+        assert ("K from the 287 °C to 387 °C" in output) == beyond, output
 
 
 @pytest.mark.parametrize(

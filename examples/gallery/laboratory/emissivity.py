@@ -46,7 +46,7 @@ for area in areas(REGIONS, found.raster):
     parts = row.estimate.budget().standard_uncertainty.to_series()
     print(f"{row.name}: put in {put_in.mean():.4f}, sd {put_in.std():.4f}")
     print(
-        f"    mean {row.mean:.4f}, sd {row.standard_deviation:.4f}, {row.pixels} pixels, "
+        f"    mean {row.mean:.4f}, sd {row.standard_deviation:.4f}, {row.used.count} pixels, "
         f"u {row.estimate.standard_uncertainty:.2g}, U {row.estimate.expanded_uncertainty():.2g}"
     )
     print("   ", ", ".join(f"{cause} {part:.2g}" for cause, part in parts.items()))
@@ -63,7 +63,7 @@ for celsius in (391.0, 470.0, 570.0):
     values = chip + 2e-4 * (celsius - 391.0)
     maps.append(determine_emissivity([heated(values, background, hot.reference)], hot))
 whole = [area for area in areas(REGIONS, maps[0].raster) if area.whole]
-lines = [emissivity_line([one.of(area) for one in maps]) for area in whole]
+lines = [emissivity_line([one.of(area).line for one in maps]) for area in whole]
 over_temperature = draw_emissivity(maps[0], REGIONS, lines)
 for line in lines:
     middle, slope = line.estimate.values

@@ -37,7 +37,7 @@ image = chipglow.read_measurement(files / "470.nc")
 rows = []
 for area in chipglow.areas(regions, image.raster):
     seen = float(image.band.temperature(image.radiance[:, area.mask].mean()))
-    line = emissivity_line([one.of(area) for one in maps])
+    line = emissivity_line([one.of(area).line for one in maps])
     found = chipglow.true_temperature([image], area, line)
     rows.append((area.name, seen - KELVIN, found.estimate))
     true, expanded = float(found.estimate.values) - KELVIN, found.estimate.expanded_uncertainty()

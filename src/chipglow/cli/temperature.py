@@ -9,9 +9,7 @@ from chipglow.cli.options import Settings, argument, file_option, option
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
     from chipglow.laboratory.emissivity import (
-        AreaEmissivity,
         EmissivityLine,
-        KnownEmissivity,
         ReflectedTemperature,
         RegionTemperatures,
     )
@@ -85,9 +83,9 @@ def temperature(
 
 def _emissivities(
     text: str, uncertainty: float | None
-) -> "KnownEmissivity | dict[str, AreaEmissivity] | dict[str, EmissivityLine]":
+) -> "EmissivityLine | dict[str, EmissivityLine]":
     """One emissivity, or those of a file."""
-    from chipglow.laboratory.emissivity import KnownEmissivity, read_region_emissivity
+    from chipglow.laboratory.emissivity import EmissivityLine, read_emissivity_lines
 
     try:
         number = float(text)
@@ -96,8 +94,8 @@ def _emissivities(
             raise ValueError(
                 "--emissivity-uncertainty: the file states it, expected none with a file"
             ) from None
-        return read_region_emissivity(Path(text))
-    return KnownEmissivity(number, uncertainty or 0.0)
+        return read_emissivity_lines(Path(text))
+    return EmissivityLine.constant(number, uncertainty or 0.0)
 
 
 def _surroundings(reflected: str | None, uncertainty: str | None) -> "ReflectedTemperature | None":

@@ -21,23 +21,7 @@ class Result(Protocol):
 
 
 def write_result(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write a result as what the file's name says.
-
-    Parameters
-    ----------
-    result : Result
-        Such as a `RakeGrid` or a `BandProfile`.
-    path : path-like
-        ``.csv`` for its frame as `write_frame` writes it, ``.nc`` for its arrays as NetCDF-4; a
-        file that is there is replaced at the end.
-
-    Raises
-    ------
-    ValueError
-        If the name ends in something else.
-    OSError
-        If the file cannot be written.
-    """
+    """Write a result as what the file's name says."""
     write_table_or_dataset(Path(path), *columns_and_rows(result.to_frame()), result.to_dataset)
 
 
@@ -45,18 +29,6 @@ def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     """Write a result's frame as CSV: the names of its columns, then a line a row.
 
     Numbers have nine digits; a cell is empty where there is none.
-
-    Parameters
-    ----------
-    frame : pandas.DataFrame
-        What a result's ``to_frame`` gives.
-    path : path-like
-        The file to write; one that is there is replaced at the end.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
     """
     write_table(Path(path), *columns_and_rows(frame))
 

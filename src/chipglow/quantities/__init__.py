@@ -14,9 +14,11 @@ from chipglow.quantities.settings import (
     settings,
     value_at,
 )
-from chipglow.quantities.units import Quantity
+from chipglow.quantities.units import ZERO_CELSIUS, Array, Quantity
 
 __all__ = [
+    "ZERO_CELSIUS",
+    "Array",
     "Family",
     "FileBeside",
     "Parameter",

@@ -10,7 +10,7 @@ from fractions import Fraction
 from functools import cache
 from math import isfinite
 from numbers import Real
-from typing import TYPE_CHECKING, Annotated, Any, Final, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,10 @@ from pydantic_core import CoreSchema, core_schema
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
+
+Array: TypeAlias = NDArray[np.float64]
+ZERO_CELSIUS: Final = 273.15
+"""In K."""
 
 _NUMBER: Final = r"\d{1,40}(?:\.\d{0,40})?(?:[eE][+-]?\d{1,3})?|\.\d{1,40}(?:[eE][+-]?\d{1,3})?"
 _FRACTION: Final = r"\d{1,3}/\d{1,3}"
@@ -72,7 +76,7 @@ class Unit:
 
 
 SI: Final = Unit(1.0)
-CELSIUS: Final = Unit(1.0, 273.15)
+CELSIUS: Final = Unit(1.0, ZERO_CELSIUS)
 
 
 def parse_unit(text: str, base: str, field: str) -> Unit:

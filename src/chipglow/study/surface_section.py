@@ -9,9 +9,10 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from chipglow.laboratory.emissivity import (
+    emissivity_trend,
     measured_features,
+    read_emissivity_lines,
     read_emissivity_map,
-    read_measured_areas,
 )
 from chipglow.quantities import FileBeside, Parameter, Section
 from chipglow.quantities.units import WAVELENGTHS
@@ -203,10 +204,11 @@ class FeaturesSection(Section):
 
     def _measured(self, file: str, seed: int) -> FeatureTrends:
         try:
-            areas = measured_features(read_measured_areas(file))
+            lines = measured_features(read_emissivity_lines(file))
+            trends = {name: emissivity_trend(line) for name, line in lines.items()}
             means = {
-                name: Emissivity(area.trend.emissivity, area.standard_deviation)
-                for name, area in areas.items()
+                name: Emissivity(trends[name].emissivity, line.standard_deviation)
+                for name, line in lines.items()
             }
         except ValueError as error:
             raise ValueError(f"surface.measured: {file}: {error}") from None
@@ -217,7 +219,7 @@ class FeaturesSection(Section):
             tool=means.get("tool", bare.tool),
         )
         return FeatureTrends(
-            bare, {_FEATURE.get(name, name): area.trend for name, area in areas.items()}
+            bare, {_FEATURE.get(name, name): trend for name, trend in trends.items()}
         )
 
 

@@ -6,12 +6,12 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage
+from chipglow.quantities import Array
 from chipglow.scene import Tool
 
 _HEIGHT: Final = 4.2
@@ -30,18 +30,7 @@ _LINES: Final = {
 
 
 def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile) -> Figure:
-    """Draw the curves on the image of the reference, and the temperature along them.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        What the profile was read from.
-    tool : Tool
-        The tool, in the measurement's coordinates.
-    profile : BandProfile
-        The profile. The image is that of the frame nearest to the reference, and of the first one
-        if no frame has a band.
-    """
+    """Draw the curves on the image of the reference, and the temperature along them."""
     first, last = profile.times[[0, -1]]
     colours = _COLOURS((profile.times - first) / max(last - first, 1e-12))
     with drawing.style():
@@ -66,7 +55,7 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
     return figure
 
 
-def _draw_times(figure: Figure, axes: Axes, times: NDArray[np.float64]) -> None:
+def _draw_times(figure: Figure, axes: Axes, times: Array) -> None:
     """Which colour is which time, where there are too many curves to name each."""
     span = matplotlib.colors.Normalize(1e6 * times[0], 1e6 * times[-1])
     key = matplotlib.cm.ScalarMappable(span, _COLOURS)
@@ -79,7 +68,7 @@ def _draw_image(
     measurement: Measurement,
     tool: Tool,
     profile: BandProfile,
-    colours: NDArray[np.float64],
+    colours: Array,
 ) -> None:
     away = np.abs(profile.offset)
     frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
@@ -98,9 +87,7 @@ def _draw_image(
     )
 
 
-def _draw_profile(
-    axes: Axes, profile: BandProfile, frame: int, colour: NDArray[np.float64]
-) -> None:
+def _draw_profile(axes: Axes, profile: BandProfile, frame: int, colour: Array) -> None:
     values = profile.temperature[frame] - KELVIN
     if not np.isfinite(values).any():
         return

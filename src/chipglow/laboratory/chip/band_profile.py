@@ -25,6 +25,7 @@ from chipglow.laboratory.chip.tool_position import (
     contribution,
     tool_in,
 )
+from chipglow.quantities import Array
 from chipglow.scene import Line, Tool, sample
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, to_xarray
@@ -72,50 +73,35 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class BandProfile:
-    """Radiance temperature along the shear band in several frames.
-
-    Parameters
-    ----------
-    reference : Line
-        The curve of the fully developed band, with distances as below.
-    distance : ndarray
-        Distances in m, common to all frames, shape (n,): from the cutting edge straight to the
-        curve's first point, then along the curve.
-    points : ndarray
-        Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
-        band does not reach.
-    estimate : Estimate
-        Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
-        is not usable. Its components are ``calibration``, which is the same in all that was
-        measured by it; ``position`` of the curve, of every point by itself; and ``tool``, the same
-        in all that is read by this tool, of which `TOOL_BUDGET` are parts: it moves the edge from
-        which the distance counts.
-    offset : ndarray
-        Median distance in m of each frame's band from the reference, shape (frames,): positive
-        toward the chip, negative toward the workpiece; NaN without a band.
-    stage : tuple of Stage
-        How far each frame's band has developed.
-    times : ndarray
-        When each frame's integration began in s, shape (frames,).
-    width : float
-        Width of the mean across the curve in m.
-    notes : Notes
-        Assumptions and warnings.
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit.
-    """
+    """Radiance temperature along the shear band in several frames."""
 
     reference: Line
-    distance: NDArray[np.float64]
-    points: NDArray[np.float64]
+    """The curve of the fully developed band, with distances as below."""
+    distance: Array
+    """Distances in m, common to all frames, shape (n,): from the cutting edge straight to the
+    curve's first point, then along the curve.
+    """
+    points: Array
+    """Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
+    band does not reach.
+    """
     estimate: Estimate
-    offset: NDArray[np.float64]
+    """Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
+    is not usable. Its components are ``calibration``, which is the same in all that was
+    measured by it; ``position`` of the curve, of every point by itself; and ``tool``, the same
+    in all that is read by this tool, of which `TOOL_BUDGET` are parts: it moves the edge from
+    which the distance counts.
+    """
+    offset: Array
+    """Median distance in m of each frame's band from the reference, shape (frames,): positive
+    toward the chip, negative toward the workpiece; NaN without a band.
+    """
     stage: tuple[Stage, ...]
-    times: NDArray[np.float64]
+    """How far each frame's band has developed."""
+    times: Array
+    """When each frame's integration began in s, shape (frames,)."""
     width: float
+    """Width of the mean across the curve in m."""
     notes: Notes = field(default_factory=Notes)
 
     def __post_init__(self) -> None:
@@ -132,7 +118,7 @@ class BandProfile:
             )
 
     @property
-    def temperature(self) -> NDArray[np.float64]:
+    def temperature(self) -> Array:
         """Values of `estimate` in K, shape (frames, n)."""
         return self.estimate.values
 
@@ -143,15 +129,7 @@ class BandProfile:
         return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each frame's band, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``time_us``, ``stage``, ``distance_um``, ``x_um``, ``y_um``,
-            ``radiance_temperature_degC``, and the standard uncertainty with its parts; NaN where
-            nothing is known.
-        """
+        """Every point of each frame's band, a row each."""
         there = np.isfinite(self.points[..., 0]).ravel()
         frame, point = (index.ravel() for index in np.indices(self.temperature.shape))
         stages = np.array([stage.value for stage in self.stage], dtype=object)
@@ -167,15 +145,7 @@ class BandProfile:
         return pd.DataFrame(columns)[there].reset_index(drop=True)
 
     def to_dataset(self) -> xr.Dataset:
-        """Every point of each frame's band as arrays in SI units.
-
-        Returns
-        -------
-        xarray.Dataset
-            Of the dimensions (time, distance): ``temperature`` with its components as
-            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``, ``x`` and
-            ``y``; ``offset`` and ``stage`` of each frame; and the reference.
-        """
+        """Every point of each frame's band as arrays in SI units."""
         both = ("time", "distance")
         data = to_xarray(self.estimate, "temperature", both, "K")
         data["temperature"].attrs["long_name"] = "radiance temperature"
@@ -199,15 +169,7 @@ class BandProfile:
         )
 
     def stage_frame(self) -> pd.DataFrame:
-        """Each frame's band, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``time_us``, ``stage``, ``offset_um`` from the reference, ``from_um`` and
-            ``to_um`` of the distance, ``mean_degC``, ``greatest_degC`` and the root mean square
-            ``standard_uncertainty_K`` along it; NaN without a band.
-        """
+        """Each frame's band, a row each."""
         return pd.DataFrame([self._stage_row(frame) for frame in range(self.times.size)])
 
     def _stage_row(self, frame: int) -> dict[str, float | str]:
@@ -231,7 +193,7 @@ def band_profile(
     measurement: Measurement,
     tool: Tool | None = None,
     frames: Sequence[int] | None = None,
-    curve: NDArray[np.float64] | None = None,
+    curve: Array | None = None,
     reference: int | None = None,
     width: float | None = None,
     position: float | None = None,
@@ -355,7 +317,7 @@ class _Images:
         return self._made[frame]
 
 
-def _given(curve: NDArray[np.float64], tool: Tool, pitch: float) -> Line:
+def _given(curve: Array, tool: Tool, pitch: float) -> Line:
     """A given polyline at steps of half a pixel."""
     if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
         raise ValueError(
@@ -431,7 +393,7 @@ def _reference(
     return line
 
 
-def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[str, ...]:
+def _joined(temperature: Array, times: Array) -> tuple[str, ...]:
     """A warning of found curves that cross a deep valley between two hot places."""
     valleys = [_valley(values[np.isfinite(values)]) for values in temperature]
     crossing = [
@@ -448,7 +410,7 @@ def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tup
     )
 
 
-def _valley(values: NDArray[np.float64]) -> tuple[float, float]:
+def _valley(values: Array) -> tuple[float, float]:
     """Depth of the deepest valley along a curve in K, and its fraction of the curve's range."""
     if values.size == 0:
         return 0.0, 0.0
@@ -466,7 +428,7 @@ def _heat(measurement: Measurement, line: Line, number: int) -> float:
     return float(scipy.integrate.trapezoid(values, line.distance))
 
 
-def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:
+def _common(lines: Sequence[Line | None], pitch: float) -> Array:
     """Distances that cover all lines, at steps of half a pixel."""
     first = min(float(line.distance[0]) for line in lines if line)
     last = max(float(line.distance[-1]) for line in lines if line)
@@ -474,7 +436,7 @@ def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:
     return step * np.arange(np.ceil(first / step - 1e-6), np.floor(last / step + 1e-6) + 1)
 
 
-def _laid(line: Line | None, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _laid(line: Line | None, distance: Array) -> Array:
     """Points of a line at these distances, NaN beyond its ends."""
     if line is None:
         return np.full((distance.size, 2), nan)
@@ -484,7 +446,7 @@ def _laid(line: Line | None, distance: NDArray[np.float64]) -> NDArray[np.float6
     return np.where(beyond[:, None], nan, np.stack(columns, axis=1))
 
 
-def _toward(moves: NDArray[np.float64], line: Line | None, tool: Tool) -> NDArray[np.float64]:
+def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
     """How far the edge moves toward a line's first point in m, shape (k,)."""
     if line is None:
         return np.zeros(len(moves))
@@ -496,21 +458,14 @@ def _toward(moves: NDArray[np.float64], line: Line | None, tool: Tool) -> NDArra
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """Temperature along a curve in K, and what makes it uncertain, of a frame.
+    """Temperature along a curve in K, and what makes it uncertain, of a frame."""
 
-    Parameters
-    ----------
-    temperature : ndarray
-        Mean across the curve, shape (n,); NaN where there is none.
-    calibration : ndarray
-        Its change with each error of the calibration, shape (errors, n).
-    position : ndarray
-        Its standard uncertainty from the place of the curve, shape (n,).
-    """
-
-    temperature: NDArray[np.float64]
-    calibration: NDArray[np.float64]
-    position: NDArray[np.float64]
+    temperature: Array
+    """Mean across the curve, shape (n,); NaN where there is none."""
+    calibration: Array
+    """Its change with each error of the calibration, shape (errors, n)."""
+    position: Array
+    """Its standard uncertainty from the place of the curve, shape (n,)."""
 
 
 class _Reader:
@@ -525,7 +480,7 @@ class _Reader:
         count = max(round(width / self.pitch * _FINE), 1)
         self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
 
-    def __call__(self, number: int, points: NDArray[np.float64]) -> _Read:
+    def __call__(self, number: int, points: Array) -> _Read:
         """What is read at points of a frame, NaN beyond the ends of its curve."""
         effects = self.measurement.calibration_effects(number)
         found = _Read(
@@ -543,12 +498,10 @@ class _Reader:
         found.position[there] = self._position(number, curve)
         return found
 
-    def _mean(
-        self, image: NDArray[np.floating], places: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _mean(self, image: NDArray[np.floating], places: Array) -> Array:
         return np.asarray(sample(image, self.measurement.raster, places).mean(axis=-1))
 
-    def _position(self, number: int, curve: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _position(self, number: int, curve: Array) -> Array:
         image = self.images[number]
         slopes = (
             map_coordinates(slope, image.index(curve), order=1, mode="nearest")
@@ -563,9 +516,7 @@ class _Reader:
         u = self.position
         return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
 
-    def of_the_edge(
-        self, number: int, points: NDArray[np.float64], nearer: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def of_the_edge(self, number: int, points: Array, nearer: Array) -> Array:
         """Changes in K of what is read at a distance from an edge that is nearer to the curve.
 
         By each of `nearer` in m, shape (k, n).

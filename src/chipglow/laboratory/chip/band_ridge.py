@@ -18,6 +18,7 @@ from chipglow.laboratory.chip.ridge import (
     normals_of,
     strongest_part,
 )
+from chipglow.quantities import Array
 from chipglow.scene import Line, Raster, Tool
 
 LEAST_PROMINENCE: Final = 10.0
@@ -42,33 +43,19 @@ _NO_RIDGE: Final = "shear band: no ridge of the radiance temperature is there"
 
 @dataclass(frozen=True)
 class ThermalImage:
-    """A frame in which every pixel has a temperature, so that slopes and bends exist.
+    """A frame in which every pixel has a temperature, so that slopes and bends exist."""
 
-    Parameters
-    ----------
-    temperature : ndarray
-        Radiance temperature in K, shape (y, x). Pixels under the camera's range have its
-        lower limit, or the lowest temperature of the frame where none is stated; saturated and
-        dead ones have that of their nearest usable neighbour.
-    usable : ndarray of bool
-        Which pixels are measured.
-    raster : Raster
-        Where the pixels are.
+    temperature: Array
+    """Radiance temperature in K, shape (y, x). Pixels under the camera's range have its
+    lower limit, or the lowest temperature of the frame where none is stated; saturated and
+    dead ones have that of their nearest usable neighbour.
     """
-
-    temperature: NDArray[np.float64]
     usable: NDArray[np.bool_]
     raster: Raster
 
     @classmethod
     def of(cls, measurement: Measurement, frame: int) -> "ThermalImage":
-        """A frame of a measurement.
-
-        Raises
-        ------
-        NoShearBandError
-            If no pixel is usable.
-        """
+        """A frame of a measurement."""
         known = np.asarray(measurement.data["radiance_temperature"][frame].values, dtype=np.float64)
         flags = np.asarray(measurement.data["flags"][frame].values)
         usable = np.isfinite(known)
@@ -80,7 +67,7 @@ class ThermalImage:
         filled[flags & Flag.UNDER_RANGE > 0] = lower_limit
         return cls(filled, usable, measurement.raster)
 
-    def index(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def index(self, points: Array) -> Array:
         """Row and column of points in m, shape (2, ...)."""
         column = (points[..., 0] - self.raster.left) / self.raster.spacing - 0.5
         row = (self.raster.top - points[..., 1]) / self.raster.spacing - 0.5
@@ -89,8 +76,6 @@ class ThermalImage:
     def noise(self) -> float:
         """Standard deviation in K of what differs from pixel to pixel.
 
-        Notes
-        -----
         Immerkaer (1996): the difference of two Laplacians takes away what is linear or bent; its
         mean magnitude over the usable pixels is that of the noise. An edge that is one pixel sharp
         counts as noise.
@@ -107,28 +92,6 @@ class ThermalImage:
 def find_band(image: ThermalImage, tool: Tool) -> Line:
     """Find the shear band in a measured image.
 
-    Parameters
-    ----------
-    image : ThermalImage
-        A frame.
-    tool : Tool
-        The tool, in the image's coordinates.
-
-    Returns
-    -------
-    Line
-        The ridge, away from the cutting edge, at steps of half a pixel. The distance in m counts
-        from the edge: straight to the ridge's first point, then along it.
-
-    Raises
-    ------
-    NoShearBandError
-        If no ridge is long and prominent enough to be a band.
-    ValueError
-        If the cutting edge is farther from the image than the image is wide or high.
-
-    Notes
-    -----
     A ridge is where the second derivative across it is negative (Lindeberg 1998: eigenvalues of
     the Hessian after Gaussians of several widths, times the square of the width). What runs along
     the rake face is left out, for there friction heats the chip. In polar coordinates about the
@@ -160,7 +123,7 @@ def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
     return replace(image, temperature=temperature)
 
 
-def _ridge(image: ThermalImage, tool: Tool, response: NDArray[np.float64]) -> Line:
+def _ridge(image: ThermalImage, tool: Tool, response: Array) -> Line:
     """The ridge of the strongest path through a response."""
     pitch = image.raster.spacing
     points = _path(image, response, tool)
@@ -183,7 +146,7 @@ def _check_edge(raster: Raster, tool: Tool) -> None:
         )
 
 
-def _response(image: ThermalImage, tool: Tool) -> NDArray[np.float64]:
+def _response(image: ThermalImage, tool: Tool) -> Array:
     """Height in K of ridges that do not run along the rake face, shape (y, x)."""
     x, y = tool.rake_direction
     best = np.zeros(image.temperature.shape)
@@ -205,7 +168,7 @@ def _response(image: ThermalImage, tool: Tool) -> NDArray[np.float64]:
     return best
 
 
-def _path(image: ThermalImage, response: NDArray[np.float64], tool: Tool) -> NDArray[np.float64]:
+def _path(image: ThermalImage, response: Array, tool: Tool) -> Array:
     polar = PolarGrid.about(tool, image.raster)
     allowed = map_coordinates(image.usable.astype(np.uint8), polar.index, order=0) > 0
     allowed &= polar.on_raster & polar.off_face
@@ -225,24 +188,22 @@ def _path(image: ThermalImage, response: NDArray[np.float64], tool: Tool) -> NDA
     return polar.points[i, j]
 
 
-def _climbed(
-    points: NDArray[np.float64], image: ThermalImage, coefficients: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _climbed(points: Array, image: ThermalImage, coefficients: Array) -> Array:
     """Each point moved to the maximum across the curve, if there is one."""
     pitch = image.raster.spacing
     offsets, profiles = _profiles(points, image, coefficients, _SEARCH)
     place, inside = highest(profiles, offsets)
     # A parabola of nearly equal values may leave its interval.
     moved = np.where(inside, np.clip(place, -_SEARCH * pitch, _SEARCH * pitch), 0.0)
-    return np.asarray(points + moved[:, None] * normals_of(points))
+    return points + moved[:, None] * normals_of(points)
 
 
 def _profiles(
-    points: NDArray[np.float64],
+    points: Array,
     image: ThermalImage,
-    coefficients: NDArray[np.float64],
+    coefficients: Array,
     reach: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Offsets in m up to a reach in pixels, and the smoothed temperature across every point."""
     count = ceil(reach * _FINE)
     offsets = image.raster.spacing / _FINE * np.arange(-count, count + 1, dtype=np.float64)
@@ -253,7 +214,7 @@ def _profiles(
     return offsets, gaussian_filter(values, _CLIMB_BLUR, mode="nearest")
 
 
-def _within(points: NDArray[np.float64], image: ThermalImage) -> NDArray[np.float64]:
+def _within(points: Array, image: ThermalImage) -> Array:
     """The points whose pixel is usable, from the first to the last of them."""
     row, column = np.rint(image.index(points)).astype(np.int64)
     rows, columns = image.usable.shape
@@ -265,9 +226,7 @@ def _within(points: NDArray[np.float64], image: ThermalImage) -> NDArray[np.floa
     return points[kept[0] : kept[-1] + 1]
 
 
-def _check(
-    points: NDArray[np.float64], image: ThermalImage, coefficients: NDArray[np.float64]
-) -> None:
+def _check(points: Array, image: ThermalImage, coefficients: Array) -> None:
     pitch = image.raster.spacing
     length = float(arc_length(points)[-1]) / pitch
     if length < SHORTEST:

@@ -3,17 +3,17 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Estimate
 
 
-def celsius(kelvins: NDArray[np.float64]) -> NDArray[np.float64]:
+def celsius(kelvins: Array) -> Array:
     """Temperatures in K in degrees Celsius."""
-    return kelvins - 273.15
+    return kelvins - ZERO_CELSIUS
 
 
-def budget_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+def budget_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, Array]:
     """Standard uncertainty of temperatures in K and its part from each cause, by their names.
 
     Each of shape (values,). NaN of a cause that is not in the budget, or of which nothing is known;
@@ -28,7 +28,7 @@ def budget_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, NDArr
     return columns
 
 
-def known_uncertainty(estimate: Estimate) -> NDArray[np.float64]:
+def known_uncertainty(estimate: Estimate) -> Array:
     """Standard uncertainty of the values; NaN without any component."""
     whole = estimate.standard_uncertainty if estimate.components else np.nan
     return np.where(np.isfinite(estimate.values), whole, np.nan)

@@ -22,46 +22,20 @@ _CLEARLY: Final = 4.0
 
 @dataclass(frozen=True)
 class ChosenTool:
-    """A tool, its uncertainty and its notes.
-
-    Parameters
-    ----------
-    tool : Tool
-        The tool in the measurement's coordinates.
-    notes : Notes
-        Assumptions, warnings and, as remarks, what was found.
-    uncertainty : ToolUncertainty, optional
-        How well its place is known, if it was found and no option gives an uncertainty.
-    """
+    """A tool, its uncertainty and its notes."""
 
     tool: Tool
+    """The tool in the measurement's coordinates."""
     notes: Notes = field(default_factory=Notes)
+    """Assumptions, warnings and, as remarks, what was found."""
     uncertainty: ToolUncertainty | None = None
+    """How well its place is known, if it was found and no option gives an uncertainty."""
 
 
 def chosen_tool(
     measurement: Measurement, tool: str | None, position: str | None = None
 ) -> ChosenTool:
-    """The tool that an option ``--tool`` chooses.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        States its tool, or shows it.
-    tool : str, optional
-        A tool's YAML file; ``found``, to look for the rake face in the image; by default what the
-        measurement states.
-    position : str, optional
-        What an option ``--position`` says, which takes the place of the uncertainty of a tool that
-        is found.
-
-    Raises
-    ------
-    ValueError
-        If there is no such tool.
-    OSError
-        If the file cannot be read.
-    """
+    """The tool that an option ``--tool`` chooses."""
     if tool is None:
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":

@@ -22,25 +22,7 @@ class NoContactError(ValueError):
 def contact_length(
     raster: Raster, workpiece: NDArray[np.bool_], tool: Tool, touching: float
 ) -> float:
-    """Length over which the chip touches the rake face.
-
-    Parameters
-    ----------
-    raster : Raster
-        Where the samples are.
-    workpiece : ndarray of bool
-        Where there is workpiece or chip, shape (y, x).
-    tool : Tool
-        The tool.
-    touching : float
-        Distance from the rake face in m within which chip counts as touching it.
-
-    Returns
-    -------
-    float
-        Length in m from the end of the edge up to the first gap that is longer than two of
-        the paper's pixels; 0 if the chip does not touch the rake face there.
-    """
+    """Length over which the chip touches the rake face."""
     step = raster.spacing / 2
     along = np.arange(0.0, np.hypot(raster.rows, raster.columns) * raster.spacing, step)
     foot = tool.rake_point(along)
@@ -59,24 +41,7 @@ def contact_length(
 def contact_temperatures(
     frame: Frame, raster: Raster, tool: Tool, length: float
 ) -> tuple[float, float]:
-    """Mean temperatures within `BESIDE` of the rake face, along the contact.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene at one time.
-    raster : Raster
-        Where the samples are.
-    tool : Tool
-        The tool.
-    length : float
-        Length of the contact in m, as `contact_length` gives it.
-
-    Returns
-    -------
-    tuple of float
-        Of the chip and of the tool in K; NaN where there is none.
-    """
+    """Mean temperatures within `BESIDE` of the rake face, along the contact."""
     x, y = np.meshgrid(raster.x, raster.y)
     distance = tool.signed_distance(x, y)
     along, _ = tool.face_coordinates(np.stack([x, y], axis=-1))

@@ -12,6 +12,7 @@ from scipy.special import ndtr
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.tool_position import ToolUncertainty
+from chipglow.quantities import Array
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 from chipglow.text import Notes
 
@@ -38,21 +39,14 @@ _SHIFT: Final = 0.5 / sqrt(3.0)
 
 @dataclass(frozen=True)
 class FoundTool:
-    """A tool that was found in an image.
-
-    Parameters
-    ----------
-    tool : PlacedTool
-        The tool in the measurement's coordinates.
-    uncertainty : ToolUncertainty
-        Standard uncertainties of its place and its rake angle.
-    notes : Notes
-        The assumed shape, and reasons why it may not be the rake face.
-    """
+    """A tool that was found in an image."""
 
     tool: PlacedTool
+    """The tool in the measurement's coordinates."""
     uncertainty: ToolUncertainty
+    """Standard uncertainties of its place and its rake angle."""
     notes: Notes
+    """The assumed shape, and reasons why it may not be the rake face."""
 
 
 def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> FoundTool:
@@ -136,13 +130,13 @@ def _not_found(reason: str) -> ValueError:
     )
 
 
-def _mean_radiance(measurement: Measurement) -> NDArray[np.float64]:
+def _mean_radiance(measurement: Measurement) -> Array:
     """Mean over the frames, shape (y, x); 0 where nothing was received."""
     radiance = measurement.radiance
     return np.asarray(np.where(np.isfinite(radiance), radiance, 0.0).mean(axis=0))
 
 
-def _best_line(image: NDArray[np.float64], angles: NDArray[np.float64]) -> _CoarseLine:
+def _best_line(image: Array, angles: Array) -> _CoarseLine:
     """The rightmost line that explains about as much of the image as the best."""
     if image.shape[1] < 2 * _REACH + 2:
         raise _not_found(f"the image is {image.shape[1]} pixels wide")
@@ -159,7 +153,7 @@ def _best_line(image: NDArray[np.float64], angles: NDArray[np.float64]) -> _Coar
     return _CoarseLine(float(at_place[right] + _REACH), float(angles[at_angle[right]]), prominence)
 
 
-def _scores(image: NDArray[np.float64], slope: float) -> NDArray[np.float64]:
+def _scores(image: Array, slope: float) -> Array:
     """How much a break explains on lines of one slope, by the column in the middle row."""
     indices = np.indices(image.shape, dtype=np.float64)
     rows, columns = indices[0], indices[1]
@@ -172,17 +166,17 @@ def _scores(image: NDArray[np.float64], slope: float) -> NDArray[np.float64]:
     return np.asarray(np.where(there, np.minimum(gain, _CONTRAST_LIMIT), 0.0).mean(axis=0))
 
 
-def _up(image: NDArray[np.float64], rows: NDArray[Any]) -> NDArray[np.float64]:
+def _up(image: Array, rows: NDArray[Any]) -> Array:
     """Rows counted up from the middle one."""
     return np.asarray((image.shape[0] - 1) / 2 - rows, dtype=np.float64)
 
 
 def _gain(
-    windows: NDArray[np.float64],
-    place: NDArray[np.float64],
+    windows: Array,
+    place: Array,
     blur: float,
-    image: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    image: Array,
+) -> Array:
     """Root mean square that a break explains beyond a smooth course, as a fraction of the level."""
     steps = np.arange(-_REACH, _REACH + 1.0)
     basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)
@@ -192,7 +186,7 @@ def _gain(
     return np.asarray(np.sqrt(np.maximum(explained, 0.0) / steps.size) / level)
 
 
-def _parabolas(offset: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
+def _parabolas(offset: Array, blur: float) -> Array:
     """Parabola, and another one that begins at offset 0, blurred by a Gaussian; shape (..., 6)."""
     step = ndtr(offset / blur)
     bell = blur * np.exp(-0.5 * (offset / blur) ** 2) / sqrt(2 * np.pi)
@@ -200,7 +194,7 @@ def _parabolas(offset: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
     return np.stack([np.ones_like(offset), offset, offset**2, *begun], axis=-1)
 
 
-def _decays(offset: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
+def _decays(offset: Array, blur: float) -> Array:
     """Courses that fall with the distance from offset 0, on either side; shape (..., 6)."""
     courses = []
     for away in (offset, -offset):
@@ -211,12 +205,12 @@ def _decays(offset: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
     return np.stack(courses, axis=-1)
 
 
-def _left(windows: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:
+def _left(windows: Array, basis: Array) -> Array:
     """Sum of squares that a linear model leaves, of each window."""
     return np.asarray((_remainder(windows, basis) ** 2).sum(axis=-1))
 
 
-def _remainder(windows: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:
+def _remainder(windows: Array, basis: Array) -> Array:
     frame, _ = np.linalg.qr(basis)
     if frame.ndim == 2:
         return np.asarray(windows - windows @ frame @ frame.T)
@@ -226,29 +220,19 @@ def _remainder(windows: NDArray[np.float64], basis: NDArray[np.float64]) -> NDAr
 
 @dataclass(frozen=True)
 class _Strip:
-    """Pixels of rows beside a line; nothing is resampled.
+    """Pixels of rows beside a line; nothing is resampled."""
 
-    Parameters
-    ----------
-    windows : ndarray
-        Radiance, shape (rows, pixels).
-    middle : ndarray
-        Column of each window's middle pixel, shape (rows,).
-    up : ndarray
-        Rows counted up from the image's middle one, shape (rows,).
-    level : ndarray
-        Level of each window's radiance, shape (rows,).
-    """
-
-    windows: NDArray[np.float64]
-    middle: NDArray[np.float64]
-    up: NDArray[np.float64]
-    level: NDArray[np.float64]
+    windows: Array
+    """Radiance, shape (rows, pixels)."""
+    middle: Array
+    """Column of each window's middle pixel, shape (rows,)."""
+    up: Array
+    """Rows counted up from the image's middle one, shape (rows,)."""
+    level: Array
+    """Level of each window's radiance, shape (rows,)."""
 
     @classmethod
-    def along(
-        cls, line: NDArray[np.float64], image: NDArray[np.float64], rows: NDArray[np.int64]
-    ) -> "_Strip":
+    def along(cls, line: Array, image: Array, rows: NDArray[np.int64]) -> "_Strip":
         up = _up(image, rows)
         nearest = np.rint(line[0] + line[1] * up).astype(np.int64)
         middle = np.clip(nearest, _REACH, image.shape[1] - 1 - _REACH)
@@ -256,18 +240,18 @@ class _Strip:
         level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0)
         return cls(windows, middle.astype(np.float64), up, level)
 
-    def place(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
+    def place(self, line: Array) -> Array:
         """Where a line is in each window, from its middle pixel."""
         return np.asarray(line[0] + line[1] * self.up - self.middle, dtype=np.float64)
 
-    def residuals(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residuals(self, line: Array) -> Array:
         """What the model leaves of each row, as a fraction of its level, shape (rows, pixels)."""
         steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
         left = _remainder(self.windows, _decays(steps, float(line[2])))
-        return np.asarray(left / self.level[:, None])
+        return left / self.level[:, None]
 
 
-def _rows_with_face(image: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.int64]:
+def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:
     """Rows in which a break on the line explains something."""
     every = np.arange(image.shape[0], dtype=np.int64)
     place = line[0] + line[1] * _up(image, every)
@@ -278,9 +262,7 @@ def _rows_with_face(image: NDArray[np.float64], line: NDArray[np.float64]) -> ND
     return np.asarray(rows[gain > _HAS_FACE * typical], dtype=np.int64)
 
 
-def _best_start(
-    image: NDArray[np.float64], rows: NDArray[np.int64], start: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _best_start(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     """Of the lines around one, that which leaves least: the least squares have several minima."""
     lines = [
         start + np.array([place, slope, 0.0])
@@ -291,9 +273,7 @@ def _best_start(
     return np.asarray(lines[int(np.argmin(left))], dtype=np.float64)
 
 
-def _fit(
-    image: NDArray[np.float64], rows: NDArray[np.int64], start: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     """Column in the middle row, slope and width of the blur in pixels."""
     # Windows that moved with the line would make the sum of squares jump.
     strip = _Strip.along(start, image, rows)
@@ -311,15 +291,13 @@ def _fit(
     return np.asarray(found.x, dtype=np.float64)
 
 
-def _good_rows(residuals: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _good_rows(residuals: Array) -> NDArray[np.bool_]:
     """Rows that the model fits about as well as most."""
     left = np.sqrt((residuals**2).mean(axis=-1))
     return np.asarray(left <= _WORST_ROWS * np.median(left))
 
 
-def _jackknife(
-    image: NDArray[np.float64], rows: NDArray[np.int64], fit: NDArray[np.float64]
-) -> tuple[float, float]:
+def _jackknife(image: Array, rows: NDArray[np.int64], fit: Array) -> tuple[float, float]:
     """Standard uncertainties of the angle in rad, and of the place in pixels, across the face."""
     middle = float(_up(image, rows).mean())
     fits = np.array(
@@ -335,9 +313,7 @@ def _jackknife(
     return angle_error, place_error
 
 
-def _tip_row(
-    image: NDArray[np.float64], line: NDArray[np.float64], rows: NDArray[np.int64]
-) -> tuple[float, bool]:
+def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float, bool]:
     """Row in which the radiance on the face has fallen to half, and whether it is seen to."""
     every = np.arange(image.shape[0])
     windows = _Strip.along(line, image, every).windows
@@ -351,9 +327,7 @@ def _tip_row(
     return row - 1 + float((upper - level[hottest] / 2) / (upper - lower)), True
 
 
-def _placed(
-    tool: ToolGeometry, raster: Raster, line: NDArray[np.float64], tip_row: float
-) -> PlacedTool:
+def _placed(tool: ToolGeometry, raster: Raster, line: Array, tip_row: float) -> PlacedTool:
     """The tool with its lowest point at the tip's row and its face on the line."""
     tip_y = raster.top - raster.spacing * (tip_row + 0.5)
     foot = tool.rake_foot + np.array([0.0, tip_y])
@@ -373,7 +347,7 @@ def _warnings(
     angle: float,
     angle_error: float,
     place_error: float,
-    angles: NDArray[np.float64],
+    angles: Array,
     prominence: float,
     tip_seen: bool,
 ) -> list[str]:

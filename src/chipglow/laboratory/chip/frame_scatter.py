@@ -6,8 +6,8 @@ from typing import Final
 from uuid import uuid4
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.uncertainty import Cause, Component
 
 FRAMES: Final = "frames"
@@ -19,26 +19,19 @@ _LEAST: Final = 8
 
 @dataclass(frozen=True, eq=False)
 class FrameScatter:
-    """Errors of a mean over frames, as the frames themselves show them.
+    """Errors of a mean over frames, as the frames themselves show them."""
 
-    Parameters
-    ----------
-    patterns : ndarray
-        Independent errors of the mean, each of one standard deviation, shape (frames, ...): how
-        each frame is away from the mean. Places that change together do so in them.
-    freedom : float
-        Degrees of freedom; infinite without frames.
+    patterns: Array
+    """Independent errors of the mean, each of one standard deviation, shape (frames, ...): how
+    each frame is away from the mean. Places that change together do so in them.
     """
-
-    patterns: NDArray[np.float64]
     freedom: float = inf
+    """Degrees of freedom; infinite without frames."""
 
     @classmethod
-    def of(cls, frames: NDArray[np.float64]) -> "FrameScatter":
+    def of(cls, frames: Array) -> "FrameScatter":
         """What frames of shape (frames, ...), NaN where there is nothing, show.
 
-        Notes
-        -----
         Successive frames that are alike count as fewer: the variance of the mean grows by
         1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that
         is not positive (C. J. Geyer, Statistical Science 7 (1992) 473).
@@ -54,7 +47,7 @@ class FrameScatter:
         return cls(away * np.sqrt(longer / pairs), freedom if len(frames) > 1 else inf)
 
     @property
-    def standard_deviation(self) -> NDArray[np.float64]:
+    def standard_deviation(self) -> Array:
         """Standard uncertainty of the mean, shape (...)."""
         return np.asarray(np.sqrt(np.sum(self.patterns**2, axis=0)))
 
@@ -64,7 +57,7 @@ class FrameScatter:
         return Component(cause, self.patterns.reshape(len(self.patterns), -1).T.copy())
 
 
-def _longer(away: NDArray[np.float64]) -> float:
+def _longer(away: Array) -> float:
     """By how much the variance of the mean is larger than of independent frames, 1 or more."""
     frames = away.reshape(len(away), -1)
     count, square = len(frames), float(np.sum(frames**2))

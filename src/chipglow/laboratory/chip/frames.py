@@ -7,20 +7,7 @@ from numpy.typing import NDArray
 
 
 def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]:
-    """Numbers of the chosen frames, shape (n,); of all for None.
-
-    Parameters
-    ----------
-    frames : sequence of int, optional
-        The chosen ones, from 0.
-    count : int
-        How many there are.
-
-    Raises
-    ------
-    ValueError
-        If none is chosen, or one that is not there.
-    """
+    """Numbers of the chosen frames, shape (n,); of all for None."""
     numbers = np.arange(count) if frames is None else np.asarray(frames, dtype=np.int64)
     wrong = numbers[(numbers < 0) | (numbers >= count)]
     if wrong.size or numbers.size == 0:

@@ -5,9 +5,9 @@ from math import nan
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.laboratory.chip.segmentation import end_of_build_up
+from chipglow.quantities import Array
 from chipglow.scene import Scene
 
 LARGEST_FRACTION: Final = 0.01
@@ -16,24 +16,19 @@ LARGEST_FRACTION: Final = 0.01
 
 @dataclass(frozen=True)
 class Inertia:
-    """Inertia of the scaled mass in a cut, after the first build-up of the chip.
-
-    Parameters
-    ----------
-    kinetic_fraction : float
-        Greatest change of the kinetic energy since the start over the work of the drive till then;
-        NaN where the scene has no energy balance.
-    force_fraction : float
-        Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
-        over the mean cutting force; NaN where the scene does not state it. By the balance of
-        momentum a chip that leaves at v makes a fraction abs(V − v)/V of it a force.
-    mass_scaling : float
-        Factor on the density: the true mass has this much less of both.
-    """
+    """Inertia of the scaled mass in a cut, after the first build-up of the chip."""
 
     kinetic_fraction: float
+    """Greatest change of the kinetic energy since the start over the work of the drive till then;
+    NaN where the scene has no energy balance.
+    """
     force_fraction: float
+    """Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
+    over the mean cutting force; NaN where the scene does not state it. By the balance of
+    momentum a chip that leaves at v makes a fraction abs(V − v)/V of it a force.
+    """
     mass_scaling: float
+    """Factor on the density: the true mass has this much less of both."""
 
     @property
     def warning(self) -> str:
@@ -52,13 +47,7 @@ class Inertia:
 
 
 def inertia(scene: Scene) -> Inertia | None:
-    """Inertia of the cut that a scene is of; None without a force history.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene with its force history, as the cutting simulation's file has it.
-    """
+    """Inertia of the cut that a scene is of; None without a force history."""
     if "cutting_force" not in scene.data:
         return None
     cutting = _values(scene, "cutting_force")
@@ -73,11 +62,11 @@ def inertia(scene: Scene) -> Inertia | None:
     return Inertia(float(kinetic_fraction), float(force_fraction), scaling)
 
 
-def _ratio(part: NDArray[np.float64], whole: NDArray[np.float64]) -> NDArray[np.float64]:
+def _ratio(part: Array, whole: Array) -> Array:
     """NaN where there is no whole, as before the tool touches."""
     unknown = np.full(np.shape(whole), nan)
     return np.asarray(np.divide(part, whole, out=unknown, where=whole > 0.0))
 
 
-def _values(scene: Scene, name: str) -> NDArray[np.float64]:
+def _values(scene: Scene, name: str) -> Array:
     return np.asarray(scene.data[name].values, dtype=np.float64)

@@ -11,6 +11,7 @@ from chipglow.laboratory.chip.contact import contact_length
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.segmentation import Segmentation, segmentation
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
+from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
@@ -27,23 +28,18 @@ _DEVELOPED: Final = 0.5
 
 @dataclass(frozen=True)
 class ChipScan:
-    """The chip as it passes one rake-normal line.
-
-    Parameters
-    ----------
-    height : float
-        Where the line stands on the rake face, in m up from the end of the edge; NaN if at
-        no height the chip's free surface is in the view all the time.
-    time : ndarray
-        Times of the frames that were looked at in s, shape (n,).
-    thickness : ndarray
-        Distance from the rake face to the free surface along the line in m, shape (n,); NaN
-        without a height.
-    """
+    """The chip as it passes one rake-normal line."""
 
     height: float
-    time: NDArray[np.float64]
-    thickness: NDArray[np.float64]
+    """Where the line stands on the rake face, in m up from the end of the edge; NaN if at
+    no height the chip's free surface is in the view all the time.
+    """
+    time: Array
+    """Times of the frames that were looked at in s, shape (n,)."""
+    thickness: Array
+    """Distance from the rake face to the free surface along the line in m, shape (n,); NaN
+    without a height.
+    """
 
 
 @dataclass(frozen=True)
@@ -51,112 +47,85 @@ class ChipMetrics:
     """What describes a segmented chip; lengths in m, times in s, forces in N/m of width.
 
     A ``…_standard_deviation`` is that of what the mean was taken over, NaN for one value.
-
-    Parameters
-    ----------
-    period, period_uncertainty : float
-        Time from segment to segment and its standard uncertainty, from the force history; NaN
-        without one or without two force peaks (the uncertainty: three).
-    frequency : float
-        Segments a second in Hz: 1 over `period`.
-    speed : float
-        Cutting speed in m/s: the undeformed workpiece's under the cut; NaN if none is in the view.
-    spacing, spacing_uncertainty : float
-        Length of uncut workpiece in a segment: `period` times `speed`.
-    chip_spacing : float
-        Length of chip in a segment, from band to band along it: `period` times `chip_speed`.
-    feed : float
-        Uncut chip thickness, as given or from the scene; NaN if the workpiece's free surface is
-        not in the view at the left.
-    thickness : float
-        Mean thickness of the chip, at right angles to the rake face; see `scan` for when it and
-        what follows from it are NaN.
-    peak, peak_standard_deviation, valley, valley_standard_deviation : float
-        Mean of the greatest and the least thickness of each segment, and their standard
-        deviation over the segments.
-    degree : float
-        Degree of segmentation, (`peak` - `valley`) / `peak`.
-    ratio : float
-        Chip ratio, `feed` / `thickness`.
-    chip_speed, chip_speed_standard_deviation : float
-        Mean speed of the chip up the rake face in m/s where `scan` stands, and its standard
-        deviation over the frames: a segmented chip moves by fits and starts.
-    contact, contact_standard_deviation : float
-        Length of contact on the rake face, mean and standard deviation over the frames; NaN if
-        it reaches the border of the view in one of them.
-    shear_angle, shear_angle_standard_deviation : float
-        Angle in rad from the direction of cutting to the straight line through the middle half of
-        the shear band, over the frames in which the band is developed: where it reaches the free
-        surface and its rate is at least half the greatest. NaN without such a frame, as the next.
-    band_width, band_width_standard_deviation : float
-        Full width at half maximum of the strain rate across the band, over the same frames.
-    band_rate : float
-        Greatest plastic strain rate of the band in 1/s: median over its middle half, in the frame
-        where that is greatest.
-    band_strain : float
-        Greatest plastic strain that passes `scan`, as the median over the middle half of `valley`
-        and the mean over the segments: that of the bands once they are formed.
-    cutting_mean, cutting_swing, thrust_mean, thrust_swing : float
-        Forces as in `Segmentation`; NaN without a force history.
-    segments : int
-        Whole segments that pass `scan`; without a period the scene counts as one.
-    scan : ChipScan
-        Where and when the thickness was read. The thickness is NaN if the chip is cut by the
-        border of the view at every height at some time, or the scene is shorter than a period.
     """
 
     period: float
     period_uncertainty: float
+    """Time from segment to segment and its standard uncertainty, from the force history; NaN
+    without one or without two force peaks (the uncertainty: three).
+    """
     frequency: float
+    """Segments a second in Hz: 1 over `period`."""
     speed: float
+    """Cutting speed in m/s: the undeformed workpiece's under the cut; NaN if none is in the view.
+    """
     spacing: float
     spacing_uncertainty: float
+    """Length of uncut workpiece in a segment: `period` times `speed`."""
     chip_spacing: float
+    """Length of chip in a segment, from band to band along it: `period` times `chip_speed`."""
     feed: float
+    """Uncut chip thickness, as given or from the scene; NaN if the workpiece's free surface is
+    not in the view at the left.
+    """
     thickness: float
+    """Mean thickness of the chip, at right angles to the rake face; see `scan` for when it and
+    what follows from it are NaN.
+    """
     peak: float
     peak_standard_deviation: float
     valley: float
     valley_standard_deviation: float
+    """Mean of the greatest and the least thickness of each segment, and their standard
+    deviation over the segments.
+    """
     degree: float
+    """Degree of segmentation, (`peak` - `valley`) / `peak`."""
     ratio: float
+    """Chip ratio, `feed` / `thickness`."""
     chip_speed: float
     chip_speed_standard_deviation: float
+    """Mean speed of the chip up the rake face in m/s where `scan` stands, and its standard
+    deviation over the frames: a segmented chip moves by fits and starts.
+    """
     contact: float
     contact_standard_deviation: float
+    """Length of contact on the rake face, mean and standard deviation over the frames; NaN if
+    it reaches the border of the view in one of them.
+    """
     shear_angle: float
     shear_angle_standard_deviation: float
+    """Angle in rad from the direction of cutting to the straight line through the middle half of
+    the shear band, over the frames in which the band is developed: where it reaches the free
+    surface and its rate is at least half the greatest. NaN without such a frame, as the next.
+    """
     band_width: float
     band_width_standard_deviation: float
+    """Full width at half maximum of the strain rate across the band, over the same frames."""
     band_rate: float
+    """Greatest plastic strain rate of the band in 1/s: median over its middle half, in the frame
+    where that is greatest.
+    """
     band_strain: float
+    """Greatest plastic strain that passes `scan`, as the median over the middle half of `valley`
+    and the mean over the segments: that of the bands once they are formed.
+    """
     cutting_mean: float
     cutting_swing: float
     thrust_mean: float
     thrust_swing: float
+    """Forces as in `Segmentation`; NaN without a force history."""
     segments: int
+    """Whole segments that pass `scan`; without a period the scene counts as one."""
     scan: ChipScan
+    """Where and when the thickness was read. The thickness is NaN if the chip is cut by the
+    border of the view at every height at some time, or the scene is shorter than a period.
+    """
 
 
 def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     """Measure a chip: thickness, segmentation, contact, speed and shear band.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene; it must state its tool. Where it has a force history, that gives the period.
-    feed : float, optional
-        Uncut chip thickness in m; by default it is read from the workpiece at the left of the
-        view: from the material coordinates of its free surface where the scene has them, else
-        from the height of that surface.
-
-    Raises
-    ------
-    ValueError
-        If the scene states no tool, or the feed is not positive.
-
-    Notes
-    -----
     A camera's view seldom holds two whole segments at once. So the chip is measured as it passes
     one line at right angles to the rake face, the lowest on which its free surface is in the view
     and over 1.2 times the feed all the time. There it is formed and still lies on the face: on a
@@ -229,8 +198,8 @@ class _Look:
     """What one frame shows: profile of the chip over the heights on the rake face, in m."""
 
     time: float
-    profile: NDArray[np.float64]
-    exit_height: NDArray[np.float64]
+    profile: Array
+    exit_height: Array
     contact: float
     feed: float
     speed: float
@@ -257,8 +226,8 @@ class _Passing:
     """The chip over whole segments as they pass the scanned line."""
 
     thickness: float
-    peaks: NDArray[np.float64]
-    valleys: NDArray[np.float64]
+    peaks: Array
+    valleys: Array
     speed: float
     speed_standard_deviation: float
     strain: float
@@ -303,24 +272,22 @@ def _frame_numbers(scene: Scene) -> list[int]:
     return [int(number) for number in even.round()]
 
 
-def _heights(raster: Raster, tool: Tool) -> NDArray[np.float64]:
+def _heights(raster: Raster, tool: Tool) -> Array:
     """Heights on the rake face in the view, each two samples."""
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
     points = tool.rake_point(heights)
     return heights[: max(1, int(_inside(raster, points).sum()))]
 
 
-def _inside(raster: Raster, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
     """Which points are in the view, a sample or more from its border."""
     left, right, bottom, top = raster.extent
     x, y, rim = points[..., 0], points[..., 1], raster.spacing
     across = (x > left + rim) & (x < right - rim)
-    return np.asarray(across & (y > bottom + rim) & (y < top - rim))
+    return across & (y > bottom + rim) & (y < top - rim)
 
 
-def _profile(
-    frame: Frame, raster: Raster, tool: Tool, heights: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _profile(frame: Frame, raster: Raster, tool: Tool, heights: Array) -> Array:
     """Distance from the rake face to the chip's free surface; NaN where the view ends before.
 
     The chip is the longest stretch of material on the line: it may have lifted off the face.
@@ -363,7 +330,7 @@ def _scan_row(looks: list[_Look], feed: float) -> int | None:
     return int(seen[0]) if seen.size else None
 
 
-def _windows(time: NDArray[np.float64], period: float) -> list[NDArray[np.bool_]]:
+def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     """Whole periods, the last at the end of the scene; without a period the whole scene."""
     if np.isnan(period):
         return [np.ones(time.size, dtype=np.bool_)]
@@ -411,10 +378,10 @@ def _median(values: list[float]) -> float:
     return float(np.median(known)) if known.size else nan
 
 
-def _mean(values: NDArray[np.float64]) -> float:
+def _mean(values: Array) -> float:
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else nan
 
 
-def _deviation(values: NDArray[np.float64]) -> float:
+def _deviation(values: Array) -> float:
     return float(np.std(values, ddof=1)) if values.size > 1 else nan

@@ -28,6 +28,7 @@ from chipglow.laboratory.chip.tool_position import (
     contribution,
     tool_in,
 )
+from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 from chipglow.scene.tool_attributes import tool_attributes
 from chipglow.text import Notes
@@ -47,46 +48,32 @@ _ROUNDING: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class RakeGrid:
-    """Radiance temperature in squares beside the rake face (Heigel and Whitenton 2010, Figure 7).
+    """Radiance temperature in squares beside the rake face (the paper, Figure 7)."""
 
-    Parameters
-    ----------
-    along : ndarray
-        Middles of the squares along the rake face in m, from the lower end of the straight face,
-        shape (n,).
-    depth : ndarray
-        Middles of the squares from the rake face into the chip in m, shape (m,).
-    estimate : Estimate
-        Mean radiance temperature in K of each square's pixels, shape (frames, m, n); NaN where
-        the square is left out. Its components are ``calibration``, which is the same in all that
-        was measured by it, and ``tool``, the same in all that is read by this tool, of which
-        `TOOL_BUDGET` are parts.
-    standard_deviation : ndarray
-        Standard deviation over the square's pixels in K, of the same shape; NaN also for a single
-        pixel.
-    count : ndarray
-        Usable pixels in each square, of the same shape.
-    size : float
-        Side of a square in m.
-    tool : Tool
-        The tool, in the measurement's coordinates.
-    times : ndarray
-        When each frame's integration began in s, shape (frames,).
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit or the size is not positive.
+    along: Array
+    """Middles of the squares along the rake face in m, from the lower end of the straight face,
+    shape (n,).
     """
-
-    along: NDArray[np.float64]
-    depth: NDArray[np.float64]
+    depth: Array
+    """Middles of the squares from the rake face into the chip in m, shape (m,)."""
     estimate: Estimate
-    standard_deviation: NDArray[np.float64]
+    """Mean radiance temperature in K of each square's pixels, shape (frames, m, n); NaN where
+    the square is left out. Its components are ``calibration``, which is the same in all that
+    was measured by it, and ``tool``, the same in all that is read by this tool, of which
+    `TOOL_BUDGET` are parts.
+    """
+    standard_deviation: Array
+    """Standard deviation over the square's pixels in K, of the same shape; NaN also for a single
+    pixel.
+    """
     count: NDArray[np.int64]
+    """Usable pixels in each square, of the same shape."""
     size: float
+    """Side of a square in m."""
     tool: Tool
-    times: NDArray[np.float64]
+    """The tool, in the measurement's coordinates."""
+    times: Array
+    """When each frame's integration began in s, shape (frames,)."""
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.depth.size, self.along.size)
@@ -98,7 +85,7 @@ class RakeGrid:
             raise ValueError(f"rake grid: size is {self.size!r}, expected over 0 m")
 
     @property
-    def mean(self) -> NDArray[np.float64]:
+    def mean(self) -> Array:
         """Values of `estimate` in K, shape (frames, m, n)."""
         return self.estimate.values
 
@@ -131,26 +118,18 @@ class RakeGrid:
         return replace(mean, components=(*mean.components, scatter))
 
     @property
-    def frame_mean(self) -> NDArray[np.float64]:
+    def frame_mean(self) -> Array:
         """Values of `frame_estimate` in K, shape (m, n); NaN where no frame has one."""
         return self.frame_estimate.values
 
     @property
-    def frame_standard_deviation(self) -> NDArray[np.float64]:
+    def frame_standard_deviation(self) -> Array:
         """Standard deviation of `mean` between those frames in K, shape (m, n); NaN for one."""
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
 
     def to_frame(self) -> pd.DataFrame:
-        """Every square of every frame, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``time_us``, ``depth_um``, ``along_um``, ``mean_degC``,
-            ``standard_deviation_K`` over the square's pixels, ``usable_pixels``, and the standard
-            uncertainty with its parts; NaN where a square is left out, or nothing is known.
-        """
+        """Every square of every frame, a row each."""
         places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
         time, depth, along = (1e6 * place.ravel() for place in places)
         return pd.DataFrame(
@@ -166,16 +145,7 @@ class RakeGrid:
         )
 
     def to_dataset(self) -> xr.Dataset:
-        """Every square of every frame as arrays in SI units.
-
-        Returns
-        -------
-        xarray.Dataset
-            Of the dimensions (time, depth, along): ``mean`` with its components as
-            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``,
-            ``standard_deviation``
-            and ``count``; and the tool as a scene has it.
-        """
+        """Every square of every frame as arrays in SI units."""
         dimensions = ("time", "depth", "along")
         data = to_xarray(self.estimate, "mean", dimensions, "K")
         data["mean"].attrs["long_name"] = "radiance temperature"
@@ -194,14 +164,7 @@ class RakeGrid:
         )
 
     def mean_frame(self) -> pd.DataFrame:
-        """Every square in the mean over the frames, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``depth_um``, ``along_um``, ``mean_degC``, ``standard_deviation_K`` between the
-            frames (of one frame over the square's pixels), and ``frames`` in which it is usable.
-        """
+        """Every square in the mean over the frames, a row each."""
         depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
         several = self.times.size > 1
         standard_deviation = (
@@ -239,13 +202,7 @@ class RakeGrid:
         return notes
 
     def up_to(self, columns: int) -> "RakeGrid":
-        """The same of the first squares along the face.
-
-        Parameters
-        ----------
-        columns : int
-            How many of each row.
-        """
+        """The same of the first squares along the face."""
         return replace(
             self,
             along=self.along[:columns],
@@ -254,15 +211,8 @@ class RakeGrid:
             count=self.count[:, :, :columns],
         )
 
-    def corners(self) -> NDArray[np.float64]:
-        """Corners of the squares in the measurement's coordinates.
-
-        Returns
-        -------
-        ndarray
-            x and y in m, shape (m + 1, n + 1, 2): rows from the face into the chip, columns from
-            the edge along the face.
-        """
+    def corners(self) -> Array:
+        """Corners of the squares in the measurement's coordinates."""
         sides = (np.arange(self.depth.size + 1), np.arange(self.along.size + 1))
         across, along = (self.size * steps for steps in sides)
         normal = np.array(self.tool.rake_normal)
@@ -391,7 +341,7 @@ def _averages(usable: NDArray[np.bool_]) -> "sparse.csr_array":
     return sparse.csr_array((weights.ravel(), places), shape=(squares, usable.size))
 
 
-def _places_in_squares(grid: RakeGrid, pitch: float) -> NDArray[np.float64]:
+def _places_in_squares(grid: RakeGrid, pitch: float) -> Array:
     """Places spread evenly over each square, about one a pixel, in m, shape (m, n, k, 2)."""
     count = round(grid.size / pitch)
     steps = grid.size * ((np.arange(count) + 0.5) / count - 0.5)
@@ -403,25 +353,16 @@ def _places_in_squares(grid: RakeGrid, pitch: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class _Squares:
-    """Which pixels belong to which square, and with what weight.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Rows and columns of squares.
-    whole : ndarray of bool
-        Which squares are whole inside the image, flat.
-    pixel, square : ndarray of int
-        Flat numbers of the pixels in the grid and of their squares, shape (k,).
-    weight : ndarray
-        Weights, of sum 1 in each square, shape (k,).
-    """
+    """Which pixels belong to which square, and with what weight."""
 
     shape: tuple[int, int]
     whole: NDArray[np.bool_]
+    """Which squares are whole inside the image, flat."""
     pixel: NDArray[np.int64]
     square: NDArray[np.int64]
-    weight: NDArray[np.float64]
+    """Flat numbers of the pixels in the grid and of their squares, shape (k,)."""
+    weight: Array
+    """Weights, of sum 1 in each square, shape (k,)."""
 
     @classmethod
     def of(cls, raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> "_Squares":
@@ -436,8 +377,8 @@ class _Squares:
         return cls((rows, columns), whole, np.flatnonzero(inside), square, weight)
 
     def statistics(
-        self, values: NDArray[np.float64], usable: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        self, values: Array, usable: NDArray[np.bool_]
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
         """Mean, standard deviation and number of usable pixels, each of `shape`."""
         good = usable.ravel()[self.pixel]
         value = np.where(good, values.ravel()[self.pixel], 0.0)
@@ -453,12 +394,12 @@ class _Squares:
         number_kept = kept.astype(np.int64).reshape(self.shape)
         return mean.reshape(self.shape), standard_deviation.reshape(self.shape), number_kept
 
-    def mean(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def mean(self, values: Array) -> Array:
         """Mean of values of all pixels, NaN counting as 0, of `shape`."""
         good = np.nan_to_num(values.ravel()[self.pixel])
         return self._sum(self.weight * good).reshape(self.shape)
 
-    def _sum(self, values: NDArray[np.generic]) -> NDArray[np.float64]:
+    def _sum(self, values: NDArray[np.generic]) -> Array:
         total = np.bincount(self.square, values.astype(np.float64), minlength=self.whole.size)
         return np.asarray(total, dtype=np.float64)
 
@@ -474,19 +415,13 @@ def _checked_size(pixels: float, depth: float, raster: Raster) -> float:
     return size
 
 
-def _middles(raster: Raster) -> NDArray[np.float64]:
+def _middles(raster: Raster) -> Array:
     """Middles of the pixels, x and y in m, shape (y * x, 2)."""
     return np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
 
 
 def _columns(raster: Raster, tool: Tool, size: float, rows: int) -> int:
-    """Number of squares along the face up to the last that is whole inside the image.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Number of squares along the face up to the last that is whole inside the image."""
     left, right, bottom, top = raster.extent
     corners = np.array([[left, bottom], [left, top], [right, bottom], [right, top]])
     furthest = float(tool.face_coordinates(corners)[0].max())
@@ -515,20 +450,8 @@ def _whole(raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> 
     return np.asarray(inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:])
 
 
-def _centred_weights(
-    off: NDArray[np.float64], square: NDArray[np.int64], squares: int
-) -> NDArray[np.float64]:
-    """Weights of sum 1 whose weighted middle is the square's, nearest to equal ones.
-
-    Parameters
-    ----------
-    off : ndarray
-        Places of pixels from the middles of their squares in m, shape (k, 2).
-    square : ndarray
-        Numbers of their squares, shape (k,).
-    squares : int
-        Number of squares.
-    """
+def _centred_weights(off: Array, square: NDArray[np.int64], squares: int) -> Array:
+    """Weights of sum 1 whose weighted middle is the square's, nearest to equal ones."""
     number = np.maximum(np.bincount(square, minlength=squares), 1)
     middle = np.stack([np.bincount(square, part, squares) / number for part in off.T], axis=-1)
     spread = off - middle[square]
@@ -541,7 +464,7 @@ def _centred_weights(
     return np.asarray(1 / number[square] + (spread * slope[square]).sum(axis=-1))
 
 
-def _ratio(total: NDArray[np.float64], count: NDArray[np.generic]) -> NDArray[np.float64]:
+def _ratio(total: Array, count: NDArray[np.generic]) -> Array:
     """Quotient; NaN where the divisor is not positive."""
     divisor = np.asarray(count, dtype=np.float64)
     quotient = np.full(total.shape, np.nan)

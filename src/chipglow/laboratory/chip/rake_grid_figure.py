@@ -6,12 +6,12 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip.rake_grid import RakeGrid
+from chipglow.quantities import Array
 
 _HEIGHT: Final = 3.8
 _AROUND: Final = 60e-6
@@ -20,18 +20,7 @@ _MARKERS: Final = "osD^vP*X"
 
 
 def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
-    """Draw a grid on the image that it was read from, and its profiles along the rake face.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        What the grid was read from.
-    grid : RakeGrid
-        The grid. Of several frames their mean is drawn, with bars of one standard deviation
-        between frames, and hollow where a square is usable in some of the frames only; of one
-        frame, with bars of one standard deviation over a square's pixels. Bands are of one standard
-        uncertainty of the mean, where calibration or tool are in it.
-    """
+    """Draw a grid on the image that it was read from, and its profiles along the rake face."""
     with drawing.style():
         figure = drawing.new_figure(_HEIGHT)
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
@@ -57,7 +46,7 @@ def _draw_image(figure: Figure, axes: Axes, measurement: Measurement, grid: Rake
     drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
 
 
-def _mean_image(measurement: Measurement, grid: RakeGrid) -> NDArray[np.float64]:
+def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
     """Mean over the grid's frames of what is usable in K; NaN where no frame has a value."""
     frames = np.isin(measurement.times, grid.times)
     values = measurement.radiance_temperature()[frames]

@@ -7,15 +7,7 @@ from chipglow.scene import Scene
 
 
 def resolution_warnings(scene: Scene, band_width: float = nan) -> tuple[str, ...]:
-    """Sentences about lengths of a cut that its grid does not resolve.
-
-    Parameters
-    ----------
-    scene : Scene
-        A scene of the cutting simulation; of another nothing is said.
-    band_width : float, optional
-        Width of the shear band in m, which is known after the cut only; NaN: not known.
-    """
+    """Sentences about lengths of a cut that its grid does not resolve."""
     known = str(scene.data.attrs.get("resolution_warnings", ""))
     cell = float(scene.data.attrs.get("cell", 0.0))
     return (*known.splitlines(), *unresolved({"shear band": band_width}, cell))

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 
 _RADIUS_STEP: Final = 2e-6
@@ -30,33 +31,22 @@ class NoShearBandError(ValueError):
 
 @dataclass(frozen=True)
 class PolarGrid:
-    """Places about the cutting edge: radii down, angles from the rake face downward across.
+    """Places about the cutting edge: radii down, angles from the rake face downward across."""
 
-    Parameters
-    ----------
-    points : ndarray
-        x and y in m, shape (radii, angles, 2).
-    index : ndarray
-        Row and column of the raster at these places, shape (2, radii, angles).
-    on_raster : ndarray of bool
-        Whether a place lies between the outermost centres of the raster.
-    off_face : ndarray of bool
-        Whether it lies beyond the layer along the rake face, which friction shears and heats too.
-    radii : ndarray
-        Distances from the edge in m.
-    radius_step : float
-        Their distance in m: 2 µm, or a third of a sample that is over 6 µm wide.
-    angle_step : float
-        Angle between neighbours in rad.
-    """
-
-    points: NDArray[np.float64]
-    index: NDArray[np.float64]
+    points: Array
+    """x and y in m, shape (radii, angles, 2)."""
+    index: Array
+    """Row and column of the raster at these places, shape (2, radii, angles)."""
     on_raster: NDArray[np.bool_]
+    """Whether a place lies between the outermost centres of the raster."""
     off_face: NDArray[np.bool_]
-    radii: NDArray[np.float64]
+    """Whether it lies beyond the layer along the rake face, which friction shears and heats too."""
+    radii: Array
+    """Distances from the edge in m."""
     radius_step: float
+    """Their distance in m: 2 µm, or a third of a sample that is over 6 µm wide."""
     angle_step: float
+    """Angle between neighbours in rad."""
 
     @classmethod
     def about(cls, tool: Tool, raster: Raster) -> "PolarGrid":
@@ -85,16 +75,11 @@ class PolarGrid:
             angle_step=float(angles[1] - angles[0]),
         )
 
-    def slopes_from_face(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def slopes_from_face(self, values: Array) -> NDArray[np.bool_]:
         """Where values only fall, at one radius, from the layer along the rake face up to there.
 
         That is the slope of the layer, however far it reaches, and no ridge: before a ridge the
         values rise.
-
-        Parameters
-        ----------
-        values : ndarray
-            Values at the places, shape (radii, angles).
         """
         rises = np.zeros_like(self.off_face)
         rises[:, 1:] = self.off_face[:, :-1] & (np.diff(values, axis=1) > 0)
@@ -102,7 +87,7 @@ class PolarGrid:
 
     def best_path(
         self,
-        score: NDArray[np.float64],
+        score: Array,
         allowed: NDArray[np.bool_],
         ends: NDArray[np.bool_],
         toll: float,
@@ -110,31 +95,6 @@ class PolarGrid:
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Path with one angle at every radius that gathers the most.
 
-        Parameters
-        ----------
-        score : ndarray
-            What a place adds, shape (radii, angles).
-        allowed : ndarray of bool
-            Where the path may run.
-        ends : ndarray of bool
-            Where it may end.
-        toll : float
-            What every step costs, as a fraction of the median score on the best path without.
-        anywhere : bool
-            Whether the path may begin at any radius, not only at the first.
-
-        Returns
-        -------
-        tuple of ndarray
-            Indices of the radii, one after the other, and of the angles.
-
-        Raises
-        ------
-        NoShearBandError
-            If there is no path to an end.
-
-        Notes
-        -----
         Dynamic programming over the radii, with a cost of turning. It is done twice: the second
         time what is well under the strength of the first path costs, else the path would gain by
         running on where the band has ended.
@@ -145,7 +105,7 @@ class PolarGrid:
 
     def _best(
         self,
-        score: NDArray[np.float64],
+        score: Array,
         allowed: NDArray[np.bool_],
         ends: NDArray[np.bool_],
         anywhere: bool,
@@ -167,9 +127,7 @@ class PolarGrid:
             columns.append(int(came_from[last + 1 - len(columns), columns[-1]]))
         return np.arange(last + 1 - len(columns), last + 1), np.array(columns[::-1])
 
-    def _best_before(
-        self, total: NDArray[np.float64], i: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def _best_before(self, total: Array, i: int) -> tuple[Array, NDArray[np.int64]]:
         """Greatest sum within reach at the radius before, less a little for turning."""
         slope = self.radii[i] * self.angle_step / self.radius_step
         reach = max(1, min(ceil(_STEEPEST / slope), total.size - 1))
@@ -193,40 +151,15 @@ def _greatest_within_reach(total, penalty):  # type: ignore[no-untyped-def]
     return best, came_from
 
 
-def off_face(points: NDArray[np.float64], tool: Tool) -> NDArray[np.bool_]:
-    """Which points lie beyond the layer along the rake face, which friction shears and heats too.
-
-    Parameters
-    ----------
-    points : ndarray
-        x and y in m, shape (..., 2).
-    tool : Tool
-        The tool. The layer is 25 µm thick, and toward the edge 0.4 of the distance from it.
-    """
+def off_face(points: Array, tool: Tool) -> NDArray[np.bool_]:
+    """Mask of points beyond the layer along the rake face, which friction shears and heats."""
     radius = np.linalg.norm(points - tool.edge_point, axis=-1)
     depth = tool.signed_distance(points[..., 0], points[..., 1])
     return np.asarray(depth > np.minimum(_RAKE_LAYER, _RAKE_LAYER_SHARE * radius))
 
 
-def strongest_part(
-    points: NDArray[np.float64], strength: NDArray[np.float64], longest: float
-) -> slice:
-    """The strongest part of a path between stretches without a ridge that are too long.
-
-    Parameters
-    ----------
-    points : ndarray
-        The path in m, shape (n, 2).
-    strength : ndarray
-        What each point adds, not negative, shape (n,); under half the median there is no ridge.
-    longest : float
-        Length in m over which a stretch without a ridge divides the path.
-
-    Returns
-    -------
-    slice
-        The points from the first to the last on the ridge of that part.
-    """
+def strongest_part(points: Array, strength: Array, longest: float) -> slice:
+    """The strongest part of a path between stretches without a ridge that are too long."""
     weak = strength < _WEAK * np.median(strength)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]]).astype(np.int8)))
     along = arc_length(points)
@@ -238,7 +171,7 @@ def strongest_part(
     return slice(int(strong[0]), int(strong[-1]) + 1)
 
 
-def even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+def even_steps(points: Array, step: float) -> Array:
     """Curve smoothed by local parabolas and laid out anew at even steps of arc length in m."""
     along = arc_length(points)
     even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
@@ -249,17 +182,10 @@ def even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     return local_parabolas(resampled, window)
 
 
-def local_parabolas(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+def local_parabolas(values: Array, window: int) -> Array:
     """Least-squares parabolas over windows of even steps, each at its middle (Savitzky-Golay).
 
     As `scipy.signal.savgol_filter`, whose package takes half a second to be imported.
-
-    Parameters
-    ----------
-    values : ndarray
-        Shape (n, columns).
-    window : int
-        Values of a window, odd, 3 to n. The first and the last one hold to the ends.
     """
     half = window // 2
     powers = np.vander(np.arange(-half, half + 1.0), 3)
@@ -269,37 +195,20 @@ def local_parabolas(values: NDArray[np.float64], window: int) -> NDArray[np.floa
     return np.concatenate([first, middle, last])
 
 
-def arc_length(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def arc_length(points: Array) -> Array:
     """Distance along a polyline from its first point in m, shape (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def normals_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def normals_of(points: Array) -> Array:
     """Unit normals of a curve, shape (n, 2): those that point up if it runs to the left."""
     tangent = np.gradient(points, axis=0)
     tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
     return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
 
 
-def highest(
-    values: NDArray[np.float64], offsets: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Place of each row's greatest value by a parabola through it and its neighbours.
-
-    Parameters
-    ----------
-    values : ndarray
-        Profiles across a curve, shape (n, m).
-    offsets : ndarray
-        Where they are read, evenly spaced, shape (m,).
-
-    Returns
-    -------
-    place : ndarray
-        Offset of the top, shape (n,).
-    inside : ndarray of bool
-        Whether it is a maximum, not an end of the profile.
-    """
+def highest(values: Array, offsets: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Place of each row's greatest value by a parabola through it and its neighbours."""
     peak = values.argmax(axis=1)
     inside = (peak > 0) & (peak < offsets.size - 1)
     peak = np.clip(peak, 1, offsets.size - 2)

@@ -4,33 +4,27 @@ from dataclasses import dataclass
 from math import nan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.camera import frame_weights
 from chipglow.laboratory.chip.contact import contact_length
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
+from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 
 
 @dataclass(frozen=True)
 class Instant:
-    """The shear band during one exposure.
-
-    Parameters
-    ----------
-    start : float
-        When the exposure begins in s.
-    band : ShearBand or None
-        Ridge of the strain rate's mean over the exposure; None if there is none.
-    temperatures : ndarray
-        Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
-        scene, empty without a band.
-    """
+    """The shear band during one exposure."""
 
     start: float
+    """When the exposure begins in s."""
     band: ShearBand | None
-    temperatures: NDArray[np.float64]
+    """Ridge of the strain rate's mean over the exposure; None if there is none."""
+    temperatures: Array
+    """Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
+    scene, empty without a band.
+    """
 
     @property
     def mean_temperature(self) -> float:
@@ -40,15 +34,7 @@ class Instant:
 
     @classmethod
     def at(cls, scene: Scene, start: float, duration: float) -> "Instant":
-        """Find the band during an exposure.
-
-        Parameters
-        ----------
-        scene : Scene
-            The scene; it must state its tool.
-        start, duration : float
-            When the exposure begins and how long it lasts, in s.
-        """
+        """Find the band during an exposure."""
         indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
         rate = _mean(scene, "plastic_strain_rate", indices, weights)
         workpiece = scene.field("material", indices[len(indices) // 2]) == Material.WORKPIECE
@@ -63,34 +49,23 @@ class Instant:
 
 @dataclass(frozen=True)
 class Segment:
-    """A segment of the chip whose shear band is developed, and where its errors are read.
-
-    Parameters
-    ----------
-    start : float
-        When the exposure begins in s.
-    frame : Frame
-        The scene in the middle of the exposure.
-    tool : Tool
-        The tool.
-    band : ShearBand
-        Ridge of the strain rate's mean over the exposure.
-    contact_length : float
-        Length over which the chip touches the rake face in m.
-    momentary_band : ShearBand or None
-        The band in `frame` alone, which motion does not blur; None if there is none.
-    sweep : float
-        How far the band's middle moves across itself during the exposure, in m; NaN where it is
-        not found in both the first and the last frame.
-    """
+    """A segment of the chip whose shear band is developed, and where its errors are read."""
 
     start: float
+    """When the exposure begins in s."""
     frame: Frame
+    """The scene in the middle of the exposure."""
     tool: Tool
     band: ShearBand
+    """Ridge of the strain rate's mean over the exposure."""
     contact_length: float
+    """Length over which the chip touches the rake face in m."""
     momentary_band: ShearBand | None
+    """The band in `frame` alone, which motion does not blur; None if there is none."""
     sweep: float
+    """How far the band's middle moves across itself during the exposure, in m; NaN where it is
+    not found in both the first and the last frame.
+    """
 
     @property
     def moment(self) -> ShearBand:
@@ -104,19 +79,7 @@ class Segment:
 
     @classmethod
     def of(cls, scene: Scene, instant: Instant, duration: float, touching: float) -> "Segment":
-        """The segment at an instant that has a band.
-
-        Parameters
-        ----------
-        scene : Scene
-            The scene; it must state its tool.
-        instant : Instant
-            Its band, during the exposure.
-        duration : float
-            How long the exposure lasts in s.
-        touching : float
-            Distance from the rake face in m within which chip counts as touching it.
-        """
+        """The segment at an instant that has a band."""
         assert scene.tool is not None and instant.band is not None
         indices, _ = frame_weights(scene.times, scene.frame_spacing, instant.start, duration)
         frame = scene.frame(indices[len(indices) // 2])
@@ -132,9 +95,7 @@ class Segment:
         )
 
 
-def _mean(
-    scene: Scene, field_name: str, indices: range, weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _mean(scene: Scene, field_name: str, indices: range, weights: Array) -> Array:
     total = np.zeros(scene.raster.shape)
     for index, weight in zip(indices, weights, strict=True):
         total += weight * scene.field(field_name, index)

@@ -10,6 +10,8 @@ import scipy  # its signal part is slow to import, and loaded at its first use
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from chipglow.quantities import Array
+
 _LEAST_PROMINENCE: Final = 0.3
 """Least rise of the autocorrelation from the valley before its first peak to that peak: in a few
 unequal segments the peak is low, but the valley deep; noise has neither."""
@@ -28,37 +30,28 @@ continuous chip."""
 
 @dataclass(frozen=True)
 class Segmentation:
-    """Segments in a force history.
-
-    Parameters
-    ----------
-    start : float
-        Time in s from which the history counts: what is before is the first build-up of the chip.
-    period : float
-        Mean time from one force peak to the next in s; NaN with less than two peaks.
-    period_uncertainty : float
-        Standard uncertainty of the period in s: the deviation of the intervals over the root of
-        their number; NaN for less than two intervals.
-    correlation_period : float
-        The period in s from the autocorrelation of the whole history, as a check; NaN where
-        segments are too unequal for it.
-    peaks : ndarray
-        Times of the force peaks in s.
-    cutting_mean, thrust_mean : float
-        Mean forces per width of cut from `start` on in N/m.
-    cutting_swing, thrust_swing : float
-        Mean height of the forces' peaks over the valleys between them in N/m; NaN without peaks.
-    """
+    """Segments in a force history."""
 
     start: float
+    """Time in s from which the history counts: what is before is the first build-up of the chip."""
     period: float
+    """Mean time from one force peak to the next in s; NaN with less than two peaks."""
     period_uncertainty: float
+    """Standard uncertainty of the period in s: the deviation of the intervals over the root of
+    their number; NaN for less than two intervals.
+    """
     correlation_period: float
-    peaks: NDArray[np.float64]
+    """The period in s from the autocorrelation of the whole history, as a check; NaN where
+    segments are too unequal for it.
+    """
+    peaks: Array
+    """Times of the force peaks in s."""
     cutting_mean: float
     thrust_mean: float
+    """Mean forces per width of cut from `start` on in N/m."""
     cutting_swing: float
     thrust_swing: float
+    """Mean height of the forces' peaks over the valleys between them in N/m; NaN without peaks."""
 
     @property
     def segments(self) -> int:
@@ -71,20 +64,6 @@ def segmentation(
 ) -> Segmentation:
     """Period and swing of the segments from the history of the forces.
 
-    Parameters
-    ----------
-    time : array_like
-        Times in s, at even steps, shape (n,).
-    cutting_force, thrust_force : array_like
-        Forces per width of cut in N/m, shape (n,).
-
-    Raises
-    ------
-    ValueError
-        If the times do not ascend evenly or there are fewer than 16.
-
-    Notes
-    -----
     The history counts from where the cutting force first reaches the median of its second half,
     and from a fifth of its duration on at the earliest. A force whose range is under a tenth of its
     mean has no segments: a continuous chip ripples, by some per cent.
@@ -131,25 +110,19 @@ def segmentation(
     )
 
 
-def end_of_build_up(cutting_force: NDArray[np.float64]) -> int:
-    """Index from which a history of the cutting force counts: see `segmentation`.
-
-    Parameters
-    ----------
-    cutting_force : ndarray
-        Per width of cut in N/m, shape (n,), at even steps, n over 0.
-    """
+def end_of_build_up(cutting_force: Array) -> int:
+    """Index from which a history of the cutting force counts: see `segmentation`."""
     later = cutting_force[cutting_force.size // 2 :]
     return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
 
 
-def _range(force: NDArray[np.float64]) -> float:
+def _range(force: Array) -> float:
     """From 5 % to 95 % of the values."""
     low, high = np.percentile(force, [5.0, 95.0])
     return float(high - low)
 
 
-def _correlation(swing: NDArray[np.float64]) -> NDArray[np.float64]:
+def _correlation(swing: Array) -> Array:
     """Autocorrelation up to half of the history, slightly smoothed; 0 for a constant force."""
     spectrum = np.fft.rfft(swing, 2 * swing.size)
     raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
@@ -159,7 +132,7 @@ def _correlation(swing: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(gaussian_filter1d(correlation / correlation[0], 2.0))
 
 
-def _correlation_period(correlation: NDArray[np.float64], step: float) -> float:
+def _correlation_period(correlation: Array, step: float) -> float:
     """Lag of the first clear peak of the unbiased autocorrelation; NaN if there is none."""
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
@@ -169,9 +142,7 @@ def _correlation_period(correlation: NDArray[np.float64], step: float) -> float:
     return float(peaks[0] * step) if peaks.size else nan
 
 
-def _unequal_period(
-    swing: NDArray[np.float64], correlation: NDArray[np.float64], step: float
-) -> float:
+def _unequal_period(swing: Array, correlation: Array, step: float) -> float:
     """Mean interval between the peaks that stand out; NaN if there are less than three."""
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
@@ -183,14 +154,14 @@ def _unequal_period(
     return float(np.diff(peaks).mean() * step) if peaks.size > 2 else nan
 
 
-def _peaks(force: NDArray[np.float64], period: float) -> NDArray[np.int64]:
+def _peaks(force: Array, period: float) -> NDArray[np.int64]:
     peaks, _ = scipy.signal.find_peaks(
         force, distance=max(0.6 * period, 1.0), prominence=_range(force) / 5
     )
     return np.asarray(peaks, dtype=np.int64)
 
 
-def _swing(force: NDArray[np.float64], peaks: NDArray[np.int64]) -> float:
+def _swing(force: Array, peaks: NDArray[np.int64]) -> float:
     """Mean height of the peaks over the valleys between them."""
     if peaks.size < 2:
         return nan

@@ -18,6 +18,7 @@ from chipglow.laboratory.chip.ridge import (
     off_face,
     strongest_part,
 )
+from chipglow.quantities import Array
 from chipglow.scene import Line, Raster, Tool, sample, straight_line
 
 BAND_RATE: Final = 6000.0
@@ -33,31 +34,24 @@ _NO_RIDGE: Final = "shear band: no ridge of the plastic strain rate is off the r
 
 @dataclass(frozen=True)
 class ShearBand:
-    """A shear band as a curve, away from the cutting edge.
-
-    Parameters
-    ----------
-    ridge : Line
-        Points of greatest strain rate, at even steps. The distance in m counts from the cutting
-        edge: straight to the first point, where the band begins, then along the curve. A band
-        that has left the edge with the chip begins where it comes out of the layer along the rake
-        face.
-    normals : ndarray
-        Unit normals of the curve on the chip's side (upward), shape (n, 2).
-    rate : ndarray
-        Plastic strain rate on the ridge in 1/s, shape (n,).
-    widths : ndarray
-        Full width at half maximum of the strain rate across the ridge in m, shape (n,); NaN where
-        the rate does not fall to half on both sides.
-    reaches_surface : bool
-        Whether the curve ends at a free surface, not at the border of the field of view.
-    """
+    """A shear band as a curve, away from the cutting edge."""
 
     ridge: Line
-    normals: NDArray[np.float64]
-    rate: NDArray[np.float64]
-    widths: NDArray[np.float64]
+    """Points of greatest strain rate, at even steps. The distance in m counts from the cutting
+    edge: straight to the first point, where the band begins, then along the curve. A band
+    that has left the edge with the chip begins where it comes out of the layer along the rake
+    face.
+    """
+    normals: Array
+    """Unit normals of the curve on the chip's side (upward), shape (n, 2)."""
+    rate: Array
+    """Plastic strain rate on the ridge in 1/s, shape (n,)."""
+    widths: Array
+    """Full width at half maximum of the strain rate across the ridge in m, shape (n,); NaN where
+    the rate does not fall to half on both sides.
+    """
     reaches_surface: bool
+    """Whether the curve ends at a free surface, not at the border of the field of view."""
 
     @property
     def length(self) -> float:
@@ -89,18 +83,10 @@ class ShearBand:
     def middle_half(self) -> NDArray[np.bool_]:
         """Which points are on the middle half of the curve, shape (n,)."""
         fraction = (self.ridge.distance - self.start) / self.length
-        return np.asarray((fraction >= 0.25) & (fraction <= 0.75))
+        return (fraction >= 0.25) & (fraction <= 0.75)
 
     def across(self, half_length: float, step: float) -> Line:
-        """Line across the band's middle; the distance grows from the workpiece to the chip.
-
-        Parameters
-        ----------
-        half_length : float
-            Reach to either side in m.
-        step : float
-            Distance between points in m.
-        """
+        """Line across the band's middle; the distance grows from the workpiece to the chip."""
         count = round(half_length / step)
         distance = step * np.arange(-count, count + 1)
         return straight_line(self.ridge.points[self.middle], self.normals[self.middle], distance)
@@ -114,25 +100,6 @@ def find_shear_band(
 ) -> ShearBand:
     """Find the shear band as the ridge of the strain rate that leads to the free surface.
 
-    Parameters
-    ----------
-    raster : Raster
-        Where the samples are.
-    strain_rate : ndarray
-        Plastic strain rate in 1/s, shape (y, x), such as the mean over an exposure.
-    workpiece : ndarray of bool
-        Where there is workpiece or chip.
-    tool : Tool
-        The tool; the ridge leads away from its edge.
-
-    Raises
-    ------
-    NoShearBandError
-        If no connected path through the material leads to a surface or to the border of the
-        field, the rate on the best one stays under `BAND_RATE`, or it is no ridge.
-
-    Notes
-    -----
     In polar coordinates about the edge the band has one angle at every radius. Dynamic
     programming finds the path of the greatest sum of log(1 + rate / 6000 s⁻¹): the logarithm
     keeps a single hot spot from outweighing a stretch of band. A layer along the rake face is left
@@ -160,8 +127,8 @@ def find_shear_band(
 
 
 def _best_path(
-    raster: Raster, rate: NDArray[np.float64], workpiece: NDArray[np.bool_], tool: Tool
-) -> tuple[NDArray[np.float64], bool]:
+    raster: Raster, rate: Array, workpiece: NDArray[np.bool_], tool: Tool
+) -> tuple[Array, bool]:
     """Points from where the band begins to the surface, and whether it is a free surface."""
     polar = PolarGrid.about(tool, raster)
     values = map_coordinates(rate, polar.index, order=1)
@@ -182,7 +149,7 @@ def _best_path(
 
 def _path_of_one_band(
     polar: PolarGrid,
-    score: NDArray[np.float64],
+    score: Array,
     allowed: NDArray[np.bool_],
     ends: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -195,7 +162,7 @@ def _path_of_one_band(
     return polar.best_path(score, beyond, ends, _TOLL, anywhere=True)
 
 
-def _check(rate: NDArray[np.float64]) -> None:
+def _check(rate: Array) -> None:
     if not rate.max() >= BAND_RATE:
         raise NoShearBandError(
             f"shear band: the greatest plastic strain rate on the best path is "
@@ -205,9 +172,7 @@ def _check(rate: NDArray[np.float64]) -> None:
         raise NoShearBandError(_NO_RIDGE)
 
 
-def _climb(
-    points: NDArray[np.float64], raster: Raster, rate: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _climb(points: Array, raster: Raster, rate: Array) -> Array:
     """Move each point to the maximum of the strain rate across the curve, if there is one."""
     normals = normals_of(points)
     count = ceil(_SEARCH / raster.spacing)
@@ -216,10 +181,10 @@ def _climb(
     values = gaussian_filter(np.nan_to_num(sample(rate, raster, across)), _CLIMB_BLUR)
     place, inside = highest(values, offsets)
     moved = np.where(inside, place, 0.0)
-    return np.asarray(points + moved[:, None] * normals)
+    return points + moved[:, None] * normals
 
 
-def _beyond_layer(points: NDArray[np.float64], tool: Tool) -> NDArray[np.float64]:
+def _beyond_layer(points: Array, tool: Tool) -> Array:
     """The points after the last that climbed to a maximum in the layer along the rake face."""
     within = np.flatnonzero(~off_face(points, tool))
     beyond = points[within[-1] + 1 :] if within.size else points
@@ -229,11 +194,11 @@ def _beyond_layer(points: NDArray[np.float64], tool: Tool) -> NDArray[np.float64
 
 
 def _widths(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
+    points: Array,
+    normals: Array,
     raster: Raster,
-    rate: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    rate: Array,
+) -> Array:
     """Full width at half maximum across each point of the curve."""
     step = raster.spacing / 2
     offsets = step * np.arange(ceil(_WIDEST / step) + 1, dtype=np.float64)
@@ -242,12 +207,10 @@ def _widths(
         places = points[:, None] + sign * offsets[:, None] * normals[:, None]
         values = np.nan_to_num(sample(rate, raster, places))
         sides.append(_half_crossing(values, offsets))
-    return np.asarray(sides[0] + sides[1])
+    return sides[0] + sides[1]
 
 
-def _half_crossing(
-    values: NDArray[np.float64], offsets: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _half_crossing(values: Array, offsets: Array) -> Array:
     """Offset where each row first falls to half its first value; NaN where it never does."""
     half = values[:, :1] / 2
     below = values <= half

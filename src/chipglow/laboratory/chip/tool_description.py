@@ -30,46 +30,12 @@ class ToolDescription(ToolSection):
 
 
 def load_tool(path: str | Path) -> Tool:
-    """Read a tool from a YAML file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file: keys of a study's section ``cutting.tool``, and ``tip``. An outline that it
-        names is looked up beside it.
-
-    Returns
-    -------
-    Tool
-        In the measurement's coordinates.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or the tool is not possible.
-    OSError
-        If the file cannot be read.
-    """
+    """Read a tool from a YAML file."""
     return load_described(ToolDescription, path).build()
 
 
 def tool_of(measurement: Measurement, path: str | Path | None) -> Tool:
-    """Tool of a file or, without one, the tool that a measurement states.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        A simulated measurement states its scene's tool.
-    path : str or Path, optional
-        A tool's YAML file; see `load_tool`.
-
-    Raises
-    ------
-    ValueError
-        If there is no file and the measurement states no tool, or as `load_tool`.
-    OSError
-        If the file cannot be read.
-    """
+    """Tool of a file or, without one, the tool that a measurement states."""
     if path is not None:
         return load_tool(path)
     tool = measurement.tool

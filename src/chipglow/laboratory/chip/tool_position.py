@@ -12,6 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.band_ridge import ThermalImage
+from chipglow.quantities import Array
 from chipglow.scene import Tool
 from chipglow.uncertainty import Cause, Component
 
@@ -23,20 +24,7 @@ TOOL_BUDGET: Final = ("tool along", "tool across", "tool angle")
 
 
 def tool_in(measurement: Measurement, given: Tool | None) -> Tool:
-    """The given tool, or else the measurement's own.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Frames of a camera.
-    given : Tool, optional
-        A tool, in the measurement's coordinates.
-
-    Raises
-    ------
-    ValueError
-        If there is neither.
-    """
+    """The given tool, or else the measurement's own."""
     tool = measurement.tool if given is None else given
     if tool is None:
         raise ValueError(
@@ -48,30 +36,18 @@ def tool_in(measurement: Measurement, given: Tool | None) -> Tool:
 
 @dataclass(frozen=True)
 class ToolUncertainty:
-    """Standard uncertainties of the place of a tool, independent of each other.
-
-    Parameters
-    ----------
-    along : float
-        Of the tip along the rake face in m.
-    across : float
-        Of the rake face across itself in m, where `pivot` is.
-    angle : float
-        Of the rake angle in rad.
-    pivot : float
-        Where on the rake face its place and its angle are independent: the distance in m up the
-        straight face from its lower end.
-
-    Raises
-    ------
-    ValueError
-        If one is not finite, or an uncertainty is negative.
-    """
+    """Standard uncertainties of the place of a tool, independent of each other."""
 
     along: float
+    """Of the tip along the rake face in m."""
     across: float
+    """Of the rake face across itself in m, where `pivot` is."""
     angle: float = 0.0
+    """Of the rake angle in rad."""
     pivot: float = 0.0
+    """Where on the rake face its place and its angle are independent: the distance in m up the
+    straight face from its lower end.
+    """
 
     def __post_init__(self) -> None:
         for name in ("along", "across", "angle"):
@@ -81,22 +57,8 @@ class ToolUncertainty:
         if not isfinite(self.pivot):
             raise ValueError(f"tool uncertainty: pivot is {self.pivot!r} m, expected a finite one")
 
-    def displacements(self, tool: Tool, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far points that are fixed to the tool move, one standard uncertainty at a time.
-
-        Parameters
-        ----------
-        tool : Tool
-            The tool.
-        points : ndarray
-            x and y in m, shape (..., 2).
-
-        Returns
-        -------
-        ndarray
-            In m, shape (3, ..., 2): the tool moved up along the face, moved across it into the
-            chip, and turned to a greater rake angle about `pivot`.
-        """
+    def displacements(self, tool: Tool, points: Array) -> Array:
+        """How far points that are fixed to the tool move, one standard uncertainty at a time."""
         direction, normal = np.array(tool.rake_direction), np.array(tool.rake_normal)
         offset = points - tool.rake_point(self.pivot)
         up, out = offset @ direction, offset @ normal
@@ -106,43 +68,19 @@ class ToolUncertainty:
             [moved, np.broadcast_to(self.across * normal, points.shape), self.angle * turned]
         )
 
-    def component(self, tool: Tool, effects: Iterable[NDArray[np.float64]]) -> Component:
-        """The component that the place of a tool makes.
-
-        Parameters
-        ----------
-        tool : Tool
-            The tool. The errors of the same tool with the same uncertainty are the same, in
-            whatever is read by it.
-        effects : iterable of ndarray
-            Changes of the values by one standard uncertainty `along`, `across` and of `angle`,
-            with their sign, all of one shape; NaN where there is no value.
-        """
+    def component(self, tool: Tool, effects: Iterable[Array]) -> Component:
+        """The component that the place of a tool makes."""
         columns = np.stack([one.ravel() for one in effects], axis=1)
         identity = hashlib.sha256(repr((tool, self)).encode()).hexdigest()[:16]
         return Component(Cause(TOOL, identity, len(TOOL_BUDGET), parts=TOOL_BUDGET), columns)
 
 
-def contribution(
-    image: ThermalImage, points: NDArray[np.float64], displacement: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def contribution(image: ThermalImage, points: Array, displacement: Array) -> Array:
     """What a displacement by one standard uncertainty changes in what is read.
 
     Half the difference between the temperatures on either side: the uncertainty of the position
     times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one side is
     outside the image, the difference from the other.
-
-    Parameters
-    ----------
-    image : ThermalImage
-        The image.
-    points, displacement : ndarray
-        x and y in m, shape (..., 2).
-
-    Returns
-    -------
-    ndarray
-        In K with its sign, shape (...).
     """
     (behind, no_behind), (here, _), (ahead, no_ahead) = (
         _read(image, points + side * displacement) for side in (-1, 0, 1)
@@ -151,9 +89,7 @@ def contribution(
     return np.where(no_ahead ^ no_behind, one_side, (ahead - behind) / 2)
 
 
-def _read(
-    image: ThermalImage, points: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _read(image: ThermalImage, points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Temperatures in K, of the nearest pixel outside the image, and which are outside."""
     row, column = image.index(points)
     rows, columns = image.temperature.shape

@@ -23,6 +23,7 @@ from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
 from chipglow.laboratory.chip.frame_scatter import FrameScatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Tool, sample
 from chipglow.text import Notes
 from chipglow.uncertainty import Component, Estimate, draw
@@ -42,7 +43,7 @@ _FEW: Final = 3
 _SAME_ANGLE: Final = radians(0.1)
 
 
-def normalised_error(measured: Estimate, simulated: Estimate) -> NDArray[np.float64]:
+def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
     """E_n number: magnitude of the difference over the expanded uncertainty of the difference.
 
     E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043), k = `COVERAGE`. Up to 1 the
@@ -50,57 +51,38 @@ def normalised_error(measured: Estimate, simulated: Estimate) -> NDArray[np.floa
     """
     away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.abs(away.values) / (COVERAGE * away.standard_uncertainty))
+        return np.abs(away.values) / (COVERAGE * away.standard_uncertainty)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How one simulation fits the measurement at one place.
-
-    Parameters
-    ----------
-    label : str
-        Name of the simulation.
-    bias : float
-        Mean of simulated less measured in K.
-    bias_uncertainty : float
-        Its standard uncertainty in K.
-    rms : float
-        Root of the mean square of the differences in K.
-    agreeing : int
-        Number of values with E_n up to 1.
-    count : int
-        Number of values that both have.
-    """
+    """How one simulation fits the measurement at one place."""
 
     label: str
     bias: float
+    """Mean of simulated less measured in K."""
     bias_uncertainty: float
+    """Its standard uncertainty in K."""
     rms: float
+    """Root of the mean square of the differences in K."""
     agreeing: int
+    """Number of values with E_n up to 1."""
     count: int
+    """Number of values that both have."""
 
 
 @dataclass(frozen=True)
 class PlaceResult:
-    """Which simulation fits best at one place.
-
-    Parameters
-    ----------
-    place : str
-        Where, in words.
-    fits : tuple of Fit
-        One for each simulation, in the given order.
-    best : int
-        Number of the one with the least root mean square.
-    confidence : float
-        Fraction of the draws of all uncertainties in which it has the least one.
-    """
+    """Which simulation fits best at one place."""
 
     place: str
+    """Where, in words."""
     fits: tuple[Fit, ...]
+    """One for each simulation, in the given order."""
     best: int
+    """Number of the one with the least root mean square."""
     confidence: float
+    """Fraction of the draws of all uncertainties in which it has the least one."""
 
     @property
     def is_sure(self) -> bool:
@@ -143,78 +125,40 @@ def _agreement(fit: Fit) -> str:
 
 @dataclass(frozen=True)
 class GridComparison:
-    """The analysis grid on the rake face, measured and simulated.
+    """The analysis grid on the rake face, measured and simulated."""
 
-    Parameters
-    ----------
-    along, depth : ndarray
-        Middles of the squares up the face and into the chip in m, shapes (n,) and (m,).
-    measured : Estimate
-        Shape (m, n).
-    simulated : tuple of Estimate
-        One for each simulation.
-    """
-
-    along: NDArray[np.float64]
-    depth: NDArray[np.float64]
+    along: Array
+    depth: Array
+    """Middles of the squares up the face and into the chip in m, shapes (n,) and (m,)."""
     measured: Estimate
+    """Shape (m, n)."""
     simulated: tuple[Estimate, ...]
 
 
 @dataclass(frozen=True)
 class BandComparison:
-    """The temperature along the shear band, measured and simulated.
+    """The temperature along the shear band, measured and simulated."""
 
-    Parameters
-    ----------
-    distance : ndarray
-        Distance from the cutting edge in m, at steps of a measured pixel, shape (n,).
-    measured : Estimate
-        Shape (n,).
-    simulated : tuple of Estimate
-        One for each simulation.
-    """
-
-    distance: NDArray[np.float64]
+    distance: Array
+    """Distance from the cutting edge in m, at steps of a measured pixel, shape (n,)."""
     measured: Estimate
     simulated: tuple[Estimate, ...]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measurement beside simulations.
-
-    Parameters
-    ----------
-    labels : tuple of str
-        Names of the simulations.
-    grid : GridComparison or None
-        At the rake face; None if there is nothing to compare.
-    band : BandComparison or None
-        Along the shear band; None if there is nothing to compare.
-    places : tuple of PlaceResult
-        Which simulation fits where.
-    notes : Notes
-        Assumptions and warnings.
-    """
+    """A measurement beside simulations."""
 
     labels: tuple[str, ...]
     grid: GridComparison | None
+    """At the rake face; None if there is nothing to compare."""
     band: BandComparison | None
+    """Along the shear band; None if there is nothing to compare."""
     places: tuple[PlaceResult, ...]
     notes: Notes
 
     def to_frame(self) -> pd.DataFrame:
-        """Every value of each simulation, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``place``, ``along_um`` and ``depth_um`` of squares, ``distance_um`` of points
-            in the band, ``measured_degC``, ``simulation``, ``simulated_degC``, their expanded
-            uncertainties (k = 2) ``…_expanded_K``, ``difference_K`` and ``E_n``; NaN where there is
-            none.
-        """
+        """Every value of each simulation, a row each."""
         parts: list[pd.DataFrame] = []
         if self.grid is not None:
             depth, along = np.meshgrid(1e6 * self.grid.depth, 1e6 * self.grid.along, indexing="ij")
@@ -227,14 +171,7 @@ class Comparison:
         return pd.concat(parts, ignore_index=True)
 
     def fit_frame(self) -> pd.DataFrame:
-        """How each simulation fits at each place, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``place``, ``simulation``, ``bias_K``, ``bias_standard_uncertainty_K``,
-            ``rms_K``, ``values`` and ``values_with_E_n_up_to_1``.
-        """
+        """How each simulation fits at each place, a row each."""
         return pd.DataFrame(
             {
                 "place": result.place.rstrip(","),
@@ -274,10 +211,10 @@ def _value_frames(
     measured = pair.measured
     for label, simulated in zip(labels, pair.simulated, strict=True):
         columns = {
-            "measured_degC": measured.values - 273.15,
+            "measured_degC": measured.values - ZERO_CELSIUS,
             "measured_expanded_K": COVERAGE * measured.standard_uncertainty,
             "simulation": label,
-            "simulated_degC": simulated.values - 273.15,
+            "simulated_degC": simulated.values - ZERO_CELSIUS,
             "simulated_expanded_K": COVERAGE * simulated.standard_uncertainty,
             "difference_K": simulated.values - measured.values,
             "E_n": normalised_error(measured, simulated),
@@ -291,32 +228,22 @@ def _flat(values: Any) -> Any:
 
 @dataclass(frozen=True)
 class StatedUncertainties:
-    """Uncertainties that the files do not state.
-
-    Parameters
-    ----------
-    temperature : float
-        Standard uncertainty of the measured radiance temperature in K, common to all values, for a
-        measurement without its own.
-    emissivity : float
-        Relative standard uncertainty of the emissivities that the simulations assume.
-    position : float, optional
-        Standard uncertainty of positions in the measured image in m, of each value by itself. By
-        default that of a pixel; for squares at the rake face only where `tool` is not stated.
-    tool : ToolUncertainty, optional
-        Uncertainty of the tool's place in the measured image, common to all values, such as that
-        of a `FoundTool`.
-
-    Raises
-    ------
-    ValueError
-        If one is negative or not finite.
-    """
+    """Uncertainties that the files do not state."""
 
     temperature: float = 0.0
+    """Standard uncertainty of the measured radiance temperature in K, common to all values, for a
+    measurement without its own.
+    """
     emissivity: float = 0.0
+    """Relative standard uncertainty of the emissivities that the simulations assume."""
     position: float | None = None
+    """Standard uncertainty of positions in the measured image in m, of each value by itself. By
+    default that of a pixel; for squares at the rake face only where `tool` is not stated.
+    """
     tool: ToolUncertainty | None = None
+    """Uncertainty of the tool's place in the measured image, common to all values, such as that
+    of a `FoundTool`.
+    """
 
     def __post_init__(self) -> None:
         for name in ("temperature", "emissivity", "position"):
@@ -329,7 +256,7 @@ def compare(
     measured: Measurement,
     simulated: Mapping[str, Measurement],
     tool: Tool,
-    curve: NDArray[np.float64] | None = None,
+    curve: Array | None = None,
     stated: StatedUncertainties | None = None,
     reference: int | None = None,
 ) -> Comparison:
@@ -498,7 +425,7 @@ def _few_frames(name: str, count: int) -> str:
 
 def _compare_band(
     files: Sequence[tuple[str, Measurement, Tool, int | None]],
-    curve: NDArray[np.float64] | None,
+    curve: Array | None,
     stated: StatedUncertainties,
     notes: Notes,
 ) -> BandComparison | None:
@@ -559,9 +486,7 @@ def _laid_by_the_edge(
     return replace(profile, estimate=replace(alone, components=components))
 
 
-def _along(
-    name: str, profile: BandProfile, distance: NDArray[np.float64], notes: Notes
-) -> Estimate:
+def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Estimate:
     """Means over the frames at distances from the edge.
 
     Where a single frame reaches, the variance between frames is the mean of it where several do.
@@ -577,7 +502,7 @@ def _along(
     elif used.sum() < _FEW:
         notes.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
 
-    def read(field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def read(field: Array) -> Array:
         rows = field.reshape(profile.temperature.shape)[used]
         return np.stack([_at(distance, profile.distance, row) for row in rows])
 
@@ -594,7 +519,7 @@ def _along(
     return replace(found, components=(*found.components, _scatter(frames, known).component()))
 
 
-def _scatter(frames: NDArray[np.float64], known: NDArray[np.bool_]) -> FrameScatter:
+def _scatter(frames: Array, known: NDArray[np.bool_]) -> FrameScatter:
     """How the frames differ, where they are known."""
     count, scatter = known.sum(axis=0), FrameScatter.of(frames)
     several = count > 1
@@ -606,14 +531,12 @@ def _scatter(frames: NDArray[np.float64], known: NDArray[np.bool_]) -> FrameScat
     return scatter
 
 
-def _at(
-    distance: NDArray[np.float64], own: NDArray[np.float64], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _at(distance: Array, own: Array, values: Array) -> Array:
     """Values at other distances; NaN beside a NaN and beyond the ends."""
-    return np.asarray(np.interp(distance, own, values, left=np.nan, right=np.nan))
+    return np.interp(distance, own, values, left=np.nan, right=np.nan)
 
 
-def _mean(values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _mean(values: Array, known: NDArray[np.bool_]) -> Array:
     """Mean over the first axis of what is known; NaN where nothing is."""
     count = known.sum(axis=0)
     total = np.where(known, values, 0.0).sum(axis=0)

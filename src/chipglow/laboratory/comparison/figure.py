@@ -6,11 +6,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, GridComparison
+from chipglow.quantities import Array
 from chipglow.uncertainty import Estimate
 
 _HEIGHT: Final = 5.2
@@ -19,15 +19,7 @@ _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
-    """Draw what was measured and simulated, and the differences with expanded uncertainties.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The comparison. Of the squares at the rake face the nearest row is drawn with its
-        uncertainties, and the differences of the rows behind it, paler the deeper; and the shear
-        band.
-    """
+    """Draw what was measured and simulated, and the differences with expanded uncertainties."""
     columns = []
     if comparison.grid is not None:
         grid = comparison.grid
@@ -64,7 +56,7 @@ def _colour(number: int) -> str:
 
 
 def _draw_values(
-    axes: Axes, place: NDArray[np.float64], readings: Sequence[Estimate], labels: Sequence[str]
+    axes: Axes, place: Array, readings: Sequence[Estimate], labels: Sequence[str]
 ) -> None:
     measured, *simulated = readings
     x, values = 1e6 * place, measured.values - KELVIN
@@ -90,7 +82,7 @@ def _draw_deeper(axes: Axes, grid: GridComparison) -> None:
         axes.set_title(f"dashed: deeper rows, to {deepest:.3g} µm", fontsize="small")
 
 
-def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence[Estimate]) -> None:
+def _draw_differences(axes: Axes, place: Array, readings: Sequence[Estimate]) -> None:
     measured, *simulated = readings
     axes.axhline(0.0, color="black", linewidth=0.8)
     step = float(np.median(np.diff(1e6 * place))) if place.size > 1 else 0.0

@@ -12,20 +12,7 @@ from chipglow.laboratory.result_file import write_frame
 
 
 def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
-    """Read simulated measurements, by their attribute ``surface`` or their file's name.
-
-    Parameters
-    ----------
-    paths : iterable of path
-        Their files.
-
-    Raises
-    ------
-    ValueError
-        If one is no measurement, or there twice; the message names the file.
-    OSError
-        If one cannot be read.
-    """
+    """Read simulated measurements, by their attribute ``surface`` or their file's name."""
     found: dict[str, Measurement] = {}
     for path in map(Path, paths):
         item = load_measurement(path)
@@ -39,17 +26,7 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> None:
-    """Write a comparison into a folder that is there.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What to write.
-    folder : Path
-        Gets ``comparison.csv``, a line for each value of each simulation with its expanded
-        uncertainty (k = 2), and ``summary.json``, the fits, sentences, assumptions
-        and warnings; both with units in the names of the columns and keys.
-    """
+    """Write a comparison into a folder that is there."""
     write_frame(comparison.to_frame(), folder / "comparison.csv")
     summary = {
         "statement": comparison.statement,

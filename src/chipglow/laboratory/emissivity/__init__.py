@@ -1,7 +1,6 @@
 """Emissivity from images of heated objects, and true temperatures by it."""
 
 from chipglow.laboratory.emissivity.emissivity import (
-    AreaEmissivity,
     EmissivityLine,
     EmissivityMap,
     Heating,
@@ -12,11 +11,10 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.file import (
     EmissivityMapFile,
-    MeasuredArea,
     MeasuredEmissivity,
+    emissivity_trend,
+    read_emissivity_lines,
     read_emissivity_map,
-    read_measured_areas,
-    read_region_emissivity,
     write_emissivity,
 )
 from chipglow.laboratory.emissivity.region_emissivities import (
@@ -30,7 +28,6 @@ from chipglow.laboratory.emissivity.study_sections import (
     surface_text,
 )
 from chipglow.laboratory.emissivity.temperature import (
-    KnownEmissivity,
     ReflectedTemperature,
     RegionTemperatures,
     TrueTemperature,
@@ -39,13 +36,10 @@ from chipglow.laboratory.emissivity.temperature import (
 )
 
 __all__ = [
-    "AreaEmissivity",
     "EmissivityLine",
     "EmissivityMap",
     "EmissivityMapFile",
     "Heating",
-    "KnownEmissivity",
-    "MeasuredArea",
     "MeasuredEmissivity",
     "ReflectedTemperature",
     "RegionEmissivities",
@@ -57,12 +51,12 @@ __all__ = [
     "determine_emissivity",
     "emissivity_covariance",
     "emissivity_line",
+    "emissivity_trend",
     "load_regions",
     "measured_features",
     "measured_text",
+    "read_emissivity_lines",
     "read_emissivity_map",
-    "read_measured_areas",
-    "read_region_emissivity",
     "surface_text",
     "true_temperature",
     "true_temperatures",

@@ -13,15 +13,17 @@ from numpy.typing import NDArray
 from chipglow.camera import Flag, Measurement
 from chipglow.laboratory.emissivity.observations import (
     RANDOM,
+    UsedPixels,
     area_estimate,
     check_same_pixels,
-    count_flags,
-    flag_text,
-    left_out_warning,
+    drift_effect,
     observed_flags,
     observed_radiance,
     stated_calibration,
+    used_pixels,
+    with_drift,
 )
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
 from chipglow.uncertainty import Estimate, propagate
@@ -35,8 +37,10 @@ BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
 LABORATORY: Final = 293.0
 """Temperature in K of the paper's laboratory, which surfaces reflect."""
 
+CONSTANT: Final = np.array([[1.0], [0.0]])
+"""Design of a line from its constant."""
+
 _CLEARLY: Final = 5.0
-_ZERO_CELSIUS: Final = 273.15
 
 
 @dataclass(frozen=True)
@@ -99,37 +103,26 @@ class Heating:
 
 @dataclass(frozen=True, eq=False)
 class EmissivityMap:
-    """Emissivity of every pixel; made by `determine_emissivity`.
-
-    Parameters
-    ----------
-    heating : Heating
-        How the object was heated.
-    band : Band
-        The camera's band.
-    raster : Raster
-        The pixels.
-    radiance : ndarray
-        Radiance in W/(m² sr) of every observation, shape (observation, y, x): the frames of one
-        image, or the means of several images. NaN where a frame is flagged.
-    flags : ndarray
-        All `Flag` that a pixel has in any frame, uint8, shape (y, x).
-    calibration : ndarray, optional
-        Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x).
-    lower_limit : float
-        Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
-    recordings : int
-        From how many recordings the observations are.
-    """
+    """Emissivity of every pixel; made by `determine_emissivity`."""
 
     heating: Heating
+    """How the object was heated."""
     band: Band
+    """The camera's band."""
     raster: Raster
-    radiance: NDArray[np.float64]
+    radiance: Array
+    """Radiance in W/(m² sr) of every observation, shape (observation, y, x): the frames of one
+    image, or the means of several images. NaN where a frame is flagged.
+    """
     flags: NDArray[np.uint8]
-    calibration: NDArray[np.float64] | None
+    """All `Flag` that a pixel has in any frame, uint8, shape (y, x)."""
+    calibration: Array | None
+    """Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x)."""
     lower_limit: float = 0.0
+    """Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
+    """
     recordings: int = 1
+    """From how many recordings the observations are."""
 
     @property
     def hidden(self) -> float:
@@ -150,17 +143,17 @@ class EmissivityMap:
         return hashlib.sha256(self.radiance.tobytes()).hexdigest()[:16]
 
     @cached_property
-    def emissivity(self) -> NDArray[np.float64]:
+    def emissivity(self) -> Array:
         """Emissivity, shape (y, x); NaN where flagged. Noise can take it out of 0 to 1."""
         return emissivity_of_radiance(self.mean_radiance, self.heating, self.band)
 
     @cached_property
-    def mean_radiance(self) -> NDArray[np.float64]:
+    def mean_radiance(self) -> Array:
         """Mean radiance over the observations in W/(m² sr), shape (y, x); NaN where flagged."""
         return np.asarray(self.radiance.mean(axis=0))
 
     @cached_property
-    def radiance_temperature(self) -> NDArray[np.float64]:
+    def radiance_temperature(self) -> Array:
         """Radiance temperature of the mean radiance in K, shape (y, x); NaN where flagged."""
         return np.asarray(self.band.temperature(self.mean_radiance), np.float64)
 
@@ -170,14 +163,11 @@ class EmissivityMap:
 
         Of one observation it is without the pixel's noise, of which then nothing is known.
         """
-        found = self._systematic(self.emissivity, self.mean_radiance, self.calibration)
-        drift = self._drift(self.mean_radiance)
-        if drift is None:
-            found = found.with_unevaluated("drift")
-        else:
-            found = found.with_component(
-                "drift", drift, independent="common", identity=self.identity
-            )
+        relative = self.heating.drift
+        effect = self.mean_radiance / self._contrast / sqrt(self.recordings)
+        drift = None if relative is None else relative * effect
+        systematic = self._systematic(self.emissivity, self.mean_radiance, self.calibration)
+        found = with_drift(systematic, drift, self.identity)
         if self.observations == 1:
             return found.with_unevaluated("noise")
         noise = self.radiance.std(axis=0, ddof=1) / sqrt(self.observations) / self._contrast
@@ -191,61 +181,34 @@ class EmissivityMap:
         )
 
     def of(self, area: Area) -> "RegionEmissivity":
-        """Mean emissivity of an area, and what makes it uncertain.
-
-        Parameters
-        ----------
-        area : Area
-            Pixels on this map's raster.
-
-        Raises
-        ------
-        ValueError
-            If fewer than two of its pixels can be used.
-        """
-        usable = area.mask & np.isfinite(self.mean_radiance)
-        flagged = count_flags(self.flags[area.mask])
-        count = int(usable.sum())
-        if count < 2:
-            raise ValueError(
-                f"region {area.name}: {count} of its {int(area.mask.sum())} pixels can be used "
-                f"({flag_text(flagged)}), expected 2 or more"
-            )
-        values = emissivity_of_radiance(self.radiance[:, usable], self.heating, self.band)
-        mean_radiance = float(self.mean_radiance[usable].mean())
-        calibration = None if self.calibration is None else self.calibration[usable].mean()
+        """Mean emissivity of an area, and what makes it uncertain."""
+        used = used_pixels(area, self.mean_radiance, self.flags)
+        values = emissivity_of_radiance(self.radiance[:, used.mask], self.heating, self.band)
+        mean_radiance = float(self.mean_radiance[used.mask].mean())
+        calibration = None if self.calibration is None else self.calibration[used.mask].mean()
         pixels = values.mean(axis=0)
         mean = float(pixels.mean())
         random = area_estimate(mean, values, f"{self.identity} {area.name}")
+        repeatability = float(random.contribution("repeatability"))
+        drift = drift_effect(
+            self.heating.drift, mean_radiance / self._contrast, self.recordings, repeatability
+        )
         estimate = self._systematic(np.array(mean), mean_radiance, calibration)
-        drift = self._drift(mean_radiance)
-        if self.recordings > 1:
-            # What of the drift the recordings do not show already as their repeatability.
-            shown = float(random.contribution("repeatability"))
-            drift = sqrt(max((drift or 0.0) ** 2 - shown**2, 0.0))
-        if drift is None:
-            estimate = estimate.with_unevaluated("drift")
-        else:
-            estimate = estimate.with_component(
-                "drift", drift, independent="common", identity=self.identity
-            )
-        found = RegionEmissivity(
+        result = RegionEmissivity(
             name=area.name,
             feature=area.feature,
             whole=area.whole,
             heating=self.heating,
-            pixels=count,
-            left_out=int(area.mask.sum()) - count,
-            flagged=flagged,
+            used=used,
             hidden=self.hidden,
             standard_deviation=float(pixels.std(ddof=1)),
             outside=(int((pixels < 0).sum()), int((pixels > 1).sum())),
             observed=values.mean(axis=1),
-            estimate=estimate + (random - mean),
+            estimate=with_drift(estimate, drift, self.identity) + (random - mean),
         )
-        return replace(found, estimate=found.estimate.with_warnings(*found._warnings()))
+        return replace(result, estimate=result.estimate.with_warnings(*result._warnings()))
 
-    def _systematic(self, values: NDArray[np.float64], radiance: Any, calibration: Any) -> Estimate:
+    def _systematic(self, values: Array, radiance: Any, calibration: Any) -> Estimate:
         """Emissivities with what is common to all pixels, frames and images."""
 
         def found(reference: Any, reflected: Any) -> Any:
@@ -265,12 +228,6 @@ class EmissivityMap:
         effect = 0.0 if calibration is None else calibration / self._contrast
         return replace(known.with_component("calibration", effect), values=values)
 
-    def _drift(self, radiance: Any) -> Any:
-        """Effect on the emissivity of drift between recordings; None if that is not stated."""
-        if self.heating.drift is None:
-            return None
-        return self.heating.drift * radiance / self._contrast / sqrt(self.recordings)
-
     @property
     def _contrast(self) -> float:
         """Radiance of a blackbody at the true temperature over that of the surroundings."""
@@ -280,75 +237,69 @@ class EmissivityMap:
 
 @dataclass(frozen=True, eq=False)
 class RegionEmissivity:
-    """Emissivity of an area: a row of the table; made by `EmissivityMap.of`.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    whole : bool
-        Whether the area is all that there is of the feature.
-    heating : Heating
-        How the object was heated.
-    pixels : int
-        Number of pixels that count.
-    left_out : int
-        How many more there are that do not count, because they are flagged.
-    flagged : dict
-        How many have each `Flag`.
-    hidden : float
-        Lowest emissivity that the camera's range measures; 0 without a lower limit.
-    standard_deviation : float
-        Standard deviation over the pixels: how much the surface varies from place to place, with
-        the pixels' noise. It is no uncertainty of the mean.
-    outside : tuple of int
-        How many pixels have an emissivity under 0, and over 1.
-    observed : ndarray
-        Mean emissivity of each observation, shape (observation,).
-    estimate : Estimate
-        Mean emissivity, with the components of `COMMON`, the same in all areas and images;
-        ``drift`` from recording to recording over the repeatability, the same in all areas of a
-        map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
-    """
+    """Emissivity of an area: a row of the table; made by `EmissivityMap.of`."""
 
     name: str
     feature: str
+    """The area's name, and the feature that it belongs to."""
     whole: bool
+    """Whether the area is all that there is of the feature."""
     heating: Heating
-    pixels: int
-    left_out: int
-    flagged: dict[Flag, int]
+    """How the object was heated."""
+    used: UsedPixels
     hidden: float
+    """Lowest emissivity that the camera's range measures; 0 without a lower limit."""
     standard_deviation: float
+    """Standard deviation over the pixels: how much the surface varies from place to place, with
+    the pixels' noise. It is no uncertainty of the mean.
+    """
     outside: tuple[int, int]
-    observed: NDArray[np.float64]
+    """How many pixels have an emissivity under 0, and over 1."""
+    observed: Array
+    """Mean emissivity of each observation, shape (observation,)."""
     estimate: Estimate
+    """Mean emissivity, with the components of `COMMON`, the same in all areas and images;
+    ``drift`` from recording to recording over the repeatability, the same in all areas of a
+    map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """
 
     @property
     def mean(self) -> float:
         """Mean emissivity."""
         return float(self.estimate.values)
 
+    @property
+    def line(self) -> "EmissivityLine":
+        """The emissivity as a line over the temperature that is constant."""
+        return EmissivityLine(
+            self.name,
+            self.feature,
+            self.estimate.linear(CONSTANT),
+            (self.heating,),
+            (self.mean,),
+            (float(self.estimate.standard_uncertainty),),
+            standard_deviation=self.standard_deviation,
+        )
+
     def _warnings(self) -> Iterator[str]:
-        text = left_out_warning(self.name, self.pixels, self.left_out, self.flagged)
-        if text is not None:
-            if self.flagged[Flag.UNDER_RANGE]:
+        for text in self.used.warnings():
+            if self.used.flagged[Flag.UNDER_RANGE]:
                 text += (
                     " The remaining pixels are brighter than the region, as the camera's range "
                     f"hides emissivities below {self.hidden:.3g}."
                 )
-            elif self.flagged[Flag.SATURATED]:
+            elif self.used.flagged[Flag.SATURATED]:
                 text += " The remaining pixels are darker than the region."
             yield text
-        under, over = self.outside
+        (under, over), count = self.outside, self.used.count
         if under:
             yield (
-                f"{self.name}: {under} of {self.pixels} pixels have an emissivity under 0: they "
-                "are darker than what is said to be reflected."
+                f"{self.name}: {under} of {count} pixels have an emissivity under 0: they "
+                "are darker than the stated surroundings."
             )
         if over:
             yield (
-                f"{self.name}: {over} of {self.pixels} pixels have an emissivity over 1: they "
+                f"{self.name}: {over} of {count} pixels have an emissivity over 1: they "
                 "are brighter than a blackbody of the true temperature."
             )
         if not 0 <= self.mean <= 1:
@@ -356,50 +307,35 @@ class RegionEmissivity:
 
 
 @dataclass(frozen=True)
-class AreaEmissivity:
-    """An area's emissivity at one true temperature: of a file, or of a line.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    heating : Heating
-        How the object was heated; of a line, with the temperature at which it is taken.
-    estimate : Estimate
-        Mean emissivity, as `RegionEmissivity` has it.
-    """
-
-    name: str
-    feature: str
-    heating: Heating
-    estimate: Estimate
-
-
-@dataclass(frozen=True)
 class EmissivityLine:
-    """Emissivity of an area over the temperature, as a straight line; by `emissivity_line`.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    heatings : tuple of Heating
-        How the object was heated, one for each true temperature.
-    means, uncertainties : tuple of float
-        Mean emissivities, and their standard uncertainties.
-    estimate : Estimate
-        Emissivity of the line at its `middle`, and its change with temperature in 1/K; shape (2,).
-    residual : float
-        Standard deviation about the line; NaN of two temperatures.
-    """
+    """Emissivity of an area as a straight line over the temperature, the simplest a constant."""
 
     name: str
     feature: str
-    heatings: tuple[Heating, ...]
-    means: tuple[float, ...]
-    uncertainties: tuple[float, ...]
+    """Name of the area and of the feature that it belongs to."""
     estimate: Estimate
-    residual: float
+    """Emissivity at `middle`, and its change with temperature in 1/K; shape (2,)."""
+    heatings: tuple[Heating, ...] = ()
+    """Heating of the object for each true temperature; empty if known from elsewhere."""
+    means: tuple[float, ...] = ()
+    uncertainties: tuple[float, ...] = ()
+    """Mean emissivity at each temperature, and its standard uncertainty."""
+    residual: float = nan
+    """Standard deviation about the line; NaN of fewer than three temperatures."""
+    standard_deviation: float = 0.0
+    """Standard deviation over the pixels, mean over the temperatures."""
+
+    @classmethod
+    def constant(cls, mean: float, standard_uncertainty: float = 0.0) -> "EmissivityLine":
+        """An emissivity from elsewhere, whose error is independent of the measurement's."""
+        if not 0 < mean <= 1:
+            raise ValueError(f"emissivity: is {mean!r}, expected over 0 to 1")
+        if not 0 <= standard_uncertainty < inf:
+            raise ValueError(
+                f"emissivity: standard uncertainty is {standard_uncertainty!r}, expected 0 or more"
+            )
+        value = Estimate(np.array(mean)).with_component("emissivity", standard_uncertainty)
+        return cls("", "", value.linear(CONSTANT))
 
     @property
     def temperatures(self) -> tuple[float, ...]:
@@ -409,7 +345,7 @@ class EmissivityLine:
     @property
     def middle(self) -> float:
         """Mean of the temperatures in K."""
-        return float(np.mean(self.temperatures))
+        return float(np.mean(self.temperatures or 0.0))
 
     @property
     def slope(self) -> float:
@@ -422,37 +358,22 @@ class EmissivityLine:
         design = np.stack([np.ones(away.size), away.ravel()], axis=1)
         return self.estimate.linear(design).reshape(*away.shape)
 
-    def weights(self, temperature: float) -> NDArray[np.float64]:
+    def weights(self, temperature: float) -> Array:
         """Weight of every mean in the emissivity at a temperature in K; their sum is 1."""
         away = np.array([1.0, temperature - self.middle])
-        found: NDArray[np.float64] = away @ np.linalg.pinv(_design(self.temperatures))
-        return found
-
-    def area(self, temperature: float) -> AreaEmissivity:
-        """Emissivity of the area at a temperature in K.
-
-        Raises
-        ------
-        ValueError
-            If it is no temperature that a heated object has.
-        """
-        heating = replace(self.heatings[0], reference=temperature)
-        return AreaEmissivity(self.name, self.feature, heating, self.at(temperature))
+        weights: Array = away @ np.linalg.pinv(_design(self.temperatures))
+        return weights
 
 
-def _design(temperatures: Sequence[float]) -> NDArray[np.float64]:
+def _design(temperatures: Sequence[float]) -> Array:
     """Design matrix of a line about the middle of the temperatures, shape (n, 2)."""
     kelvins = np.array(temperatures)
     return np.stack([np.ones_like(kelvins), kelvins - kelvins.mean()], axis=1)
 
 
-def emissivity_of_radiance(
-    radiance: NDArray[np.float64], heating: Heating, band: Band
-) -> NDArray[np.float64]:
+def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
     """Emissivity from in-band radiance in W/(m² sr), of any shape.
 
-    Notes
-    -----
     ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
     """
     ends = band.radiance(np.array([heating.reference, heating.reflected]))
@@ -496,20 +417,8 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
     )
 
 
-def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float64]:
-    """Covariance of the mean emissivities of several areas of one map.
-
-    Parameters
-    ----------
-    rows : sequence of RegionEmissivity
-        Areas of one map.
-
-    Returns
-    -------
-    ndarray
-        Shape (areas, areas). The errors of `COMMON` are the same in all areas, so a difference or
-        a ratio of two areas is known better than either.
-    """
+def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
+    """Covariance of the mean emissivities of several areas of one map."""
     observed = np.stack([row.observed for row in rows])
     chance = np.zeros((len(rows), len(rows)))
     if observed.shape[1] > 1:
@@ -519,61 +428,53 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float6
     return chance + Estimate.stack([row.estimate.without(RANDOM) for row in rows]).covariance()
 
 
-def emissivity_line(rows: Sequence[RegionEmissivity | AreaEmissivity]) -> EmissivityLine:
+def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     """Straight line through an area's emissivity at several temperatures, by least squares.
 
-    Parameters
-    ----------
-    rows : sequence of RegionEmissivity or AreaEmissivity
-        The same area at two temperatures or more.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two temperatures.
-
-    Notes
-    -----
     The line is that of ordinary least squares, a linear function of the means, through which
     their covariance is propagated (JCGM 100:2008, Equation 13). The errors of `COMMON` are the
-    same at all temperatures. Chance is that of the rows, or the scatter about the line where that
-    is more.
+    same at all temperatures. The random error is that of the means, or the scatter about the line
+    if that is larger. At one temperature the line is a constant.
     """
-    heatings = tuple(row.heating for row in rows)
+    if len(areas) == 1:
+        return areas[0]
+    heatings = tuple(area.heatings[0] for area in areas)
     temperatures = [heating.reference for heating in heatings]
     if len(set(temperatures)) < 2:
-        raise ValueError("emissivity over temperature: expected 2 temperatures or more")
-    means = np.array([float(row.estimate.values) for row in rows])
+        raise ValueError("emissivity over temperature: the temperatures are all the same")
+    estimates = [area.at(area.middle) for area in areas]
+    means = np.array([float(one.values) for one in estimates])
     design = _design(temperatures)
     solve = np.linalg.pinv(design)
     line = solve @ means
     residual = _residual(means - design @ line)
-    chance = np.array([_of_one_image(row.estimate) for row in rows])
+    random = np.array([_of_one_image(one) for one in estimates])
     if isfinite(residual):
-        chance = np.maximum(chance, residual)
+        random = np.maximum(random, residual)
     identity = " ".join(
-        one.cause.identity for row in rows for one in row.estimate.only(RANDOM).components
+        part.cause.identity for one in estimates for part in one.only(RANDOM).components
     )
     observed = Estimate(means).with_component(
-        RANDOM, chance, independent="per element", identity=identity
+        RANDOM, random, independent="per element", identity=identity
     )
     for cause in COMMON:
-        shift = np.array([row.estimate.effect(cause) for row in rows])
+        shift = np.array([one.effect(cause) for one in estimates])
         if cause == "reference":
             # An error of the temperature moves the points along the line too.
             shift = shift - line[1] * np.array([one.reference_uncertainty for one in heatings])
         observed = observed.with_component(cause, shift)
-    if not isfinite(residual) and any("drift" in row.estimate.unevaluated for row in rows):
+    if not isfinite(residual) and any("drift" in one.unevaluated for one in estimates):
         observed = observed.with_unevaluated("drift")
-    warnings = (warning for row in rows for warning in row.estimate.warnings)
+    warnings = (warning for one in estimates for warning in one.warnings)
     return EmissivityLine(
-        name=rows[0].name,
-        feature=rows[0].feature,
+        name=areas[0].name,
+        feature=areas[0].feature,
         heatings=heatings,
         means=tuple(means.tolist()),
-        uncertainties=tuple(float(row.estimate.standard_uncertainty) for row in rows),
+        uncertainties=tuple(float(one.standard_uncertainty) for one in estimates),
         estimate=observed.with_warnings(*warnings).linear(solve),
         residual=residual,
+        standard_deviation=float(np.mean([area.standard_deviation for area in areas])),
     )
 
 
@@ -593,8 +494,8 @@ def _floor(measurement: Measurement) -> float:
 
 
 def _calibration(
-    measurements: Sequence[Measurement], radiance: NDArray[np.float64], heating: Heating
-) -> NDArray[np.float64] | None:
+    measurements: Sequence[Measurement], radiance: Array, heating: Heating
+) -> Array | None:
     """Standard uncertainty of the mean radiance from the calibration, shape (y, x)."""
     if heating.camera_uncertainty is not None:
         band, spread = measurements[0].band, heating.camera_uncertainty
@@ -604,10 +505,10 @@ def _calibration(
     return stated_calibration(measurements)
 
 
-def _residual(about_line: NDArray[np.float64]) -> float:
+def _residual(about_line: Array) -> float:
     freedom = about_line.size - 2
     return sqrt(float((about_line**2).sum()) / freedom) if freedom else nan
 
 
 def _celsius(temperature: float) -> str:
-    return f"{temperature - _ZERO_CELSIUS:.6g} °C"
+    return f"{temperature - ZERO_CELSIUS:.6g} °C"

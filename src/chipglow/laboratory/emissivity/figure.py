@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
+from chipglow.quantities import Array
 from chipglow.scene import Raster, Region
 
 _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
@@ -26,17 +26,7 @@ _SLENDER: Final = 3.0
 def draw_emissivity(
     found: EmissivityMap, regions: Sequence[Region], lines: Sequence[EmissivityLine] = ()
 ) -> Figure:
-    """Draw the radiance temperature with the regions, and the emissivity beside it.
-
-    Parameters
-    ----------
-    found : EmissivityMap
-        The map to draw.
-    regions : sequence of Region
-        Regions to draw on both, those of one feature in one colour, named on the first.
-    lines : sequence of EmissivityLine
-        Emissivity of features over the temperature, drawn below if there is any.
-    """
+    """Draw the radiance temperature with the regions, and the emissivity beside it."""
     raster = found.raster
     temperature = found.radiance_temperature - KELVIN
     panels = (
@@ -77,7 +67,7 @@ def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: 
             _draw_name(axes, region.name, outline * 1e6, colour)
 
 
-def _draw_name(axes: Axes, name: str, outline: NDArray[np.float64], colour: str) -> None:
+def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
     """A region's name in its middle, upright where the region is slender."""
     width, height = np.ptp(outline, axis=0)
     x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2

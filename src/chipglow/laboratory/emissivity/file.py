@@ -1,29 +1,28 @@
 """Determined emissivities in files: maps and regions as NetCDF-4, the table of regions as CSV."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chipglow.io import write_dataset
 from chipglow.io.measurement_file import Made, read_dataset
 from chipglow.laboratory.emissivity.emissivity import (
     BUDGET,
     COMMON,
-    AreaEmissivity,
+    CONSTANT,
     EmissivityLine,
     Heating,
     emissivity_covariance,
     emissivity_line,
 )
-from chipglow.laboratory.emissivity.observations import RANDOM
+from chipglow.laboratory.emissivity.observations import RANDOM, with_drift
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
-from chipglow.quantities import FileBeside, Parameter
+from chipglow.quantities import Array, FileBeside, Parameter
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import (
@@ -40,15 +39,7 @@ _HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty"
 
 
 def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) -> None:
-    """Write emissivity maps and their regions to a NetCDF-4 file.
-
-    Parameters
-    ----------
-    found : RegionEmissivities
-        Of one object, at one true temperature or several.
-    path : path-like
-        The file to write; one that is there is replaced at the end.
-    """
+    """Write emissivity maps and their regions to a NetCDF-4 file."""
     maps, rows = found.maps, found.rows
     raster = maps[0].raster
     images: dict[str, Any] = {
@@ -126,72 +117,50 @@ def _say_correlations(data: xr.Dataset) -> None:
     data["region_mean"].attrs["unc_comps"] = known
 
 
-def read_region_emissivity(
-    path: str | os.PathLike[str],
-) -> dict[str, AreaEmissivity] | dict[str, EmissivityLine]:
-    """Read the emissivity of areas.
-
-    Parameters
-    ----------
-    path : path-like
-        A file of `write_emissivity`.
-
-    Returns
-    -------
-    dict
-        By the areas' names: of several true temperatures the line over the temperature.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file is cut short or no emissivity map; the message names the file.
-    """
-    return _read(Path(path), _regions)
+def read_emissivity_lines(path: str | os.PathLike[str]) -> dict[str, EmissivityLine]:
+    """Read the emissivity of areas over the temperature, by their names."""
+    return _read(Path(path), _lines)
 
 
-def _regions(data: xr.Dataset) -> dict[str, AreaEmissivity] | dict[str, EmissivityLine]:
+def _lines(data: xr.Dataset) -> dict[str, EmissivityLine]:
     if "observations" not in data:
         raise ValueError("it is of an earlier version, expected one that is written anew")
-    rows = [_areas(data.isel(reference=index)) for index in range(data.sizes["reference"])]
-    if len(rows) == 1:
-        return {area.name: area for area in rows[0]}
-    return {areas[0].name: emissivity_line(areas) for areas in zip(*rows, strict=True)}
+    maps = [data.isel(reference=index) for index in range(data.sizes["reference"])]
+    lines = [
+        emissivity_line([_constant(one.isel(region=index)) for one in maps])
+        for index in range(data.sizes["region"])
+    ]
+    return {line.name: line for line in lines}
 
 
-def _areas(one: xr.Dataset) -> list[AreaEmissivity]:
-    """Areas at one true temperature."""
-    reflected, *spreads = (float(one[name]) for name in _HEATING)
-    heating = Heating(float(one["reference"]), reflected, *spreads)
-    return [_stored(one.isel(region=index), heating) for index in range(one.sizes["region"])]
-
-
-def _stored(row: xr.Dataset, heating: Heating) -> AreaEmissivity:
+def _constant(row: xr.Dataset) -> EmissivityLine:
+    """Emissivity of an area at one true temperature."""
+    reflected, *spreads = (float(row[name]) for name in _HEATING)
     parts = {cause: float(row[f"region_{cause}_uncertainty"]) for cause in BUDGET}
-    observations = str(row["observations"].values)
+    name, observations = str(row["region"].values), str(row["observations"].values)
     estimate = Estimate(np.array(float(row["region_mean"])))
     for cause in COMMON:
         estimate = estimate.with_component(cause, parts[cause])
     if np.isfinite(parts["drift"]):
-        estimate = estimate.with_component(
-            "drift", parts["drift"], independent="common", identity=observations
-        )
+        estimate = with_drift(estimate, parts["drift"], observations)
     names = [cause for cause in ("repeatability", "noise") if np.isfinite(parts[cause])]
     freedom = float(row["region_random_degrees_of_freedom"])
-    identity = f"{observations} {row['region'].values}"
-    random = Cause(RANDOM, identity, len(names), freedom, parts=tuple(names))
+    random = Cause(RANDOM, f"{observations} {name}", len(names), freedom, parts=tuple(names))
     effects = np.array([[parts[name] for name in names]])
-    return AreaEmissivity(
-        str(row["region"].values),
+    estimate = replace(
+        estimate,
+        components=(*estimate.components, Component(random, effects)),
+        unevaluated=tuple(cause for cause in BUDGET if np.isnan(parts[cause])),
+        warnings=tuple(str(row["region_warnings"].values).splitlines()),
+    )
+    return EmissivityLine(
+        name,
         str(row["feature"].values),
-        heating,
-        replace(
-            estimate,
-            components=(*estimate.components, Component(random, effects)),
-            unevaluated=tuple(cause for cause in BUDGET if np.isnan(parts[cause])),
-            warnings=tuple(str(row["region_warnings"].values).splitlines()),
-        ),
+        estimate.linear(CONSTANT),
+        (Heating(float(row["reference"]), reflected, *spreads),),
+        (float(estimate.values),),
+        (float(estimate.standard_uncertainty),),
+        standard_deviation=float(row["region_standard_deviation"]),
     )
 
 
@@ -237,80 +206,24 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     return _read(Path(path), surface)
 
 
-@dataclass(frozen=True)
-class MeasuredArea:
-    """An area's emissivity as a surface takes it.
-
-    Parameters
-    ----------
-    name, feature : str
-        The area's name, and the feature that it belongs to.
-    trend : EmissivityTrend
-        The line over the temperature; measured at one temperature, the same at all.
-    standard_deviation : float
-        Over the pixels; the mean of that at several temperatures.
-    """
-
-    name: str
-    feature: str
-    trend: EmissivityTrend
-    standard_deviation: float
-
-
-def read_measured_areas(path: str | os.PathLike[str]) -> dict[str, MeasuredArea]:
-    """Read the emissivity of areas for surfaces.
-
-    Parameters
-    ----------
-    path : path-like
-        A file of `write_emissivity`.
-
-    Returns
-    -------
-    dict
-        By the areas' names.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file is cut short or no emissivity map; the message names the file.
-    """
-
-    def found(data: xr.Dataset) -> dict[str, MeasuredArea]:
-        spreads = data["region_standard_deviation"].mean("reference").values.tolist()
-        regions: Mapping[str, AreaEmissivity | EmissivityLine] = _regions(data)
-        return {
-            name: MeasuredArea(name, one.feature, _trend(one), spread)
-            for (name, one), spread in zip(regions.items(), spreads, strict=True)
-        }
-
-    return _read(Path(path), found)
-
-
-def _trend(area: AreaEmissivity | EmissivityLine) -> EmissivityTrend:
-    if isinstance(area, EmissivityLine):
-        estimate, temperatures = area.estimate, area.temperatures
-    else:
-        of_constant = np.array([[1.0], [0.0]])
-        estimate, temperatures = area.estimate.linear(of_constant), (area.heating.reference,)
+def emissivity_trend(line: EmissivityLine) -> EmissivityTrend:
+    """A line as surfaces take it: the errors that its areas share, and its own."""
     shared = (*COMMON, "drift")
-    effects = {one.cause.name: one.effects for one in estimate.components}
+    effects = {one.cause.name: one.effects for one in line.estimate.components}
     common = [effects[name][:, 0] if name in effects else np.zeros(2) for name in shared]
     own = [column for name, of in effects.items() if name not in shared for column in of.T]
-    emissivity, slope = estimate.values.tolist()
+    emissivity, slope = line.estimate.values.tolist()
     return EmissivityTrend(
-        middle=float(np.mean(temperatures)),
+        middle=line.middle,
         emissivity=emissivity,
         slope=slope,
         common=_pairs(common),
         own=_pairs(own),
-        measured=(min(temperatures), max(temperatures)),
+        measured=(min(line.temperatures), max(line.temperatures)),
     )
 
 
-def _pairs(effects: Sequence[NDArray[np.float64]]) -> tuple[tuple[float, float], ...]:
+def _pairs(effects: Sequence[Array]) -> tuple[tuple[float, float], ...]:
     return tuple((float(one), float(other)) for one, other in effects)
 
 
@@ -349,9 +262,9 @@ class MeasuredEmissivity(SurfaceChoice):
 
     def surface(self) -> TrendSurface:
         """The surface."""
-        areas = read_measured_areas(self.file)
+        areas = read_emissivity_lines(self.file)
         if self.region not in areas:
             raise ValueError(
                 f"region: {self.region!r} is not in {self.file}, expected one of {', '.join(areas)}"
             )
-        return TrendSurface(areas[self.region].trend)
+        return TrendSurface(emissivity_trend(areas[self.region]))

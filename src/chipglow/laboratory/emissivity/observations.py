@@ -1,13 +1,16 @@
 """Images of one place as observations: what they have in common, and what chance does to them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
+from chipglow.quantities import Array
+from chipglow.scene import Area
 from chipglow.uncertainty import Cause, Component, Estimate
 
 RANDOM: Final = "random"
@@ -17,26 +20,8 @@ _MANY_LEFT_OUT: Final = 0.05
 """Fraction of an area's pixels from which on it is a warning that they are left out."""
 
 
-def area_estimate(mean: float, values: NDArray[np.float64], identity: str) -> Estimate:
-    """The mean of an area with its random component: an analysis of variance.
-
-    Parameters
-    ----------
-    mean : float
-        The mean.
-    values : ndarray
-        What it is the mean of, shape (observation, pixel).
-    identity : str
-        Tells this area's observations from others.
-
-    Returns
-    -------
-    Estimate
-        With the component ``random``. Its parts are ``repeatability``, which changes from one
-        observation to the next in the whole area, over what noise explains; and the ``noise`` of
-        the pixels. Of one observation repeatability is unevaluated, and noise an upper limit: the
-        standard deviation over the pixels, of which noise is a part, by the root of their number.
-    """
+def area_estimate(mean: float, values: Array, identity: str) -> Estimate:
+    """The mean of an area with its random component: an analysis of variance."""
     observations, pixels = values.shape
     if observations == 1:
         noise = float(values[0].std(ddof=1)) / sqrt(pixels)
@@ -69,12 +54,57 @@ def uncertainty_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, 
     return {name: float(value) for name, value in (whole | parts).items()}
 
 
-def left_out_warning(name: str, pixels: int, left_out: int, flagged: dict[Flag, int]) -> str | None:
-    """Return a warning if many of an area's pixels are left out."""
-    total = pixels + left_out
-    if left_out <= _MANY_LEFT_OUT * total:
-        return None
-    return f"{name}: {left_out} of {total} pixels are left out ({flag_text(flagged)})."
+@dataclass(frozen=True, eq=False)
+class UsedPixels:
+    """Pixels of an area that have a value in every frame."""
+
+    name: str
+    mask: NDArray[np.bool_]
+    count: int
+    left_out: int
+    """Number of other pixels of the area, which are flagged."""
+    flagged: dict[Flag, int]
+    """Number of pixels with each flag."""
+
+    def warnings(self) -> list[str]:
+        """Return a warning if many of the area's pixels are left out."""
+        total = self.count + self.left_out
+        if self.left_out <= _MANY_LEFT_OUT * total:
+            return []
+        text = flag_text(self.flagged)
+        return [f"{self.name}: {self.left_out} of {total} pixels are left out ({text})."]
+
+
+def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPixels:
+    """Return the pixels of an area that can be used; raise ValueError if they are fewer than 2."""
+    usable, total = area.mask & np.isfinite(radiance), int(area.mask.sum())
+    count, flagged = int(usable.sum()), count_flags(flags[area.mask])
+    if count < 2:
+        raise ValueError(
+            f"region {area.name}: {count} of its {total} pixels can be used "
+            f"({flag_text(flagged)}), expected 2 or more"
+        )
+    return UsedPixels(area.name, usable, count, total - count, flagged)
+
+
+def drift_effect(
+    drift: float | None, effect: float, recordings: int, repeatability: float
+) -> float | None:
+    """Standard uncertainty by drift between recordings beyond the repeatability; None if unknown.
+
+    `effect` is the change of the result for a relative change of 1 of the radiance.
+    """
+    if recordings == 1:
+        return None if drift is None else drift * effect
+    stated = (drift or 0.0) * effect / sqrt(recordings)
+    return sqrt(max(stated**2 - repeatability**2, 0.0))
+
+
+def with_drift(estimate: Estimate, effect: Any, identity: str | None = None) -> Estimate:
+    """Add the component ``drift``, which is unevaluated if its effect is None."""
+    if effect is None:
+        return estimate.with_unevaluated("drift")
+    return estimate.with_component("drift", effect, independent="common", identity=identity)
 
 
 def check_same_pixels(
@@ -93,7 +123,7 @@ def check_same_pixels(
             )
 
 
-def observed_radiance(measurements: Sequence[Measurement]) -> NDArray[np.float64]:
+def observed_radiance(measurements: Sequence[Measurement]) -> Array:
     """Radiance of every observation in W/(m² sr), shape (observation, y, x).
 
     The frames of one image, or the means of several; NaN where a frame is flagged.
@@ -108,7 +138,7 @@ def observed_flags(measurements: Sequence[Measurement]) -> NDArray[np.uint8]:
     return np.asarray(np.bitwise_or.reduce(flags, axis=0), np.uint8)
 
 
-def stated_calibration(measurements: Sequence[Measurement]) -> NDArray[np.float64] | None:
+def stated_calibration(measurements: Sequence[Measurement]) -> Array | None:
     """Standard uncertainty of the mean radiance from the calibration, shape (y, x).
 
     In W/(m² sr); None unless all measurements state it.
@@ -137,5 +167,5 @@ def flag_text(flagged: dict[Flag, int]) -> str:
     return ", ".join(texts) or "none flagged"
 
 
-def _usable_radiance(measurement: Measurement) -> NDArray[np.float64]:
+def _usable_radiance(measurement: Measurement) -> Array:
     return np.where(measurement.usable.all(axis=0), measurement.radiance, np.nan)

@@ -17,55 +17,27 @@ from chipglow.laboratory.emissivity.emissivity import (
     emissivity_line,
 )
 from chipglow.laboratory.emissivity.observations import check_same_pixels, uncertainty_columns
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Region, areas, shared_pixels
 from chipglow.text import Notes
 
 
 @dataclass(frozen=True, eq=False)
 class RegionEmissivities:
-    """Emissivity of the regions of an image; made by `determine_emissivities`.
-
-    Parameters
-    ----------
-    maps : tuple of EmissivityMap
-        One for each heating.
-    rows : tuple of tuple of RegionEmissivity
-        The same areas of each map.
-    lines : tuple of EmissivityLine
-        Each area over the temperature; empty for one heating.
-    notes : Notes
-        Assumptions and warnings.
-    """
+    """Emissivity of the regions of an image; made by `determine_emissivities`."""
 
     maps: tuple[EmissivityMap, ...]
     rows: tuple[tuple[RegionEmissivity, ...], ...]
     lines: tuple[EmissivityLine, ...] = ()
+    """Each area over the temperature; empty for one heating."""
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region at every temperature, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``region``, ``feature``, ``reference_K``, ``reflected_K``, ``pixels``, how many
-            of them are flagged, under 0 and over 1, ``mean``, ``standard_deviation`` over pixels,
-            ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
-            ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
-            NaN where nothing is known.
-        """
+        """Every region at every temperature, a row each."""
         return pd.DataFrame(_row(row) for of in self.rows for row in of)
 
     def line_frame(self) -> pd.DataFrame:
-        """Emissivity over the temperature, a row a region.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``region``, ``temperature_degC`` in the middle, ``emissivity`` there,
-            ``change_in_100_K``, their standard uncertainties ``…_uncertainty``, and the standard
-            deviation about the line, ``residual``.
-        """
+        """Emissivity over the temperature, a row a region."""
         return pd.DataFrame(map(_line_row, self.lines))
 
 
@@ -75,25 +47,7 @@ def determine_emissivities(
     regions: Sequence[Region],
     names: Sequence[str] = (),
 ) -> RegionEmissivities:
-    """Determine the emissivity of regions of a heated object.
-
-    Parameters
-    ----------
-    measurements : sequence of Measurement
-        Images of the object.
-    heatings : sequence of Heating
-        How it was heated for each image. Images of one heating are repetitions.
-    regions : sequence of Region
-        Regions of the image.
-    names : sequence of str
-        Names of the images, for errors; their numbers by default.
-
-    Raises
-    ------
-    ValueError
-        If the images are of different pixels, there are not as many heatings, or as
-        `determine_emissivity` and `EmissivityMap.of`.
-    """
+    """Determine the emissivity of regions of a heated object."""
     if len(heatings) != len(measurements):
         raise ValueError(f"{len(heatings)} heatings for {len(measurements)} images, expected one")
     check_same_pixels(measurements, "emissivity", names)
@@ -103,7 +57,11 @@ def determine_emissivities(
     maps = tuple(determine_emissivity(group, heating) for heating, group in groups.items())
     found = areas(regions, maps[0].raster)
     rows = tuple(tuple(one.of(area) for area in found) for one in maps)
-    lines = map(emissivity_line, zip(*rows, strict=True)) if len(maps) > 1 else ()
+    lines = (
+        [emissivity_line([row.line for row in of]) for of in zip(*rows, strict=True)]
+        if len(maps) > 1
+        else ()
+    )
     notes = _notes(maps, rows)
     notes.assumed.extend(
         f"{one} and {other} share {count} pixels, which count in both."
@@ -118,10 +76,10 @@ def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
         "feature": row.feature,
         "reference_K": row.heating.reference,
         "reflected_K": row.heating.reflected,
-        "pixels": row.pixels,
-        "under_range": row.flagged[Flag.UNDER_RANGE],
-        "saturated": row.flagged[Flag.SATURATED],
-        "dead": row.flagged[Flag.DEAD],
+        "pixels": row.used.count,
+        "under_range": row.used.flagged[Flag.UNDER_RANGE],
+        "saturated": row.used.flagged[Flag.SATURATED],
+        "dead": row.used.flagged[Flag.DEAD],
         "under_0": row.outside[0],
         "over_1": row.outside[1],
         "mean": row.mean,
@@ -135,7 +93,7 @@ def _line_row(line: EmissivityLine) -> Mapping[str, float | str]:
     of_middle, of_slope = line.estimate.standard_uncertainty
     return {
         "region": line.name,
-        "temperature_degC": line.middle - 273.15,
+        "temperature_degC": line.middle - ZERO_CELSIUS,
         "emissivity": middle,
         "emissivity_uncertainty": of_middle,
         "change_in_100_K": 100 * slope,
@@ -151,8 +109,8 @@ def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivi
         said("The true temperature is exact (reference_uncertainty).")
     if not heating.reflected_uncertainty:
         said(
-            f"The object reflects exactly {heating.reflected - 273.15:.4g} degC; 100 K more would "
-            f"shift the emissivity by {_of_reflected(maps[0]):+.2g} (reflected, "
+            f"The object reflects exactly {heating.reflected - ZERO_CELSIUS:.4g} degC; 100 K more "
+            f"would shift the emissivity by {_of_reflected(maps[0]):+.2g} (reflected, "
             "reflected_uncertainty)."
         )
     if heating.drift is None and any(one.recordings == 1 for one in maps):
@@ -172,7 +130,7 @@ def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivi
         )
     for of in rows:
         own = Notes(warnings=[warning for row in of for warning in row.estimate.warnings])
-        several = f"Object at {of[0].heating.reference - 273.15:.6g} °C"
+        several = f"Object at {of[0].heating.reference - ZERO_CELSIUS:.6g} °C"
         notes += own.about(several) if len(rows) > 1 else own
     return notes
 

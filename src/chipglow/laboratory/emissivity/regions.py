@@ -18,17 +18,10 @@ _SHAPES: Final = ("polygon", "rectangle", "circle")
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A coordinate or a length of a region.
-
-    Parameters
-    ----------
-    value : float
-        In pixels or in m.
-    unit : {"pixel", "m"}
-        Which of them.
-    """
+    """A coordinate or a length of a region."""
 
     value: float
+    """In pixels or in m."""
     unit: Literal["pixel", "m"]
 
 

@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import yaml
 
-from chipglow.laboratory.emissivity.emissivity import RegionEmissivity
-from chipglow.laboratory.emissivity.file import MeasuredArea
+from chipglow.laboratory.emissivity.emissivity import EmissivityLine, RegionEmissivity
 
 _FIELDS: Final[Mapping[str, str]] = {
     "chip": "body",
@@ -25,21 +24,7 @@ _GREATEST_DEVIATION: Final = 0.5
 
 
 def surface_text(rows: Iterable[RegionEmissivity]) -> str:
-    """Sections of a study with the emissivities of its features, as YAML.
-
-    Parameters
-    ----------
-    rows : iterable of RegionEmissivity
-        Determined emissivities. What they are of is known by the name of their feature: chip body,
-        shear band, workpiece, tool.
-
-    Returns
-    -------
-    str
-        The sections ``surface`` and, with a chip, ``analysis``; empty if no feature is known or a
-        chip's body comes without its shear bands. A mean or standard deviation that no study takes
-        is left out.
-    """
+    """Sections of a study with the emissivities of its features, as YAML."""
     found = {
         _FIELDS[row.feature.lower()]: {
             "mean": round(row.mean, _DIGITS),
@@ -60,13 +45,7 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
 
 
 def measured_text(file: str | os.PathLike[str]) -> str:
-    """Sections of a study with the chip of a file of `write_emissivity`, as YAML.
-
-    Parameters
-    ----------
-    file : path-like
-        The file, which has the chip's body and its shear bands.
-    """
+    """Sections of a study with the chip of a file of `write_emissivity`, as YAML."""
     sections = {
         "surface": {"measured": {_CHIP: os.fspath(file)}},
         "analysis": {"rake_chip": _CHIP, "band_chip": _CHIP},
@@ -74,19 +53,10 @@ def measured_text(file: str | os.PathLike[str]) -> str:
     return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
 
 
-def measured_features(areas: Mapping[str, MeasuredArea]) -> dict[str, MeasuredArea]:
+def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
     """Measured areas by the features of a study: body, shear_band, workpiece, tool.
 
-    Parameters
-    ----------
-    areas : mapping
-        As `read_measured_areas` gives them. Of several areas of a feature that counts which is
-        all of it: the one that is called as it is.
-
-    Raises
-    ------
-    ValueError
-        If the chip's body or its shear bands are not among them.
+    Of several areas of a feature the one that is called like it counts.
     """
     number = Counter(area.feature for area in areas.values())
     found = {

@@ -1,32 +1,33 @@
 """True temperature of an area whose emissivity is known, with its uncertainty."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import inf, isnan, sqrt
-from typing import Any, Final, Protocol, TypeAlias
+from typing import Any, Final
 from uuid import uuid4
 
 import numpy as np
 import pandas as pd
 import scipy
-from numpy.typing import NDArray
 
-from chipglow.camera import FittedCalibration, Flag, Measurement
+from chipglow.camera import FittedCalibration, Measurement
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine, Heating
 from chipglow.laboratory.emissivity.observations import (
     RANDOM,
+    UsedPixels,
     area_estimate,
     check_same_pixels,
-    count_flags,
-    flag_text,
-    left_out_warning,
+    drift_effect,
     observed_flags,
     observed_radiance,
     stated_calibration,
     uncertainty_columns,
+    used_pixels,
+    with_drift,
 )
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_HOTTEST
 from chipglow.scene import Area, Region, areas
@@ -48,76 +49,14 @@ _STEP: Final = 0.5
 _STEPS: Final = 200
 
 
-class DeterminedEmissivity(Protocol):
-    """An area's emissivity that was determined with the same camera: a `RegionEmissivity`."""
-
-    @property
-    def heating(self) -> Heating:
-        """How the object was heated."""
-
-    @property
-    def estimate(self) -> Estimate:
-        """Mean emissivity, with the components of `COMMON`, ``drift`` and ``random``."""
-
-
-Emissivity: TypeAlias = DeterminedEmissivity | EmissivityLine
-"""What `determine_emissivities` finds of an area, at one true temperature or over several."""
-
-
-@dataclass(frozen=True)
-class KnownEmissivity:
-    """An emissivity from elsewhere, whose errors have nothing to do with the measurement's.
-
-    Parameters
-    ----------
-    mean : float
-        Emissivity, over 0 to 1.
-    standard_uncertainty : float
-        Its standard uncertainty.
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
-    """
-
-    mean: float
-    standard_uncertainty: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 < self.mean <= 1:
-            raise ValueError(f"emissivity: is {self.mean!r}, expected over 0 to 1")
-        if not 0 <= self.standard_uncertainty < inf:
-            raise ValueError(
-                f"emissivity: standard uncertainty is {self.standard_uncertainty!r}, "
-                "expected 0 or more"
-            )
-
-    @property
-    def estimate(self) -> Estimate:
-        """The emissivity with the component ``emissivity``."""
-        return Estimate(np.array(self.mean)).with_component("emissivity", self.standard_uncertainty)
-
-
 @dataclass(frozen=True)
 class ReflectedTemperature:
-    """What an object reflects.
-
-    Parameters
-    ----------
-    temperature : float
-        In K; the paper's 293 K by default.
-    standard_uncertainty : float
-        In K.
-
-    Raises
-    ------
-    ValueError
-        If the temperature is not over 0 K or the uncertainty is negative.
-    """
+    """What an object reflects."""
 
     temperature: float = LABORATORY
+    """In K; the paper's 293 K by default."""
     standard_uncertainty: float = 0.0
+    """In K."""
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < inf:
@@ -138,51 +77,36 @@ class ReflectedTemperature:
 
 @dataclass(frozen=True, eq=False)
 class TrueTemperature:
-    """True temperature of an area; made by `true_temperature`.
-
-    Parameters
-    ----------
-    name : str
-        The area's name.
-    pixels, left_out : int
-        Number of pixels that count, and of those that do not, because they are flagged.
-    flagged : dict
-        How many have each `Flag`.
-    radiance_temperature : float
-        That of the area's mean radiance in K.
-    standard_deviation : float
-        Standard deviation over the pixels of the temperatures in K that each would have by
-        itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
-    mean_of_pixels : float
-        Mean of these temperatures in K: under the estimate where the area is uneven.
-    emissivity : float
-        Emissivity that was taken.
-    estimate : Estimate
-        True temperature in K, with the components ``reference`` (of the heating with which the
-        emissivity was determined), ``reflected``, ``calibration``, ``emissivity`` (by chance, or
-        as it is known), ``drift`` between recordings, that of the emissivity included, and
-        ``random``, of which ``repeatability`` and ``noise`` are parts.
-    correlation : float or None
-        Correlation of the calibration's errors at the radiances of area and emissivity; None if it
-        plays no part or is not known.
-    """
+    """True temperature of an area; made by `true_temperature`."""
 
     name: str
-    pixels: int
-    left_out: int
-    flagged: dict[Flag, int]
+    """The area's name."""
+    used: UsedPixels
     radiance_temperature: float
+    """That of the area's mean radiance in K."""
     standard_deviation: float
+    """Standard deviation over the pixels of the temperatures in K that each would have by
+    itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
+    """
     mean_of_pixels: float
+    """Mean of these temperatures in K: under the estimate where the area is uneven."""
     emissivity: float
     estimate: Estimate
+    """True temperature in K, with the components ``reference`` (of the heating with which the
+    emissivity was determined), ``reflected``, ``calibration``, ``emissivity`` (by chance, or
+    as it is known), ``drift`` between recordings, that of the emissivity included, and
+    ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """
     correlation: float | None
+    """Correlation of the calibration's errors at the radiances of area and emissivity; None if it
+    plays no part or is not known.
+    """
 
 
 def true_temperature(
     measurements: Sequence[Measurement],
     area: Area,
-    emissivity: Emissivity | KnownEmissivity,
+    emissivity: EmissivityLine,
     surroundings: ReflectedTemperature | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
@@ -195,12 +119,13 @@ def true_temperature(
         Images of the object; several of them are repetitions.
     area : Area
         Pixels of uniform temperature.
-    emissivity : RegionEmissivity, AreaEmissivity, EmissivityLine or KnownEmissivity
-        The area's emissivity, determined with the same camera, or known from elsewhere. A line
-        over the temperature is taken at the temperature that is found.
+    emissivity : EmissivityLine
+        The area's emissivity, determined with the same camera, or known from elsewhere
+        (`EmissivityLine.constant`). A line of several temperatures is taken at the resulting
+        temperature.
     surroundings : ReflectedTemperature, optional
         What the area reflects. By default those in which the emissivity was determined, with the
-        same error; of a `KnownEmissivity` the paper's 293 K.
+        same error; if it is known from elsewhere the paper's 293 K.
     calibration : FittedCalibration, optional
         The camera's calibration with which both emissivity and area were measured: it says how
         far its errors at the two radiances are the same.
@@ -228,88 +153,57 @@ def true_temperature(
     """
     check_same_pixels(measurements, "temperature")
     band, radiance = measurements[0].band, observed_radiance(measurements)
-    usable = area.mask & np.isfinite(radiance.mean(axis=0))
-    flagged = count_flags(observed_flags(measurements)[area.mask])
-    count = int(usable.sum())
-    if count < 2:
-        raise ValueError(
-            f"region {area.name}: {count} of its {int(area.mask.sum())} pixels can be used "
-            f"({flag_text(flagged)}), expected 2 or more"
-        )
-    values = radiance[:, usable]
+    used = used_pixels(area, radiance.mean(axis=0), observed_flags(measurements))
+    values = radiance[:, used.mask]
     mean = float(values.mean())
     reflecting = _surroundings(emissivity, surroundings)
     room = float(reflecting.values)
-    taken, slope = _taken(emissivity, area.name, mean, room, band)
-    equation = _Equation(float(taken.estimate.values), room, band, slope)
-    sensitivity = equation.sensitivity(area.name, mean)
+    value = _emissivity_of_area(emissivity, area.name, mean, room, band)
+    slope = emissivity.slope if len(emissivity.heatings) > 1 else 0.0
+    equation = _Equation(float(value.values), room, band, slope)
+    derivatives = equation.derivatives(area.name, mean)
     at = float(equation.temperature(np.array(mean)))
     correlation = _correlation(emissivity, at, mean, calibration, band)
-    determined = not isinstance(emissivity, KnownEmissivity)
-    shared = (correlation or 0.0) if determined else 1.0
+    shared = (correlation or 0.0) if emissivity.heatings else 1.0
     stated = stated_calibration(measurements)
-    error = 0.0 if stated is None else float(stated[usable].mean())
-    seen = _seen(values, error, shared, drift, len(measurements))
-    found = propagate(
+    error = 0.0 if stated is None else float(stated[used.mask].mean())
+    estimate = propagate(
         lambda _, seen, __: equation.temperature(seen),
-        taken.estimate.renamed(RANDOM, "emissivity"),
-        seen,
+        value.renamed(RANDOM, "emissivity"),
+        _mean_radiance(values, error, shared, drift, len(measurements)),
         reflecting,
-        derivatives=sensitivity.partials,
+        derivatives=[lambda *_, value=value: np.array(value) for value in derivatives],
     )
     pixels = equation.temperature(values.mean(axis=0))
-    count_out, mean_of_pixels = int(area.mask.sum()) - count, float(pixels.mean())
-    warnings = [f"Emissivity: {warning}" for warning in found.warnings]
-    warnings += _warnings(area.name, found, mean_of_pixels)
-    left_out = left_out_warning(area.name, count, count_out, flagged)
-    if left_out is not None:
-        warnings = [left_out, *warnings]
+    mean_of_pixels = float(pixels.mean())
+    warnings = [f"Emissivity: {warning}" for warning in estimate.warnings]
+    warnings = used.warnings() + warnings + _warnings(area.name, estimate, mean_of_pixels)
     return TrueTemperature(
         name=area.name,
-        pixels=count,
-        left_out=count_out,
-        flagged=flagged,
+        used=used,
         radiance_temperature=float(band.temperature(np.array(mean))),
         standard_deviation=float(pixels.std(ddof=1)),
         mean_of_pixels=mean_of_pixels,
-        emissivity=float(taken.estimate.values),
-        estimate=replace(found, warnings=tuple(warnings)),
+        emissivity=float(value.values),
+        estimate=replace(estimate, warnings=tuple(warnings)),
         correlation=correlation,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class RegionTemperatures:
-    """True temperatures of regions; made by `true_temperatures`.
-
-    Parameters
-    ----------
-    rows : tuple of TrueTemperature
-        One for each region of known emissivity.
-    notes : Notes
-        Assumptions and warnings.
-    """
+    """True temperatures of regions; made by `true_temperatures`."""
 
     rows: tuple[TrueTemperature, ...]
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            In K: columns ``region``, ``pixels``, ``left_out``, ``emissivity``,
-            ``radiance_temperature``, ``true_temperature``, ``standard_deviation`` over the pixels,
-            ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
-            ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
-            NaN where nothing is known.
-        """
+        """Every region, a row each."""
         return pd.DataFrame(
             {
                 "region": row.name,
-                "pixels": row.pixels,
-                "left_out": row.left_out,
+                "pixels": row.used.count,
+                "left_out": row.used.left_out,
                 "emissivity": row.emissivity,
                 "radiance_temperature": row.radiance_temperature,
                 "true_temperature": float(row.estimate.values),
@@ -323,104 +217,62 @@ class RegionTemperatures:
 def true_temperatures(
     measurements: Sequence[Measurement],
     regions: Sequence[Region],
-    emissivities: Mapping[str, Emissivity] | KnownEmissivity,
+    emissivities: Mapping[str, EmissivityLine] | EmissivityLine,
     surroundings: ReflectedTemperature | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
     names: Sequence[str] = (),
 ) -> RegionTemperatures:
-    """True temperatures of the regions of an image.
-
-    Parameters
-    ----------
-    measurements : sequence of Measurement
-        Images of the object; several of them are repetitions.
-    regions : sequence of Region
-        Regions of uniform temperature.
-    emissivities : mapping or KnownEmissivity
-        By the regions' names, as `read_region_emissivity` gives them; a region without one is left
-        out. Or one for all.
-    surroundings, calibration, drift
-        As for `true_temperature`.
-    names : sequence of str
-        Names of the images, for errors; their numbers by default.
-
-    Raises
-    ------
-    ValueError
-        If the emissivity of no region is known, or as `true_temperature`.
-    """
+    """True temperatures of the regions of an image."""
     check_same_pixels(measurements, "temperature", names)
-    found = areas(regions, measurements[0].raster)
-    if isinstance(emissivities, KnownEmissivity):
-        known: Mapping[str, Emissivity | KnownEmissivity] = dict.fromkeys(
-            (area.name for area in found), emissivities
+    places = areas(regions, measurements[0].raster)
+    if isinstance(emissivities, EmissivityLine):
+        emissivities = dict.fromkeys((area.name for area in places), emissivities)
+    known = {area: emissivities[area.name] for area in places if area.name in emissivities}
+    if not known:
+        raise ValueError(
+            f"emissivity: is known of {', '.join(emissivities)}, expected one of the regions "
+            f"{', '.join(area.name for area in places)}"
         )
-    else:
-        known = {area.name: emissivities[area.name] for area in found if area.name in emissivities}
-        if not known:
-            raise ValueError(
-                f"emissivity: is known of {', '.join(emissivities)}, expected one of the regions "
-                f"{', '.join(area.name for area in found)}"
-            )
     rows = tuple(
-        true_temperature(measurements, area, known[area.name], surroundings, calibration, drift)
-        for area in found
-        if area.name in known
+        true_temperature(measurements, area, line, surroundings, calibration, drift)
+        for area, line in known.items()
     )
+    lines = list(known.values())
     warnings = [warning for row in rows for warning in row.estimate.warnings]
-    if not isinstance(emissivities, KnownEmissivity):
-        warnings.extend(_far_from_the_heating(rows, emissivities))
+    warnings += [text for row, line in zip(rows, lines, strict=True) for text in _far(row, line)]
     unknown_drift = drift is None and len(measurements) == 1
     unknown_drift |= any(
-        np.isnan(one.estimate.contribution("drift")).any() for one in known.values()
+        np.isnan(line.at(line.middle).contribution("drift")).any() for line in lines
     )
-    fixed = isinstance(emissivities, KnownEmissivity)
-    lines = any(isinstance(one, EmissivityLine) for one in known.values())
-    assumed = _assumptions(rows, fixed, lines, surroundings is None, unknown_drift)
+    assumed = _assumptions(rows, lines, surroundings is None, unknown_drift)
     return RegionTemperatures(rows, Notes(list(assumed), warnings))
 
 
-def _far_from_the_heating(
-    rows: Iterable[TrueTemperature], emissivities: Mapping[str, Emissivity]
-) -> Iterator[str]:
-    """Regions whose temperature is another than that at which their emissivity was determined."""
-    for row in rows:
-        emissivity = emissivities[row.name]
-        if isinstance(emissivity, EmissivityLine):
-            yield from _beyond_the_line(row, emissivity)
-            continue
-        heated = emissivity.heating.reference
-        difference = abs(float(row.estimate.values) - heated)
-        if difference > FAR:
-            yield (
-                f"{row.name}: is {difference:.0f} K from the {heated - 273.15:.0f} °C "
-                "at which its emissivity was determined; what the temperature changes in the "
-                "emissivity is not in u."
-            )
-
-
-def _beyond_the_line(row: TrueTemperature, line: EmissivityLine) -> Iterator[str]:
+def _far(row: TrueTemperature, line: EmissivityLine) -> Iterator[str]:
+    """Warn if a temperature is far from those at which the emissivity was determined."""
+    if not line.heatings:
+        return
     low, high = min(line.temperatures), max(line.temperatures)
-    found = float(row.estimate.values)
-    difference = max(low - found, found - high)
+    temperature = float(row.estimate.values)
+    difference = max(low - temperature, temperature - high)
     if difference > FAR:
+        ends = [f"{end - ZERO_CELSIUS:.0f} °C" for end in dict.fromkeys((low, high))]
         yield (
-            f"{row.name}: is {difference:.0f} K beyond the {low - 273.15:.0f} °C to "
-            f"{high - 273.15:.0f} °C at which its emissivity was determined; that the line goes "
-            "on straight is not in u."
+            f"{row.name}: is {difference:.0f} K from the {' to '.join(ends)} at which its "
+            "emissivity was determined; u does not include the error of the extrapolation."
         )
 
 
 def _assumptions(
     rows: Sequence[TrueTemperature],
-    known: bool,
-    lines: bool,
+    lines: Sequence[EmissivityLine],
     same_surroundings: bool,
     unknown_drift: bool,
 ) -> Iterator[str]:
+    known = not any(line.heatings for line in lines)
     yield "Every region is of uniform temperature and emissivity."
-    if lines:
+    if any(len(line.heatings) > 1 for line in lines):
         yield "The emissivity is a straight line over the temperature."
     elif not known:
         yield "The emissivity is the same at all temperatures."
@@ -446,8 +298,8 @@ def _assumptions(
         yield "Nothing changes between frames, as there is only one."
 
 
-def _seen(
-    values: NDArray[np.float64],
+def _mean_radiance(
+    values: Array,
     calibration: float,
     shared: float,
     drift: float | None,
@@ -461,7 +313,7 @@ def _seen(
     mean = float(values.mean())
     # That which an image shows of chance has nothing to do with any other image.
     random = area_estimate(mean, values, uuid4().hex)
-    spread = _drift(drift, mean, recordings, float(random.contribution("repeatability")))
+    repeatability = float(random.contribution("repeatability"))
     found = Estimate(np.array(mean)).with_component("calibration", shared * calibration)
     found = found.with_component(
         "calibration",
@@ -469,10 +321,7 @@ def _seen(
         independent="common",
         identity="measurement",
     )
-    if spread is None:
-        found = found.with_unevaluated("drift")
-    else:
-        found = found.with_component("drift", spread, independent="common")
+    found = with_drift(found, drift_effect(drift, mean, recordings, repeatability))
     return found + (random - mean)
 
 
@@ -484,37 +333,6 @@ def _warnings(name: str, found: Estimate, mean_of_pixels: float) -> list[str]:
         f"{name}: is uneven, the mean of its pixels' temperatures is {uneven:.3g} K from the "
         "temperature of its mean radiance."
     ]
-
-
-def _drift(
-    drift: float | None, radiance: float, recordings: int, repeatability: float
-) -> float | None:
-    """Standard uncertainty of the radiance by the drift over the repeatability, if known."""
-    if recordings == 1:
-        return None if drift is None else drift * radiance
-    stated = (drift or 0.0) * radiance / sqrt(recordings)
-    return sqrt(max(stated**2 - repeatability**2, 0.0))
-
-
-@dataclass(frozen=True)
-class _Sensitivity:
-    """Change of the true temperature with what it is computed of.
-
-    With the radiance in K m² sr/W, with the emissivity in K, and with the surroundings'
-    temperature.
-    """
-
-    radiance: float
-    emissivity: float
-    reflected: float
-
-    @property
-    def partials(self) -> tuple[Callable[..., Any], ...]:
-        """By emissivity, radiance and surroundings, as `propagate` takes them."""
-        return tuple(
-            lambda *_, value=value: np.array(value)
-            for value in (self.emissivity, self.radiance, self.reflected)
-        )
 
 
 @dataclass(frozen=True)
@@ -538,12 +356,12 @@ class _Equation:
         """Radiance in W/(m² sr) of a blackbody at the object's temperature."""
         return (radiance - (1 - self.emissivity) * self.reflected_radiance) / self.emissivity
 
-    def temperature(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def temperature(self, radiance: Array) -> Array:
         """True temperature in K of apparent radiance in W/(m² sr), of the same shape."""
         return np.asarray(self.band.temperature(self.own(radiance)), np.float64)
 
-    def sensitivity(self, name: str, radiance: float) -> _Sensitivity:
-        """How the temperature of a radiance in W/(m² sr) of an area depends on all that."""
+    def derivatives(self, name: str, radiance: float) -> tuple[float, float, float]:
+        """Of the temperature by emissivity, radiance and temperature of the surroundings."""
         own = float(self.own(radiance))
         if not own > self.reflected_radiance:
             raise _too_dark(name, self.reflected)
@@ -553,14 +371,12 @@ class _Equation:
         if not rise > 0:
             raise ValueError(
                 f"region {name}: by the line of its emissivity the radiance does not rise with "
-                f"the temperature at {value - 273.15:.6g} °C, expected an emissivity that falls "
-                "less"
+                f"the temperature at {value - ZERO_CELSIUS:.6g} °C, expected an emissivity that "
+                "falls less"
             )
         by_radiance = 1 / rise
         by_environment = -(1 - self.emissivity) * self._slope(self.reflected) * by_radiance
-        return _Sensitivity(
-            by_radiance, -(own - self.reflected_radiance) * by_radiance, by_environment
-        )
+        return -(own - self.reflected_radiance) * by_radiance, by_radiance, by_environment
 
     def _slope(self, temperature: float) -> float:
         """dL/dT in W/(m² sr K), at any temperature: `Band.slope` ends with its table."""
@@ -570,25 +386,21 @@ class _Equation:
 
 def _too_dark(name: str, reflected: float) -> ValueError:
     return ValueError(
-        f"region {name}: is darker than what it reflects at {reflected - 273.15:.6g} °C, expected "
-        "a hotter object"
+        f"region {name}: is darker than what it reflects at {reflected - ZERO_CELSIUS:.6g} °C, "
+        "expected a hotter object"
     )
 
 
-def _taken(
-    emissivity: Emissivity | KnownEmissivity,
-    name: str,
-    radiance: float,
-    reflected: float,
-    band: Band,
-) -> tuple[DeterminedEmissivity | KnownEmissivity, float]:
-    """The emissivity at the temperature at which it makes an area's radiance, and its slope."""
-    if not isinstance(emissivity, EmissivityLine):
-        return emissivity, 0.0
+def _emissivity_of_area(
+    line: EmissivityLine, name: str, radiance: float, reflected: float, band: Band
+) -> Estimate:
+    """The emissivity at the temperature at which it makes an area's radiance."""
+    if len(line.heatings) < 2:
+        return line.at(line.middle)
     room = float(band.radiance(np.array(reflected)))
 
     def excess(temperature: float) -> float:
-        value = float(emissivity.at(temperature).values)
+        value = float(line.at(temperature).values)
         return value * (float(band.radiance(np.array(temperature))) - room) - (radiance - room)
 
     if not radiance > room:
@@ -596,34 +408,27 @@ def _taken(
     temperatures = np.geomspace(reflected, TABLE_HOTTEST, _STEPS).tolist()
     for colder, hotter in pairwise(temperatures):
         if excess(hotter) > 0:
-            found = float(scipy.optimize.brentq(excess, colder, hotter, xtol=1e-6))
-            return emissivity.area(found), emissivity.slope
+            return line.at(scipy.optimize.brentq(excess, colder, hotter, xtol=1e-6))
     raise ValueError(
-        f"region {name}: no temperature up to {TABLE_HOTTEST - 273.15:.0f} °C has its radiance by "
-        "the line of its emissivity, expected an emissivity that falls less with the temperature"
+        f"region {name}: no temperature up to {TABLE_HOTTEST - ZERO_CELSIUS:.0f} °C has its "
+        "radiance by the line of its emissivity, expected one that falls less with the temperature"
     )
 
 
-def _surroundings(
-    emissivity: Emissivity | KnownEmissivity, given: ReflectedTemperature | None
-) -> Estimate:
+def _surroundings(emissivity: EmissivityLine, given: ReflectedTemperature | None) -> Estimate:
     """Temperature in K of what is reflected; by default with the error that the emissivity has."""
     if given is not None:
         return given.estimate
-    if isinstance(emissivity, KnownEmissivity):
+    if not emissivity.heatings:
         return ReflectedTemperature().estimate
-    heating = _heatings(emissivity)[0]
+    heating = emissivity.heatings[0]
     return Estimate(np.array(heating.reflected)).with_component(
         "reflected", heating.reflected_uncertainty
     )
 
 
-def _heatings(emissivity: Emissivity) -> tuple[Heating, ...]:
-    return emissivity.heatings if isinstance(emissivity, EmissivityLine) else (emissivity.heating,)
-
-
 def _correlation(
-    emissivity: Emissivity | KnownEmissivity,
+    line: EmissivityLine,
     temperature: float,
     radiance: float,
     calibration: FittedCalibration | None,
@@ -631,19 +436,15 @@ def _correlation(
 ) -> float | None:
     """Correlation of the calibration's errors at the emissivity's radiances and at this one.
 
-    That of a line is the mean over its points, with their parts in the emissivity that is taken.
+    It is the mean over the points of the line, with their weights in the emissivity.
     """
-    if calibration is None or isinstance(emissivity, KnownEmissivity):
+    if calibration is None or not line.heatings:
         return None
-    if isinstance(emissivity, EmissivityLine):
-        means, weights = emissivity.means, emissivity.weights(temperature)
-    else:
-        means, weights = (float(emissivity.estimate.values),), np.ones(1)
-    found = [
+    correlations = [
         _correlation_of(mean, heating, radiance, calibration, band)
-        for mean, heating in zip(means, _heatings(emissivity), strict=True)
+        for mean, heating in zip(line.means, line.heatings, strict=True)
     ]
-    return float(np.clip(weights @ np.array(found), -1.0, 1.0))
+    return float(np.clip(line.weights(temperature) @ np.array(correlations), -1.0, 1.0))
 
 
 def _correlation_of(

@@ -7,29 +7,22 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from chipglow.camera import Blackbody, CalibrationFit, FittedCalibration, fit_models, preferred
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.measurement.camera_file import FlatFieldSources, uniform_counts
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.text import Notes
 
 
 @dataclass(frozen=True, eq=False)
 class BlackbodyCalibration:
-    """Calibrations fitted to the same blackbodies; made by `calibrate_blackbodies`.
-
-    Parameters
-    ----------
-    fits : mapping
-        By the names of their models.
-    notes : Notes
-        Assumptions, and warnings of the preferred fit.
-    """
+    """Calibrations fitted to the same blackbodies; made by `calibrate_blackbodies`."""
 
     fits: Mapping[str, CalibrationFit[FittedCalibration]]
     notes: Notes
+    """Assumptions, and warnings of the preferred fit."""
 
     @property
     def preferred(self) -> str:
@@ -37,24 +30,11 @@ class BlackbodyCalibration:
         return preferred(self.fits)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each fit, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``model``, radiance ``temperature_degC`` of the blackbody, ``counts``,
-            ``residual_counts``, ``residual_K``, and the fit's ``standard_uncertainty_K`` there.
-        """
+        """Every point of each fit, a row each."""
         return pd.concat([_points(name, fit) for name, fit in self.fits.items()], ignore_index=True)
 
     def parameter_frame(self) -> pd.DataFrame:
-        """Every parameter of each fit, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``model``, ``parameter``, ``value``, ``standard_uncertainty`` and ``unit``.
-        """
+        """Every parameter of each fit, a row each."""
         return pd.concat(
             [
                 pd.DataFrame(
@@ -85,38 +65,7 @@ def calibrate_blackbodies(
     integration_time: float | None = None,
     range_name: str | None = None,
 ) -> BlackbodyCalibration:
-    """Fit calibrations of a camera's counts to blackbodies.
-
-    Parameters
-    ----------
-    points : path-like
-        A CSV file with the columns ``temperature_degC`` (or ``_K``), ``counts`` (or ``file``, a
-        recording of each) and, if known, their standard uncertainties ``count_uncertainty`` and
-        ``temperature_uncertainty_K``.
-    band : Band
-        The camera's band.
-    models : sequence of str
-        Names of `MODELS`.
-    settings : iterable of str
-        Fields of the description of the recordings.
-    emissivity, emissivity_uncertainty : float
-        Of the blackbody; 1 is assumed.
-    surroundings : float, optional
-        Temperature in K of what a blackbody of less than 1 reflects; 20 degC is assumed.
-    common_uncertainty : float, optional
-        Standard uncertainty in K of the blackbody's temperature that all points have in common.
-    integration_time : float, optional
-        In s.
-    range_name : str, optional
-        The camera's measuring range.
-
-    Raises
-    ------
-    ValueError
-        If the points are no such table, a value is impossible, or the points cannot be fitted.
-    OSError
-        If a file cannot be read.
-    """
+    """Fit calibrations of a camera's counts to blackbodies."""
     points, settings = Path(points), list(settings)
     recordings, uniform = [], FlatFieldSources()
 
@@ -166,7 +115,7 @@ def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:
     return pd.DataFrame(
         {
             "model": name,
-            "temperature_degC": fit.temperatures - 273.15,
+            "temperature_degC": fit.temperatures - ZERO_CELSIUS,
             "counts": fit.counts,
             "residual_counts": fit.residuals,
             "residual_K": fit.residuals_temperature,
@@ -176,7 +125,7 @@ def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:
 
 
 def _assumptions(
-    emissivity: float | None, surroundings: float | None, kelvins: NDArray[np.float64]
+    emissivity: float | None, surroundings: float | None, kelvins: Array
 ) -> Iterator[str]:
     if emissivity is None:
         yield (

@@ -17,14 +17,7 @@ _SAMPLES: Final = 300
 
 
 def draw_calibrations(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> Figure:
-    """Draw counts over temperature with the fits, and the residuals in K with uncertainties.
-
-    Parameters
-    ----------
-    fits : mapping
-        Fits to the same points by their names. The shaded band is the standard uncertainty of the
-        radiance temperature; bars are those of the points.
-    """
+    """Draw counts over temperature with the fits, and the residuals in K with uncertainties."""
     with drawing.style():
         figure = drawing.new_figure(5.2)
         upper, lower = figure.subplots(2, 1, sharex=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
 from chipglow.io import atomic_path
-from chipglow.quantities import Parameter, Settings
+from chipglow.quantities import ZERO_CELSIUS, Parameter, Settings
 from chipglow.quantities.units import (
     TEMPERATURE,
     TIME,
@@ -86,7 +86,7 @@ class CalibrationDescription(Settings[FittedCalibration]):
         band, response = calibration.band, calibration.band.response
         values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
         points = (
-            fit.temperatures - 273.15, fit.counts, fit.residuals, fit.residuals_temperature
+            fit.temperatures - ZERO_CELSIUS, fit.counts, fit.residuals, fit.residuals_temperature
         )  # fmt: skip
         return cls.model_construct(
             model=calibration.kind,
@@ -142,26 +142,12 @@ def _pairs(response: TabulatedResponse) -> tuple[tuple[float, ...], ...]:
 
 
 def load_calibration(path: str | Path) -> FittedCalibration:
-    """Read a calibration from a YAML file, as ``chipglow calibrate`` writes it.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or no calibration; the message names the file.
-    OSError
-        If the file cannot be read.
-    """
+    """Read a calibration from a YAML file, as ``chipglow calibrate`` writes it."""
     return load_described(CalibrationDescription, path).build()
 
 
 def write_calibration(fit: CalibrationFit[FittedCalibration], path: str | Path) -> None:
-    """Write a calibration to a YAML file, which `load_calibration` reads.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write a calibration to a YAML file, which `load_calibration` reads."""
     text = calibration_text(CalibrationDescription.of(fit))
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -65,15 +65,7 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
 
 
 def load_recording(description: MeasurementDescription) -> Recording:
-    """Read what a camera wrote, with what a description says of it.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged, or what is said does not fit; the message names the file.
-    OSError
-        If the file cannot be read.
-    """
+    """Read what a camera wrote, with what a description says of it."""
     if description.file is None:
         raise DescriptionError("file: is missing, expected a camera's file")
     try:
@@ -106,24 +98,7 @@ def _read(description: MeasurementDescription, file: str, every: bool = False) -
 def measurement_of(
     description: MeasurementDescription, recording: Recording, name: str
 ) -> Measurement:
-    """Make a measurement of a recording as its description says.
-
-    Parameters
-    ----------
-    description : MeasurementDescription
-        What is done with it.
-    recording : Recording
-        As `load_recording` gives it for this description.
-    name : str
-        Name of the file, for errors.
-
-    Raises
-    ------
-    ValueError
-        If something is missing or does not fit; the message names the file.
-    OSError
-        If a file that the description names cannot be read.
-    """
+    """Make a measurement of a recording as its description says."""
     try:
         correction, bad_pixels = pixel_correction(description, recording, FlatFieldSources())
         calibration = description.calibration
@@ -146,27 +121,6 @@ def uniform_counts(
 
     Its pixels are corrected as those of a measurement with the same description: the counts are
     those that a calibration for such measurements needs.
-
-    Parameters
-    ----------
-    source : str or Path
-        A camera's file, or a YAML file (.yaml, .yml) that describes one.
-    settings : iterable of str
-        Fields of the description.
-    objects : FlatFieldSources, optional
-        What was read for the recording before, where several are corrected by the same frames.
-
-    Returns
-    -------
-    float
-        Mean over all frames and all pixels that are not bad.
-
-    Raises
-    ------
-    ValueError
-        If it holds no counts, is saturated, or something does not fit; the message names the file.
-    OSError
-        If a file cannot be read.
     """
     description = load_description(source, settings)
     recording = load_recording(description)
@@ -193,31 +147,7 @@ def uniform_counts(
 def pixel_correction(
     description: MeasurementDescription, recording: Recording, sources: "FlatFieldSources"
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
-    """What corrects a recording's pixels, and which of them are bad, as its description says.
-
-    Parameters
-    ----------
-    description : MeasurementDescription
-        What is done with the recording.
-    recording : Recording
-        As `load_recording` gives it for this description.
-    sources : FlatFieldSources
-        Where frames of flat-field sources are read.
-
-    Returns
-    -------
-    correction : NonUniformity or None
-        None if the pixels are not to be corrected.
-    bad : ndarray of bool or None
-        By frames of flat-field sources or by a list, shape (y, x); None for neither.
-
-    Raises
-    ------
-    ValueError
-        As `FlatFieldSources.of`, or if the frames are too few to find bad pixels in.
-    OSError
-        If a file cannot be read.
-    """
+    """What corrects a recording's pixels, and which of them are bad, as its description says."""
     fields = sources.of(description, recording)
     correction = fields.correction if fields and description.flat_field.correct else None
     if fields is not None and description.bad_pixels == "find":
@@ -236,15 +166,7 @@ class FlatFieldSources:
         self._read = lru_cache(maxsize=1)(_read_uniform)
 
     def of(self, description: MeasurementDescription, recording: Recording) -> "_FlatFields | None":
-        """Those that a recording's description names, if it does.
-
-        Raises
-        ------
-        ValueError
-            If some are missing, or are of no use for the recording; the message names the field.
-        OSError
-            If a file cannot be read.
-        """
+        """Those that a recording's description names, if it does."""
         section = description.flat_field
         if section.low is None:
             if section.high is not None or description.bad_pixels == "find":

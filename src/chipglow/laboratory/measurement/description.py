@@ -56,15 +56,7 @@ MaskText = Annotated[str, AfterValidator(_mask_or_file)]
 
 
 def band_of(text: str) -> Band:
-    """A camera's band, by its limits such as ``3.8-5.1 um`` or by the .csv file of its response.
-
-    Raises
-    ------
-    ValueError
-        If the limits are none, or the file is no table of a response.
-    OSError
-        If the file cannot be read.
-    """
+    """A camera's band, by its limits such as ``3.8-5.1 um`` or by the .csv file of its response."""
     if text.lower().endswith(".csv"):
         response = read_response(text)
         return Band(*response.limits, response)
@@ -279,22 +271,7 @@ class MeasurementDescription(Section):
 
 
 def load_description(source: str | Path, settings: Iterable[str] = ()) -> MeasurementDescription:
-    """Read the description of a camera's file from a YAML file, or make one of the file.
-
-    Parameters
-    ----------
-    source : str or Path
-        A YAML file (.yaml, .yml) that describes a camera's file, or the camera's file itself.
-    settings : iterable of str
-        Fields that come before those of the YAML file: ``band=3.8-5.1 um``.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or the description is not possible.
-    OSError
-        If the file cannot be read.
-    """
+    """Read the description of a camera's file from a YAML file, or make one of the file."""
     return described_by(MeasurementDescription, Path(source), "file", settings)
 
 

@@ -13,6 +13,7 @@ from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.frames import shown_frame
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID
+from chipglow.quantities import Array
 
 _FLAGS: Final = {
     Flag.UNDER_RANGE: ("below the lower range limit", VOID),
@@ -26,20 +27,7 @@ _BINS: Final = 80
 
 
 def draw_measurement(measurement: Measurement, time: float | None = None) -> Figure:
-    """Draw the radiance temperature of a frame, its flags, and how the temperatures are spread.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Any measurement.
-    time : float, optional
-        Time in s of the frame, the nearest one's; the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not within the measurement.
-    """
+    """Draw the radiance temperature of a frame, its flags, and how the temperatures are spread."""
     index = shown_frame(measurement.times, time, "measurement")
     celsius = measurement.radiance_temperature()[index] - KELVIN
     flags, raster = measurement.flags[index], measurement.raster
@@ -75,7 +63,7 @@ def _draw_flags(axes: Axes, flags: NDArray[np.uint8], measurement: Measurement) 
         )  # fmt: skip
 
 
-def _draw_histogram(axes: Axes, celsius: NDArray[np.float64]) -> None:
+def _draw_histogram(axes: Axes, celsius: Array) -> None:
     known = celsius[np.isfinite(celsius)]
     axes.set_xlabel("radiance temperature / °C")
     axes.set_ylabel("pixels")

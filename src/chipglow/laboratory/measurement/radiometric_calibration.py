@@ -16,6 +16,7 @@ from chipglow.camera import (
     Recording,
     replace_bad_pixels,
 )
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.scene import Raster
 from chipglow.text import Notes
@@ -31,27 +32,16 @@ _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
 
 @dataclass(frozen=True)
 class ImagePosition:
-    """How a camera's image lies in the coordinates of the cut.
-
-    Parameters
-    ----------
-    quarter_turns : int
-        How often the image is turned by 90° counter-clockwise.
-    mirror : {"none", "horizontal", "vertical"}
-        After turning: ``horizontal`` exchanges left and right, ``vertical`` top and bottom.
-    tip : tuple of float, optional
-        Where the tip of the tool, the origin of coordinates, is in the image so turned: pixels
-        right of its left edge and down from its upper edge. The lower left corner by default.
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
-    """
+    """How a camera's image lies in the coordinates of the cut."""
 
     quarter_turns: int = 0
+    """How often the image is turned by 90° counter-clockwise."""
     mirror: Mirror = "none"
+    """After turning: ``horizontal`` exchanges left and right, ``vertical`` top and bottom."""
     tip: tuple[float, float] | None = None
+    """Where the tip of the tool, the origin of coordinates, is in the image so turned: pixels
+    right of its left edge and down from its upper edge. The lower left corner by default.
+    """
 
     def __post_init__(self) -> None:
         if self.quarter_turns not in (0, 1, 2, 3):
@@ -89,33 +79,6 @@ def calibrate_recording(
     Counts become radiance by the calibration, which needs no object parameters. Radiance is taken
     as the camera received it. Temperatures become the radiance that the camera received: what it
     was set to for the object is taken back (`ObjectParameters.apparent_radiance`).
-
-    Parameters
-    ----------
-    recording : Recording
-        What the camera wrote. Its band and pitch are needed; ``dataclasses.replace`` sets what the
-        file does not say.
-    calibration : Calibration, optional
-        Of counts; by default the factory conversion, if the file has one.
-    non_uniformity : NonUniformity, optional
-        Correction of the signal before all else.
-    bad_pixels : ndarray, optional
-        Which pixels are bad, shape (y, x): replaced by their neighbours, or dead.
-    lower_limit : float, optional
-        Lowest radiance temperature in K that counts; that of the calibration if it is higher.
-    position : ImagePosition, optional
-        How the image lies in the coordinates of the cut.
-
-    Returns
-    -------
-    Measurement
-        Pixels over the recording's saturation, or hotter than the calibration reaches, are
-        `Flag.SATURATED`; colder ones `Flag.UNDER_RANGE`. Its attributes contain the notes.
-
-    Raises
-    ------
-    ValueError
-        If band, pitch or calibration is missing, or the calibration is for something else.
     """
     position = position or ImagePosition()
     _check_known(recording, calibration)
@@ -261,25 +224,8 @@ def repaired_signal(
     recording: Recording,
     non_uniformity: NonUniformity | None = None,
     bad_pixels: NDArray[np.bool_] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """A recording's signal with its pixels corrected.
-
-    Parameters
-    ----------
-    recording : Recording
-        What the camera wrote.
-    non_uniformity : NonUniformity, optional
-        Correction of the signal.
-    bad_pixels : ndarray, optional
-        Which pixels are bad, shape (y, x).
-
-    Returns
-    -------
-    signal : ndarray
-        Shape (time, y, x), NaN where there is none.
-    flags : ndarray
-        What is wrong with it: sums of `Flag`, uint8, of the same shape.
-    """
+) -> tuple[Array, NDArray[np.uint8]]:
+    """A recording's signal with its pixels corrected."""
     raw = recording.signal
     signal = raw.astype(np.float64)
     over = np.zeros(raw.shape, np.bool_)
@@ -316,8 +262,8 @@ def _radiance(
     recording: Recording,
     calibration: Calibration | None,
     band: Band,
-    signal: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    signal: Array,
+) -> Array:
     if calibration is not None:
         return calibration.radiance(signal)
     if recording.quantity == "radiance":
@@ -362,9 +308,10 @@ def _object_text(recording: Recording) -> str | None:
         "temperature": "taken back",
     }
     return (
-        f"emissivity {settings.emissivity:g}, reflected {settings.reflected - 273.15:g} degC, "
+        f"emissivity {settings.emissivity:g}, "
+        f"reflected {settings.reflected - ZERO_CELSIUS:g} degC, "
         f"transmittance {settings.transmittance:g}, "
-        f"atmosphere {settings.atmosphere - 273.15:g} degC: {became[recording.quantity]}"
+        f"atmosphere {settings.atmosphere - ZERO_CELSIUS:g} degC: {became[recording.quantity]}"
     )
 
 
@@ -424,11 +371,5 @@ def _warnings(recording: Recording, errors_known: bool) -> Iterator[str]:
 
 
 def flag_fractions(measurement: Measurement) -> dict[Flag, float]:
-    """Fraction of the pixels of all frames that has each flag.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Any measurement.
-    """
+    """Fraction of the pixels of all frames that has each flag."""
     return {flag: float(np.mean(measurement.flags & flag != 0)) for flag in Flag}

@@ -4,56 +4,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.drawing.frames import shown_frame
 from chipglow.laboratory.measurement.radiometric_calibration import flag_fractions
+from chipglow.quantities import Array
 
 
 @dataclass(frozen=True)
 class MeasurementSummary:
-    """A measurement in numbers.
-
-    Parameters
-    ----------
-    index : int
-        The frame that is looked at.
-    usable : float
-        Fraction of the pixels of all frames with a radiance temperature.
-    fractions : mapping
-        Fraction of the pixels of all frames that has each flag.
-    now, overall : tuple of float or None
-        Least, median and greatest radiance temperature in K of that frame and of all; None if no
-        pixel has one.
-    uncertainty : tuple of float or None
-        Least and greatest standard uncertainty of the radiance temperature in K from the
-        calibration, over all usable pixels; None if it is not known.
-    """
+    """A measurement in numbers."""
 
     index: int
     usable: float
+    """Fraction of the pixels of all frames with a radiance temperature."""
     fractions: Mapping[Flag, float]
+    """Fraction of the pixels of all frames that has each flag."""
     now: tuple[float, float, float] | None
     overall: tuple[float, float, float] | None
+    """Least, median and greatest radiance temperature in K of that frame and of all; None if no
+    pixel has one.
+    """
     uncertainty: tuple[float, float] | None
+    """Least and greatest standard uncertainty of the radiance temperature in K from the
+    calibration, over all usable pixels; None if it is not known.
+    """
 
 
 def measurement_summary(measurement: Measurement, time: float | None = None) -> MeasurementSummary:
-    """Look at a measurement.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Any measurement.
-    time : float, optional
-        Time in s of the frame to look at, the nearest one's; the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not within the measurement.
-    """
+    """Look at a measurement."""
     index = shown_frame(measurement.times, time, "measurement")
     kelvins = measurement.radiance_temperature()
     return MeasurementSummary(
@@ -66,16 +45,14 @@ def measurement_summary(measurement: Measurement, time: float | None = None) -> 
     )
 
 
-def _spread(kelvins: NDArray[np.float64]) -> tuple[float, float, float] | None:
+def _spread(kelvins: Array) -> tuple[float, float, float] | None:
     known = kelvins[np.isfinite(kelvins)]
     if known.size == 0:
         return None
     return float(known.min()), float(np.median(known)), float(known.max())
 
 
-def _uncertainty(
-    measurement: Measurement, kelvins: NDArray[np.float64]
-) -> tuple[float, float] | None:
+def _uncertainty(measurement: Measurement, kelvins: Array) -> tuple[float, float] | None:
     radiance_uncertainty = measurement.calibration_uncertainty
     if radiance_uncertainty is None or not np.isfinite(kelvins).any():
         return None

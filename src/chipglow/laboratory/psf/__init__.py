@@ -1,7 +1,6 @@
 """The point spread function of a camera, from images of a knife edge."""
 
-from chipglow.laboratory.psf.apertures import load_apertures
-from chipglow.laboratory.psf.edge_file import load_edge
+from chipglow.laboratory.psf.edge_file import load_apertures, load_edge
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.laboratory.psf.file import write_psf

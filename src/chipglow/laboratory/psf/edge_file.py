@@ -1,8 +1,9 @@
-"""Images of an edge as the laboratory's commands take them."""
+"""Images of edges and apertures as the laboratory's commands take them."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 from chipglow.io import is_measurement, is_scene
 from chipglow.laboratory.measurement import (
@@ -16,7 +17,9 @@ from chipglow.laboratory.measurement import (
     repaired_signal,
 )
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
-from chipglow.text import DescriptionError
+from chipglow.quantities import FileBeside, Parameter, Section
+from chipglow.quantities.units import LENGTH
+from chipglow.text import DescriptionError, load_described
 
 
 def load_edge(
@@ -26,20 +29,6 @@ def load_edge(
 
     Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
     calibration holds beyond its range, as the edge needs no temperature.
-
-    Parameters
-    ----------
-    source, settings
-        As `load_measurement` takes them.
-    region : tuple of slice, optional
-        Rows and columns that show the edge; all by default.
-
-    Raises
-    ------
-    ValueError
-        If it is no image of an edge; the message names the file.
-    OSError
-        If a file cannot be read.
     """
     settings, name = list(settings), Path(source).name
     if is_measurement(source) or is_scene(source):
@@ -57,3 +46,22 @@ def load_edge(
         return counts_image(recording, signal, flags, name, region)
     except ValueError as error:
         raise DescriptionError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error
+
+
+class ApertureSection(Section):
+    """An image of a round aperture."""
+
+    file: Annotated[FileBeside, Parameter("The measurement.")]
+    diameter: Annotated[float, Parameter("Diameter of the aperture on the object.", LENGTH)]
+
+
+class ApertureList(Section):
+    """Images of apertures of several diameters before one source."""
+
+    apertures: Annotated[tuple[ApertureSection, ...], Parameter("The images.")]
+
+
+def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
+    """Read a list of images of apertures from a YAML file."""
+    found = load_described(ApertureList, path)
+    return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]

@@ -12,6 +12,7 @@ from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, Straightness, find_edge
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.laboratory.psf.psf_models import GaussianModel
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -27,38 +28,25 @@ _WHOLE_SQUARE: Final = "The whole square of a pixel takes light (fill factor 1).
 
 @dataclass(frozen=True, eq=False)
 class EdgeImage:
-    """An image of an edge.
+    """An image of an edge."""
 
-    Parameters
-    ----------
-    radiance : ndarray
-        In W/(m² sr), or counts that are a straight line over it, shape (y, x).
-    x, y : ndarray
-        Positions of columns and rows in m; x ascends, y descends.
-    dead, saturated, below : ndarray
-        Which pixels have no value, are too bright or are too dark for the camera, shape (y, x).
-    footprint : float
-        Side of a pixel's sensitive square in m.
-    wavelength : float, optional
-        Middle of the camera's band in m.
-    name : str
-        What it is called in messages.
-    unit : str
-        Of the radiance: counts where no calibration is needed.
-    notes : Notes
-        Assumptions and warnings.
-    """
-
-    radiance: NDArray[np.float64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    radiance: Array
+    """In W/(m² sr), or counts that are a straight line over it, shape (y, x)."""
+    x: Array
+    y: Array
+    """Positions of columns and rows in m; x ascends, y descends."""
     dead: NDArray[np.bool_]
     saturated: NDArray[np.bool_]
     below: NDArray[np.bool_]
+    """Which pixels have no value, are too bright or are too dark for the camera, shape (y, x)."""
     footprint: float
+    """Side of a pixel's sensitive square in m."""
     wavelength: float | None
+    """Middle of the camera's band in m."""
     name: str
+    """What it is called in messages."""
     unit: str = "W/(m² sr)"
+    """Of the radiance: counts where no calibration is needed."""
     notes: Notes = field(default_factory=Notes)
 
     @property
@@ -113,30 +101,12 @@ def edge_image(
 
 def counts_image(
     recording: Recording,
-    signal: NDArray[np.float64],
+    signal: Array,
     flags: NDArray[np.uint8],
     name: str,
     region: tuple[slice, slice] | None = None,
 ) -> EdgeImage:
-    """The mean of frames of counts, a straight line over radiance, as an image of an edge.
-
-    Parameters
-    ----------
-    recording : Recording
-        What the camera wrote; its pitch is needed.
-    signal, flags : ndarray
-        Its counts as they are to be used and what is wrong with them, as `repaired_signal` gives
-        them, shape (time, y, x).
-    name : str
-        What it is called in messages.
-    region : tuple of slice, optional
-        Rows and columns that show the edge; all by default.
-
-    Raises
-    ------
-    ValueError
-        If the pitch is missing, or the region is not within the image.
-    """
+    """The mean of frames of counts, a straight line over radiance, as an image of an edge."""
     if recording.pitch is None:
         raise ValueError(
             "pitch: is missing, the file does not say it, expected the distance between pixels "
@@ -166,7 +136,7 @@ def counts_image(
 
 
 def _mean_image(
-    frames: NDArray[np.float64],
+    frames: Array,
     flags: NDArray[np.uint8],
     raster: Raster,
     name: str,
@@ -212,24 +182,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     Where pixels are saturated or under range, all pixels from there on outward are left
     out: to leave out only those whose noise goes over the limit would shift the mean of the others.
 
-    Parameters
-    ----------
-    image : EdgeImage
-        The image.
-
-    Returns
-    -------
-    EdgePixels
-        The pixels, x and y from the image's middle, with even noise.
-
-    Notes
-    -----
         Warnings of the image and of the choice of pixels, about the image.
-
-    Raises
-    ------
-    NoEdgeError
-        If there is no straight edge, or more than one.
     """
     image = replace(image, saturated=image.saturated | _piled_up(image))
     x, y = image.x - image.x.mean(), image.y - image.y.mean()
@@ -258,9 +211,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), notes
 
 
-def _pixels_of(
-    image: EdgeImage, x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
-) -> EdgePixels:
+def _pixels_of(image: EdgeImage, x: Array, y: Array, line: EdgeLine) -> EdgePixels:
     across, down = np.meshgrid(x, y)
     usable = image.usable
     if np.count_nonzero(usable) < 40:
@@ -305,7 +256,7 @@ def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
 
 
 def _limits(
-    image: EdgeImage, x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
+    image: EdgeImage, x: Array, y: Array, line: EdgeLine
 ) -> tuple[tuple[float, float], list[str]]:
     """Distances between which nothing is clipped, and what is to be said of it."""
     across, down = np.meshgrid(x, y)
@@ -322,9 +273,7 @@ def _limits(
     return (low, high), said
 
 
-def _first_clipped(
-    distance: NDArray[np.float64], clipped: NDArray[np.bool_], pitch: float
-) -> float:
+def _first_clipped(distance: Array, clipped: NDArray[np.bool_], pitch: float) -> float:
     """Distance from which on more than single pixels are clipped, less a pitch."""
     first = float(distance.min())
     index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()

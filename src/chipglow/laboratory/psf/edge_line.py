@@ -7,6 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
+
 _LEAST_SIGNIFICANCE: Final = 50.0
 """Square of Student's t of a step that is taken for an edge; the best of noise reaches about 20."""
 _LEAST_PIXELS: Final = 10
@@ -21,22 +23,16 @@ class NoEdgeError(ValueError):
 
 @dataclass(frozen=True)
 class EdgeLine:
-    """A straight edge.
-
-    Parameters
-    ----------
-    normal : float
-        Direction from the dark to the bright side in rad, counterclockwise from x.
-    position : float
-        Distance in m of the edge from the origin along the normal.
-    """
+    """A straight edge."""
 
     normal: float
+    """Direction from the dark to the bright side in rad, counterclockwise from x."""
     position: float
+    """Distance in m of the edge from the origin along the normal."""
 
-    def distance(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+    def distance(self, x: Array, y: Array) -> Array:
         """Signed distances of points from the edge in m, positive on the bright side."""
-        return np.asarray(x * cos(self.normal) + y * sin(self.normal) - self.position)
+        return x * cos(self.normal) + y * sin(self.normal) - self.position
 
     @property
     def tilt(self) -> float:
@@ -46,47 +42,20 @@ class EdgeLine:
 
 @dataclass(frozen=True)
 class Straightness:
-    """How far the edge is bent.
-
-    Parameters
-    ----------
-    sagitta : float
-        Deviation of a parabola through the edge from its chord, in m.
-    uncertainty : float
-        Its standard uncertainty in m.
-    """
+    """How far the edge is bent."""
 
     sagitta: float
+    """Deviation of a parabola through the edge from its chord, in m."""
     uncertainty: float
+    """Its standard uncertainty in m."""
 
 
-def find_edge(
-    image: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[EdgeLine, Straightness | None]:
+def find_edge(image: Array, x: Array, y: Array) -> tuple[EdgeLine, Straightness | None]:
     """Find the edge in an image.
 
     The step that explains most of the image's variance is looked for at all orientations; the line
     is then fitted to the centroids of the derivative in each row or column near it, without those
     that lie far off, until it stays (ISO 12233).
-
-    Parameters
-    ----------
-    image : ndarray
-        Radiance, NaN where it is not usable, shape (y, x).
-    x, y : ndarray
-        Positions of the columns and rows in m, even; x ascends and y descends.
-
-    Returns
-    -------
-    EdgeLine
-        The edge.
-    Straightness or None
-        How far it is bent; None if too few rows show it.
-
-    Raises
-    ------
-    NoEdgeError
-        If nothing in the image is an edge.
     """
     across, down = np.meshgrid(x, y)
     usable = np.isfinite(image)
@@ -111,11 +80,11 @@ def find_edge(
 
 
 def _best_step(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    value: NDArray[np.float64],
+    x: Array,
+    y: Array,
+    value: Array,
     width: float,
-    angles: NDArray[np.float64],
+    angles: Array,
 ) -> tuple[float, float, float]:
     """Square of Student's t, normal in rad and position in m of the clearest step."""
     centred = value - value.mean()
@@ -142,7 +111,7 @@ def _best_step(
 
 
 def _refined(
-    image: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
+    image: Array, x: Array, y: Array, line: EdgeLine
 ) -> tuple[EdgeLine, Straightness | None]:
     """The line through the centroids of the derivative, and how far they are bent."""
     steep = abs(cos(line.normal)) < abs(sin(line.normal))
@@ -168,12 +137,12 @@ def _refined(
 
 
 def _centroids(
-    derivative: NDArray[np.float64],
-    middles: NDArray[np.float64],
-    other: NDArray[np.float64],
-    expected: NDArray[np.float64],
+    derivative: Array,
+    middles: Array,
+    other: Array,
+    expected: Array,
     pitch: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Centroids of the derivative near the line, of the rows in which all of it is there."""
     off = (middles[None, :] - expected[:, None]) / (_WINDOW * pitch)
     window = np.where(np.abs(off) <= 1, 0.54 + 0.46 * np.cos(pi * off), 0.0)
@@ -187,7 +156,7 @@ def _centroids(
     return other[strong], (weight[strong] @ middles) / mass[strong]
 
 
-def _without_outliers(place: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
     """Which centroids lie near their line, by the median of their distances."""
     kept = np.ones(place.size, dtype=np.bool_)
     for _ in range(_ROUNDS):
@@ -207,7 +176,7 @@ def _line_of(slope: float, start: float, steep: bool, before: EdgeLine) -> EdgeL
     return EdgeLine(atan2(sign * normal[1], sign * normal[0]), sign * start / length)
 
 
-def _straightness(place: NDArray[np.float64], centre: NDArray[np.float64]) -> Straightness:
+def _straightness(place: Array, centre: Array) -> Straightness:
     unit = (place - place.mean()) / (np.ptp(place) / 2)
     design = np.vander(unit, 3)
     solution, *_ = np.linalg.lstsq(design, centre, rcond=None)

@@ -1,13 +1,13 @@
 """Oversampled edge-spread function of an image, and the line-spread function and MTF it gives."""
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit
 from chipglow.laboratory.psf.psf_models import footprint_transfer
+from chipglow.quantities import Array
 
 BINS_PER_PITCH: Final = 4
 _WINDOW_PITCHES: Final = 10.0
@@ -15,156 +15,92 @@ _WINDOW_WIDTHS: Final = 5.0
 _FREQUENCIES: Final = 65
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeSpread:
-    """Edge-spread function: the mean of the pixels at each distance from the edge.
+def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
+    """Edge-spread, line-spread and modulation transfer function of an edge, in SI units.
 
-    Parameters
-    ----------
-    distance : ndarray
-        Mean distance of a bin's pixels from the edge in m, shape (n,).
-    value, uncertainty : ndarray
-        Their mean, 0 for the dark and 1 for the bright side, and its standard uncertainty.
-    residual : ndarray
-        What the fitted model leaves of the value.
-    count : ndarray
-        Number of pixels.
-    width : float
-        Width of a bin in m.
-    """
+    The edge-spread function ``esf``, 0 on the dark and 1 on the bright side, is the mean of the
+    ``pixels`` in bins of a quarter of the pitch along the fitted edge's normal, at their mean
+    ``distance``; ``esf_residual`` is what the model leaves. Its uncertainty comes from the scatter
+    of the bin's pixels about the model where there are enough of them, but is not less than the
+    noise of all equally bright pixels. The line-spread function ``lsf`` is the difference of
+    neighbouring bins over their distance.
 
-    distance: NDArray[np.float64]
-    value: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    count: NDArray[np.int64]
-    width: float
-
-
-@dataclass(frozen=True, eq=False)
-class LineSpread:
-    """Line-spread function: the derivative of the edge-spread function.
-
-    Parameters
-    ----------
-    distance : ndarray
-        Distance from the edge in m, shape (n,).
-    value, uncertainty : ndarray
-        In 1/m, and its standard uncertainty.
-    """
-
-    distance: NDArray[np.float64]
-    value: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class TransferFunction:
-    """Modulation transfer function of optics and pixel along the edge's normal.
-
-    Parameters
-    ----------
-    frequency : ndarray
-        Spatial frequency in 1/m, shape (n,), up to twice the pixels' Nyquist frequency.
-    value, uncertainty : ndarray
-        Measured, and its standard uncertainty.
-    model, optics : ndarray
-        That of the fitted model with the pixel, and of its optics alone.
-    """
-
-    frequency: NDArray[np.float64]
-    value: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
-    model: NDArray[np.float64]
-    optics: NDArray[np.float64]
-
-
-def edge_spread(fit: ModelFit, index: int, pixels: EdgePixels) -> EdgeSpread:
-    """Bins of a quarter of the pitch along the fitted edge's normal.
-
-    Parameters
-    ----------
-    fit : ModelFit
-        Where the edge is, its background and its step.
-    index : int
-        Which of the fit's edges.
-    pixels : EdgePixels
-        The edge's pixels.
-
-    Notes
-    -----
-    The uncertainty is that of a mean: from the scatter of the bin's pixels about the model where
-    there are enough of them, but not less than the noise of all pixels as bright would give.
+    The ``mtf`` of optics and pixel goes up to twice the Nyquist frequency. The transform of the
+    edge-spread function is that of the fitted model plus that of the residuals within a window,
+    times 2πif in place of the derivative. A plain transform of the measured bins would end at the
+    window, and lack at low frequencies what the tails hold beyond. The mean over a bin is corrected
+    by its sinc; differences, for which ISO 12233 has a factor, are not taken.
     """
     edge = fit.edges[index]
-    distance = edge.line.distance(pixels.x, pixels.y)
+    every = edge.line.distance(pixels.x, pixels.y)
     width = pixels.pitch / BINS_PER_PITCH
-    bins = np.floor(distance / width).astype(np.int64)
+    bins = np.floor(every / width).astype(np.int64)
     bins -= bins.min()
-    residual = (pixels.radiance - fit.predicted(index, pixels)) / edge.step
-    value = (pixels.radiance - edge.background) / edge.step
     count = np.bincount(bins)
-    there = count > 0
-    number = count[there]
+    number = count[count > 0]
 
-    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.bincount(bins, values)[there] / number)
+    def mean(values: Array) -> Array:
+        return np.bincount(bins, values)[count > 0] / number
 
-    left = mean(residual)
-    scatter = np.maximum(mean(residual**2) - left**2, 0.0) * number / np.maximum(number - 1, 1)
+    departure = (pixels.radiance - fit.predicted(index, pixels)) / edge.step
+    distance, residual = mean(every), mean(departure)
+    value = mean((pixels.radiance - edge.background) / edge.step)
+    scatter = np.maximum(mean(departure**2) - residual**2, 0.0) * number / np.maximum(number - 1, 1)
     noise = mean((pixels.sigma / edge.step) ** 2)
     variance = np.where(number >= 10, np.maximum(scatter, noise), noise)
-    return EdgeSpread(mean(distance), mean(value), np.sqrt(variance / number), left, number, width)
-
-
-def line_spread(spread: EdgeSpread) -> LineSpread:
-    """Differences of neighbouring bins over their distance."""
-    apart = np.diff(spread.distance)
-    return LineSpread(
-        (spread.distance[1:] + spread.distance[:-1]) / 2,
-        np.diff(spread.value) / apart,
-        np.hypot(spread.uncertainty[1:], spread.uncertainty[:-1]) / apart,
+    uncertainty, apart = np.sqrt(variance / number), np.diff(distance)
+    columns: dict[str, tuple[str, Any, str]] = {
+        "distance": ("bin", distance, "m"),
+        "esf": ("bin", value, "1"),
+        "esf_uncertainty": ("bin", uncertainty, "1"),
+        "esf_residual": ("bin", residual, "1"),
+        "pixels": ("bin", number, "1"),
+        "line_distance": ("line", (distance[1:] + distance[:-1]) / 2, "m"),
+        "lsf": ("line", np.diff(value) / apart, "m-1"),
+        "lsf_uncertainty": ("line", np.hypot(uncertainty[1:], uncertainty[:-1]) / apart, "m-1"),
+    }
+    transfer = _transfer(fit, index, pixels, distance, residual, uncertainty)
+    columns |= {
+        name: ("frequency", values, "m-1" if name == "frequency" else "1")
+        for name, values in transfer.items()
+    }
+    return xr.Dataset(
+        {
+            name: ((f"{dimension}_index",), values, {"units": unit})
+            for name, (dimension, values, unit) in columns.items()
+        }
     )
 
 
-def transfer_function(
-    fit: ModelFit, index: int, pixels: EdgePixels, spread: EdgeSpread
-) -> TransferFunction:
-    """Modulation transfer function of an edge.
-
-    The transform of the edge-spread function is that of the fitted model and that of the residuals
-    within a window, times 2πif in place of the derivative. A plain transform of the measured
-    bins would end at the window, and what tails are beyond would be missing at low frequencies;
-    here the model stands for them. The mean over a bin is made up for by its sinc; differences,
-    for which ISO 12233 has a factor, are not taken.
-
-    Parameters
-    ----------
-    fit : ModelFit
-        The fit.
-    index : int
-        Which of its edges.
-    pixels : EdgePixels
-        The edge's pixels.
-    spread : EdgeSpread
-        Its edge-spread function.
-    """
-    edge = fit.edges[index]
+def _transfer(
+    fit: ModelFit,
+    index: int,
+    pixels: EdgePixels,
+    distance: Array,
+    residual: Array,
+    uncertainty: Array,
+) -> dict[str, Array]:
+    """Modulation transfer function, its uncertainty, and the fitted one with and without pixel."""
+    edge, width = fit.edges[index], pixels.pitch / BINS_PER_PITCH
     frequency = np.linspace(0.0, 1 / pixels.pitch, _FREQUENCIES)
     optics = fit.model.transfer(fit.values, frequency, edge.line.normal)
     model = optics * footprint_transfer(frequency, edge.line.normal, pixels.footprint)
     window = max(_WINDOW_PITCHES * pixels.pitch, _WINDOW_WIDTHS * fit.fwhm)
-    near = np.abs(spread.distance) < window
-    phase = np.exp(-2j * np.pi * frequency[:, None] * spread.distance[near])
-    weight = 2j * np.pi * frequency[:, None] * phase * spread.width
-    weight /= np.sinc(frequency * spread.width)[:, None]
-    value = model + weight @ spread.residual[near]
+    near = np.abs(distance) < window
+    phase = np.exp(-2j * np.pi * frequency[:, None] * distance[near])
+    weight = 2j * np.pi * frequency[:, None] * phase * width
+    weight /= np.sinc(frequency * width)[:, None]
+    value = model + weight @ residual[near]
     size = np.abs(value)
     direction = np.where(size > 0, value / np.maximum(size, 1e-300), 1.0)
     # Only the part of the noise along the value changes its magnitude, to first order.
     along = (weight * np.conj(direction)[:, None]).real
-    noise = along**2 @ spread.uncertainty[near] ** 2
+    noise = along**2 @ uncertainty[near] ** 2
     scale = size * edge.step_uncertainty / edge.step
-    return TransferFunction(
-        frequency, size, np.sqrt(noise + scale**2), np.abs(model), np.abs(optics)
-    )
+    return {
+        "frequency": frequency,
+        "mtf": size,
+        "mtf_uncertainty": np.sqrt(noise + scale**2),
+        "mtf_model": np.abs(model),
+        "mtf_optics": np.abs(optics),
+    }

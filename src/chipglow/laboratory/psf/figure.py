@@ -20,13 +20,7 @@ _SHOWN_WIDTHS: Final = 5.0
 
 
 def draw_knife_edge(found: KnifeEdge) -> Figure:
-    """Draw each image with its edge, edge-spread function with the fit and what it leaves, and MTF.
-
-    Parameters
-    ----------
-    found : KnifeEdge
-        What was found.
-    """
+    """Draw each image, the edge-spread function with fit and residuals, and the MTF."""
     heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
     with drawing.style():
         figure = drawing.new_figure(sum(heights) + 0.4)
@@ -80,16 +74,17 @@ def _label(unit: str) -> str:
 
 
 def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
-    spread = edge.spread
-    near = np.abs(spread.distance) <= distance[-1]
-    where = spread.distance[near] * 1e6
+    spread = edge.curves[["distance", "esf", "esf_uncertainty", "esf_residual"]].where(
+        np.abs(edge.curves["distance"]) <= distance[-1]
+    )
+    where = spread["distance"] * 1e6
     bars: dict[str, Any] = {"fmt": ".", "color": GREY, "markersize": 3, "elinewidth": 0.7}
-    axes.errorbar(where, spread.value[near], spread.uncertainty[near], label="measured", **bars)
+    axes.errorbar(where, spread["esf"], spread["esf_uncertainty"], label="measured", **bars)
     axes.plot(distance * 1e6, model, color=VERMILLION, label="fit")
     axes.set_title("edge-spread function")
     axes.legend(loc="upper left")
     axes.tick_params(labelbottom=False)
-    residual, deviation = 100 * spread.residual[near], 100 * spread.uncertainty[near]
+    residual, deviation = 100 * spread["esf_residual"], 100 * spread["esf_uncertainty"]
     below.errorbar(where, residual, deviation, **bars)
     below.axhline(0.0, color=VERMILLION, linewidth=1.0)
     below.set_ylabel("residual / %")
@@ -97,10 +92,11 @@ def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model
 
 
 def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
-    line = edge.line
-    near = np.abs(line.distance) <= distance[-1]
+    line = edge.curves[["line_distance", "lsf", "lsf_uncertainty"]].where(
+        np.abs(edge.curves["line_distance"]) <= distance[-1]
+    )
     axes.errorbar(
-        line.distance[near] * 1e6, line.value[near] * 1e-6, line.uncertainty[near] * 1e-6,
+        line["line_distance"] * 1e6, line["lsf"] * 1e-6, line["lsf_uncertainty"] * 1e-6,
         fmt=".", color=GREY, markersize=3, elinewidth=0.7,
     )  # fmt: skip
     axes.plot(distance * 1e6, model * 1e-6, color=VERMILLION)
@@ -110,12 +106,15 @@ def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
 
 
 def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
-    transfer = edge.transfer
-    frequency = transfer.frequency * 1e-3
-    drawing.shade(axes, frequency, transfer.value, 2 * transfer.uncertainty, GREY, 0.3)
-    axes.plot(frequency, transfer.value, color=GREY, label="measured, 2 u")
-    axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and pixel")
-    axes.plot(frequency, transfer.optics, color=BLUE, linestyle="--", label="fit: optics alone")
+    frequency, mtf, spread, model, optics = (
+        edge.curves[name].values
+        for name in ("frequency", "mtf", "mtf_uncertainty", "mtf_model", "mtf_optics")
+    )
+    frequency = frequency * 1e-3
+    drawing.shade(axes, frequency, mtf, 2 * spread, GREY, 0.3)
+    axes.plot(frequency, mtf, color=GREY, label="measured, 2 u")
+    axes.plot(frequency, model, color=VERMILLION, label="fit: optics and pixel")
+    axes.plot(frequency, optics, color=BLUE, linestyle="--", label="fit: optics alone")
     nyquist = 0.5e-3 / edge.image.pitch
     axes.axvline(nyquist, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
     axes.set_ylim(-0.05, 1.05)

@@ -2,7 +2,6 @@
 
 import os
 
-import numpy as np
 import xarray as xr
 
 from chipglow.camera import MeasuredPSF
@@ -79,24 +78,9 @@ def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Vari
 def _edge_variables(name: str, edge: EdgeResult) -> dict[str, xr.Variable]:
     """Edge-spread, line-spread and transfer function of one image."""
     about = {"image": edge.image.name, "fwhm": edge.fwhm, "fwhm_uncertainty": edge.fwhm_uncertainty}
-    columns = {
-        "distance": ("bin", edge.spread.distance, "m"),
-        "esf": ("bin", edge.spread.value, "1"),
-        "esf_uncertainty": ("bin", edge.spread.uncertainty, "1"),
-        "esf_residual": ("bin", edge.spread.residual, "1"),
-        "pixels": ("bin", edge.spread.count, "1"),
-        "line_distance": ("line", edge.line.distance, "m"),
-        "lsf": ("line", edge.line.value, "m-1"),
-        "lsf_uncertainty": ("line", edge.line.uncertainty, "m-1"),
-        "frequency": ("frequency", edge.transfer.frequency, "m-1"),
-        "mtf": ("frequency", edge.transfer.value, "1"),
-        "mtf_uncertainty": ("frequency", edge.transfer.uncertainty, "1"),
-        "mtf_model": ("frequency", edge.transfer.model, "1"),
-        "mtf_optics": ("frequency", edge.transfer.optics, "1"),
-    }
     return {
         f"{name}_{column}": xr.Variable(
-            (f"{name}_{dimension}_index",), np.asarray(values), {**about, "units": unit}
+            (f"{name}_{curve.dims[0]}",), curve.values, {**about, **curve.attrs}
         )
-        for column, (dimension, values, unit) in columns.items()
+        for column, curve in edge.curves.items()
     }

@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
 from chipglow.camera.optics.kernel import normalised
 from chipglow.laboratory.psf.knife_edge import RADIAL, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.psf.radial_psf import FIT, psf_cause
+from chipglow.quantities import Array
 from chipglow.uncertainty import Component
 from chipglow.uncertainty.estimate import factor
 
@@ -23,26 +23,12 @@ UNEXPLAINED: Final = "psf unexplained"
 _SAMPLES_PER_WIDTH: Final = 10
 _NO_WEIGHT: Final = 1e-6
 
-_Kernel = Callable[[PointSpreadFunction], NDArray[np.float64]]
+_Kernel = Callable[[PointSpreadFunction], Array]
 
 
 def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     """Kernel of the optics' point spread function, with the components of its uncertainty.
 
-    Parameters
-    ----------
-    knife : KnifeEdge
-        What was found.
-    model : str, optional
-        Name of a model, or ``radial`` for the one without a model; the best by default.
-
-    Raises
-    ------
-    ValueError
-        If there is no such model.
-
-    Notes
-    -----
     `FIT` has an error for each direction of the covariance of the model's parameters; of the one
     without a model it is that of `RadialPSF`. `MODEL` has one for each other model: its difference
     by the root of its weight. `UNEXPLAINED`, where the best model leaves more than noise does, is
@@ -57,7 +43,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
     middle = normalised(psf.kernel(spacing))
 
-    def kernel(other: PointSpreadFunction) -> NDArray[np.float64]:
+    def kernel(other: PointSpreadFunction) -> Array:
         return _of_side(normalised(other.kernel(spacing)), len(middle))
 
     parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: _of_the_model(knife, fit, kernel)}
@@ -68,7 +54,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     return MeasuredPSF(middle, spacing, tuple(components))
 
 
-def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[NDArray[np.float64]]:
+def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
     """Changes of the kernel by each independent error of the model's parameters."""
     pixels = knife.edges[0].pixels
     low, high = (np.array(ends) for ends in fit.model.bounds(pixels.pitch, pixels.reach))
@@ -85,7 +71,7 @@ def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[NDArra
     return effects
 
 
-def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[NDArray[np.float64]]:
+def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
     """Changes of the kernel by each other model, by the root of its weight."""
     here = kernel(fit.psf())
     return [
@@ -95,12 +81,12 @@ def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[NDAr
     ]
 
 
-def _component(name: str, effects: Sequence[NDArray[np.float64]]) -> Component:
+def _component(name: str, effects: Sequence[Array]) -> Component:
     columns = np.stack([one.ravel() for one in effects], axis=1)
     return Component(psf_cause(name, columns, len(effects)), columns)
 
 
-def _of_side(kernel: NDArray[np.float64], side: int) -> NDArray[np.float64]:
+def _of_side(kernel: Array, side: int) -> Array:
     """The middle of a kernel, or the kernel amid zeros."""
     more = (side - len(kernel)) // 2
     if more >= 0:

@@ -12,21 +12,14 @@ from typing import Final, Literal
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
 from scipy.special import chdtri
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
-from chipglow.laboratory.psf.edge_spread import (
-    BINS_PER_PITCH,
-    EdgeSpread,
-    LineSpread,
-    TransferFunction,
-    edge_spread,
-    line_spread,
-    transfer_function,
-)
+from chipglow.laboratory.psf.edge_spread import BINS_PER_PITCH, edge_curves
 from chipglow.laboratory.psf.psf_fit import (
     ApertureSignals,
     EdgePixels,
@@ -68,59 +61,33 @@ _SUBSAMPLES: Final = 9
 
 @dataclass(frozen=True, eq=False)
 class EdgeResult:
-    """What one image of an edge showed.
-
-    Parameters
-    ----------
-    image : EdgeImage
-        The image.
-    pixels : EdgePixels
-        Those of its pixels that were used; x and y from the image's middle.
-    spread : EdgeSpread
-        Oversampled edge-spread function.
-    line : LineSpread
-        Line-spread function.
-    transfer : TransferFunction
-        Modulation transfer function.
-    noise : float
-        Standard deviation of a pixel on the dark side in W/(m² sr).
-    fwhm, fwhm_uncertainty : float
-        Full width at half maximum in m by this edge alone, and its standard uncertainty.
-    line_fwhm : float
-        Full width at half maximum of the line-spread function in m: optics and pixel.
-    """
+    """What one image of an edge showed."""
 
     image: EdgeImage
     pixels: EdgePixels
-    spread: EdgeSpread
-    line: LineSpread
-    transfer: TransferFunction
+    """Those of its pixels that were used; x and y from the image's middle."""
+    curves: xr.Dataset
+    """Edge-spread, line-spread and modulation transfer function; see `edge_curves`."""
     noise: float
+    """Standard deviation of a pixel on the dark side in W/(m² sr)."""
     fwhm: float
     fwhm_uncertainty: float
+    """Full width at half maximum in m by this edge alone, and its standard uncertainty."""
     line_fwhm: float
+    """Full width at half maximum of the line-spread function in m: optics and pixel."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnifeEdge:
-    """A camera's point spread function by the knife-edge method.
-
-    Parameters
-    ----------
-    edges : tuple of EdgeResult
-        What each image showed.
-    fits : tuple of ModelFit
-        Models of the optics fitted to all images at once, the best by the Bayesian information
-        criterion first.
-    apertures : ApertureSignals or None
-        Signals of apertures that were fitted with the edges.
-    notes : Notes
-        Assumptions and warnings.
-    """
+    """A camera's point spread function by the knife-edge method."""
 
     edges: tuple[EdgeResult, ...]
     fits: tuple[ModelFit, ...]
+    """Models of the optics fitted to all images at once, the best by the Bayesian information
+    criterion first.
+    """
     apertures: ApertureSignals | None
+    """Signals of apertures that were fitted with the edges."""
     notes: Notes
 
     @cached_property
@@ -129,7 +96,7 @@ class KnifeEdge:
         return radial_psf(
             self.best,
             [edge.pixels for edge in self.edges],
-            [edge.spread for edge in self.edges],
+            [edge.curves for edge in self.edges],
             self.apertures,
             np.random.default_rng(_SEED),
         )
@@ -165,21 +132,13 @@ class KnifeEdge:
     @property
     def unexplained(self) -> bool:
         """Whether the best model leaves what noise does in less than one of a hundred edges."""
-        bins = sum(edge.spread.distance.size for edge in self.edges)
+        bins = sum(edge.curves["distance"].size for edge in self.edges)
         free = max(bins - self.best.free, 1)
         chance = float(chdtri(free, _BY_CHANCE)) / free
         return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
 
     def to_frame(self) -> pd.DataFrame:
-        """The models, a row each, the best first.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``model``, ``fwhm_um`` of the optics with its ``fwhm_uncertainty_um``, Akaike's
-            and the Bayesian information criterion less those of the best, ``aicc`` and ``bic``, the
-            ``weight``, and the ``reduced_chi_squared``.
-        """
+        """The models, a row each, the best first."""
         return pd.DataFrame(
             {
                 "model": fit.model.name,
@@ -194,25 +153,11 @@ class KnifeEdge:
         )
 
     def edge_frame(self) -> pd.DataFrame:
-        """The images, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``image``, ``normal_deg`` of the edge, ``fwhm_um`` of the optics by it alone,
-            ``mtf_at_nyquist``, each with its uncertainty; ``line_fwhm_um`` of the line-spread
-            function, and ``step_over_noise``.
-        """
+        """The images, a row each."""
         return pd.DataFrame(map(_edge_row, self.edges, self.best.edges))
 
     def fit(self, name: str) -> ModelFit:
-        """The fit of a model by its name.
-
-        Raises
-        ------
-        ValueError
-            If there is no such fit.
-        """
+        """The fit of a model by its name."""
         for fit in self.fits:
             if fit.model.name == name:
                 return fit
@@ -222,21 +167,7 @@ class KnifeEdge:
     def psf(
         self, part: Literal["optics", "system"] = "optics", model: str | None = None
     ) -> PointSpreadFunction:
-        """The point spread function, for ``Camera(psf=...)``.
-
-        Parameters
-        ----------
-        part : {"optics", "system"}
-            That of the optics alone, for a camera whose ``psf_order`` is ``optics``; or that of
-            optics and pixel together, as an edge shows it.
-        model : str, optional
-            Name of a model, or ``radial`` for the one without a model; the best by default.
-
-        Raises
-        ------
-        ValueError
-            If there is no such model or part.
-        """
+        """The point spread function, for ``Camera(psf=...)``."""
         if part not in ("optics", "system"):
             raise ValueError(f"part: {part!r}, expected optics or system")
         if model == RADIAL:
@@ -247,8 +178,7 @@ class KnifeEdge:
 
 
 def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
-    transfer = edge.transfer
-    half = int(np.argmin(np.abs(transfer.frequency - 0.5 / edge.image.pitch)))
+    half = int(np.argmin(np.abs(edge.curves["frequency"].values - 0.5 / edge.image.pitch)))
     return {
         "image": edge.image.name,
         "normal_deg": degrees(fitted.line.normal),
@@ -257,8 +187,8 @@ def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
         "fwhm_uncertainty_um": 1e6 * edge.fwhm_uncertainty,
         "line_fwhm_um": 1e6 * edge.line_fwhm,
         "step_over_noise": fitted.step / edge.noise,
-        "mtf_at_nyquist": float(transfer.value[half]),
-        "mtf_at_nyquist_uncertainty": float(transfer.uncertainty[half]),
+        "mtf_at_nyquist": float(edge.curves["mtf"][half]),
+        "mtf_at_nyquist_uncertainty": float(edge.curves["mtf_uncertainty"][half]),
     }
 
 
@@ -306,10 +236,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     )
     best = fits[0]
     alone = len(edges) == 1 and signals is None
-    spreads = [edge_spread(best, k, edge) for k, edge in enumerate(edges)]
-    results = tuple(
-        _result(best, k, images[k], edges[k], spreads[k], alone) for k in range(len(edges))
-    )
+    results = tuple(_result(best, k, images[k], edges[k], alone) for k in range(len(edges)))
     for k, result in enumerate(results):
         notes.warnings.extend(_edge_warnings(best, k, result))
     notes.warnings.extend(_fit_warnings(best, results))
@@ -362,7 +289,6 @@ def _result(
     k: int,
     image: EdgeImage,
     pixels: EdgePixels,
-    spread: EdgeSpread,
     alone: bool,
 ) -> EdgeResult:
     own = best
@@ -374,9 +300,7 @@ def _result(
     return EdgeResult(
         image,
         pixels,
-        spread,
-        line_spread(spread),
-        transfer_function(best, k, pixels, spread),
+        edge_curves(best, k, pixels),
         float(np.median(pixels.sigma[dark])),
         own.fwhm,
         own.fwhm_uncertainty,
@@ -451,8 +375,8 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
 
 def _left(edge: EdgeResult) -> float:
     """Root of the mean square of what the model leaves near the edge, as a fraction of the step."""
-    near = np.abs(edge.spread.distance) < 2 * edge.line_fwhm
-    return float(np.sqrt(np.mean(edge.spread.residual[near] ** 2)))
+    near = np.abs(edge.curves["distance"].values) < 2 * edge.line_fwhm
+    return float(np.sqrt(np.mean(edge.curves["esf_residual"].values[near] ** 2)))
 
 
 def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:

@@ -12,12 +12,12 @@ from math import cos, inf, log, pi, sin, sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chipglow.camera import PointSpreadFunction
 from chipglow.laboratory.psf.edge_line import EdgeLine
 from chipglow.laboratory.psf.psf_models import EdgeResponse, PSFModel, disc_response, edge_response
+from chipglow.quantities import Array
 
 _APART: Final = pi / 18
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
@@ -28,28 +28,18 @@ _SOURCE_PARAMETERS: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class EdgePixels:
-    """The usable pixels of an image of an edge.
+    """The usable pixels of an image of an edge."""
 
-    Parameters
-    ----------
-    x, y : ndarray
-        Where they are in m, shape (n,).
-    radiance : ndarray
-        In W/(m² sr), shape (n,).
-    sigma : ndarray
-        Standard deviation of their noise in W/(m² sr), shape (n,).
-    pitch, footprint : float
-        Distance between pixels, and side of a pixel's sensitive square, in m.
-    line : EdgeLine
-        About where the edge is.
-    """
-
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    radiance: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    x: Array
+    y: Array
+    """Where they are in m, shape (n,)."""
+    radiance: Array
+    """In W/(m² sr), shape (n,)."""
+    sigma: Array
+    """Standard deviation of their noise in W/(m² sr), shape (n,)."""
     pitch: float
     footprint: float
+    """Distance between pixels, and side of a pixel's sensitive square, in m."""
     line: EdgeLine
 
     @cached_property
@@ -60,37 +50,28 @@ class EdgePixels:
 
 @dataclass(frozen=True, eq=False)
 class ApertureSignals:
-    """What the camera reads in the middle of bright round apertures before one source.
+    """What the camera reads in the middle of bright round apertures before one source."""
 
-    Parameters
-    ----------
-    diameters : ndarray
-        In m, shape (n,).
-    radiance, sigma : ndarray
-        Mean of the middle pixels and its standard uncertainty in W/(m² sr), shape (n,).
-    radii : tuple of ndarray
-        Distances of those pixels from the aperture's middle in m.
-    footprint : float
-        Side of a pixel's sensitive square in m.
-    outside : float
-        Radiance beside the apertures in W/(m² sr): the background, and what tails add to it.
-    """
-
-    diameters: NDArray[np.float64]
-    radiance: NDArray[np.float64]
-    sigma: NDArray[np.float64]
-    radii: tuple[NDArray[np.float64], ...]
+    diameters: Array
+    """In m, shape (n,)."""
+    radiance: Array
+    sigma: Array
+    """Mean of the middle pixels and its standard uncertainty in W/(m² sr), shape (n,)."""
+    radii: tuple[Array, ...]
+    """Distances of those pixels from the aperture's middle in m."""
     footprint: float
+    """Side of a pixel's sensitive square in m."""
     outside: float
+    """Radiance beside the apertures in W/(m² sr): the background, and what tails add to it."""
 
     @cached_property
-    def frequency(self) -> NDArray[np.float64]:
+    def frequency(self) -> Array:
         """Frequencies in 1/m on which the transfer function is asked for."""
         step = 1 / (16 * float(self.diameters.max()))
         return np.arange(0.0, 3 / self.footprint, step)
 
     @cached_property
-    def weights(self) -> NDArray[np.float64]:
+    def weights(self) -> Array:
         """What makes signals of a transfer function, shape (aperture, frequency)."""
         pairs = zip(self.diameters, self.radii, strict=True)
         return np.array(
@@ -100,70 +81,48 @@ class ApertureSignals:
 
 @dataclass(frozen=True)
 class FittedEdge:
-    """What a fit found of one edge.
-
-    Parameters
-    ----------
-    line : EdgeLine
-        Where it is.
-    normal_uncertainty, position_uncertainty : float
-        Standard uncertainties in rad and m.
-    background, step : float
-        Radiance of the dark side, and how much brighter the other is, in W/(m² sr).
-    background_uncertainty, step_uncertainty : float
-        Standard uncertainties in W/(m² sr).
-    """
+    """What a fit found of one edge."""
 
     line: EdgeLine
     normal_uncertainty: float
     position_uncertainty: float
+    """Standard uncertainties in rad and m."""
     background: float
     step: float
+    """Radiance of the dark side, and how much brighter the other is, in W/(m² sr)."""
     background_uncertainty: float
     step_uncertainty: float
+    """Standard uncertainties in W/(m² sr)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelFit:
-    """A model of the optics fitted to edges and apertures.
-
-    Parameters
-    ----------
-    model : PSFModel
-        The model.
-    values : ndarray
-        Its parameters.
-    covariance : ndarray
-        Their covariance; what the residuals show beyond the noise is in it.
-    fwhm, fwhm_uncertainty : float
-        Full width at half maximum of the optics' point spread function and its standard
-        uncertainty in m, the model taken for true.
-    edges : tuple of FittedEdge
-        In the order of the images.
-    source, aperture_background : float
-        Radiance of the source behind the apertures above the background, and the background, in
-        W/(m² sr); NaN without apertures.
-    chi_square : float
-        Sum of the squared residuals over their noise.
-    count, free : int
-        Number of pixels and apertures, and of parameters.
-    reduced_chi_squared : float
-        Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
-        nothing but noise is left.
-    """
+    """A model of the optics fitted to edges and apertures."""
 
     model: PSFModel
-    values: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    values: Array
+    covariance: Array
+    """Their covariance; what the residuals show beyond the noise is in it."""
     fwhm: float
     fwhm_uncertainty: float
+    """Full width at half maximum of the optics' point spread function and its standard
+    uncertainty in m, the model taken for true.
+    """
     edges: tuple[FittedEdge, ...]
     source: float
     aperture_background: float
+    """Radiance of the source behind the apertures above the background, and the background, in
+    W/(m² sr); NaN without apertures.
+    """
     chi_square: float
+    """Sum of the squared residuals over their noise."""
     count: int
     free: int
+    """Number of pixels and apertures, and of parameters."""
     reduced_chi_squared: float
+    """Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
+    nothing but noise is left.
+    """
 
     @property
     def aicc(self) -> float:
@@ -177,7 +136,7 @@ class ModelFit:
         return self.count * log(self.chi_square / self.count) + (self.free + 1) * log(self.count)
 
     @property
-    def uncertainties(self) -> NDArray[np.float64]:
+    def uncertainties(self) -> Array:
         """Standard uncertainties of the parameters."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
@@ -189,11 +148,11 @@ class ModelFit:
         """Edge-spread function of optics and pixel for one of the edges, from 0 to 1."""
         return _response(self.model, self.values, self.edges[edge].line, pixels)
 
-    def predicted(self, edge: int, pixels: EdgePixels) -> NDArray[np.float64]:
+    def predicted(self, edge: int, pixels: EdgePixels) -> Array:
         """Radiance of an edge's pixels in W/(m² sr)."""
         found = self.edges[edge]
         distance = found.line.distance(pixels.x, pixels.y)
-        return np.asarray(found.background + found.step * self.response(edge, pixels)(distance))
+        return found.background + found.step * self.response(edge, pixels)(distance)
 
 
 def fit_model(
@@ -204,23 +163,7 @@ def fit_model(
     tolerance: float = 1e-8,
     tries: int = 1,
 ) -> ModelFit:
-    """Weighted least squares with the edges' places, backgrounds and steps free.
-
-    Parameters
-    ----------
-    model : PSFModel
-        What to fit.
-    edges : sequence of EdgePixels
-        One or more edges.
-    apertures : ApertureSignals, optional
-        Signals of apertures, which show the tails.
-    start : ModelFit, optional
-        An earlier fit of the same model to begin with.
-    tolerance : float
-        Relative change of the parameters at which the fit ends.
-    tries : int
-        How many of the model's own starts are tried if there is no earlier fit.
-    """
+    """Weighted least squares with the edges' places, backgrounds and steps free."""
     problem = _Problem(model, tuple(edges), apertures)
     starts = problem.starts()[:tries] if start is None else [problem.vector_of(start)]
     ends = [problem.least(vector, tolerance) for vector in starts]
@@ -238,7 +181,7 @@ class _Problem:
         self.count = sum(edge.x.size for edge in edges)
         self.scales = self._scales()
 
-    def least(self, vector: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+    def least(self, vector: Array, tolerance: float) -> Array:
         """Parameters with the least squares near some others."""
         low, high = (limit / self.scales for limit in self.bounds())
         result = least_squares(
@@ -253,11 +196,11 @@ class _Problem:
         )
         return np.asarray(result.x * self.scales)
 
-    def cost(self, vector: NDArray[np.float64]) -> float:
+    def cost(self, vector: Array) -> float:
         """Sum of the squared residuals."""
         return float(np.sum(self.residual(vector) ** 2))
 
-    def starts(self) -> list[NDArray[np.float64]]:
+    def starts(self) -> list[Array]:
         """Some parameters to begin with, those first that fit best as they are."""
         pitch = max(edge.pitch for edge in self.edges)
         low, high = (limit[: self.shapes] for limit in self.bounds())
@@ -268,7 +211,7 @@ class _Problem:
         ]
         return sorted(candidates, key=self.cost)
 
-    def vector_of(self, fit: ModelFit) -> NDArray[np.float64]:
+    def vector_of(self, fit: ModelFit) -> Array:
         """All parameters of an earlier fit."""
         parts = [fit.values]
         for edge in fit.edges:
@@ -279,7 +222,7 @@ class _Problem:
             parts.append(np.array([fit.aperture_background, fit.source]))
         return np.concatenate(parts)
 
-    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bounds(self) -> tuple[Array, Array]:
         """Least and greatest parameters."""
         low, high = self.model.bounds(
             min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
@@ -294,7 +237,7 @@ class _Problem:
             high += [outside + 0.1 * contrast, 2.0 * contrast]
         return np.array(low), np.array(high)
 
-    def residual(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(self, vector: Array) -> Array:
         """Measured less model, over the noise."""
         values = vector[: self.shapes]
         parts = []
@@ -310,7 +253,7 @@ class _Problem:
             )
         return np.concatenate(parts)
 
-    def jacobian(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    def jacobian(self, vector: Array) -> Array:
         """Derivative of the residuals by the parameters."""
         result = np.zeros((self.count + self._apertures, vector.size))
         row, column = 0, self.shapes
@@ -338,7 +281,7 @@ class _Problem:
             result[:, k] = (self.residual(moved) - here) / shift
         return result
 
-    def fitted(self, vector: NDArray[np.float64]) -> ModelFit:
+    def fitted(self, vector: Array) -> ModelFit:
         """The result, with what the residuals say of it."""
         residual, jacobian = self.residual(vector), self.jacobian(vector)
         reduced = self._reduced_chi_squared(vector, residual)
@@ -372,9 +315,7 @@ class _Problem:
     def _apertures(self) -> int:
         return 0 if self.apertures is None else self.apertures.diameters.size
 
-    def _fitted_edge(
-        self, vector: NDArray[np.float64], deviations: NDArray[np.float64], k: int
-    ) -> FittedEdge:
+    def _fitted_edge(self, vector: Array, deviations: Array, k: int) -> FittedEdge:
         begin = self.shapes + _EDGE_PARAMETERS * k
         background, step, position, normal = vector[begin : begin + _EDGE_PARAMETERS]
         spread = deviations[begin : begin + _EDGE_PARAMETERS]
@@ -388,7 +329,7 @@ class _Problem:
             float(spread[1]),
         )
 
-    def _fwhm(self, values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def _fwhm(self, values: Array) -> tuple[float, Array]:
         gradient = np.empty(self.shapes)
         low, high = self.bounds()
         for k in range(self.shapes):
@@ -400,9 +341,7 @@ class _Problem:
             gradient[k] = change / (above[k] - below[k])
         return self.model.fwhm(values), gradient
 
-    def _reduced_chi_squared(
-        self, vector: NDArray[np.float64], residual: NDArray[np.float64]
-    ) -> float:
+    def _reduced_chi_squared(self, vector: Array, residual: Array) -> float:
         """Means of the residuals at a distance, squared and over their noise, per freedom."""
         total, bins, row = 0.0, 0, 0
         for edge, (_, _, line) in zip(self.edges, self._places(vector), strict=True):
@@ -418,13 +357,13 @@ class _Problem:
             bins += int(there.sum())
         return total / max(bins - vector.size, 1)
 
-    def _fractions(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _fractions(self, values: Array) -> Array:
         """Signals of the apertures as fractions of an endless source's."""
         assert self.apertures is not None
         transfer = self.model.mean_transfer(values, self.apertures.frequency)
-        return np.asarray(self.apertures.weights @ transfer)
+        return self.apertures.weights @ transfer
 
-    def _places(self, vector: NDArray[np.float64]) -> list[tuple[float, float, EdgeLine]]:
+    def _places(self, vector: Array) -> list[tuple[float, float, EdgeLine]]:
         places = []
         for k in range(len(self.edges)):
             begin = self.shapes + _EDGE_PARAMETERS * k
@@ -432,7 +371,7 @@ class _Problem:
             places.append((background, step, EdgeLine(float(normal), float(position))))
         return places
 
-    def _beginning(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _beginning(self, values: Array) -> Array:
         """All parameters with these of the model: backgrounds and steps by linear least squares."""
         parts = [values]
         for edge in self.edges:
@@ -447,7 +386,7 @@ class _Problem:
             parts.append(np.clip(line, low, high))
         return np.concatenate(parts)
 
-    def _scales(self) -> NDArray[np.float64]:
+    def _scales(self) -> Array:
         pitch = min(edge.pitch for edge in self.edges)
         parts = [self.model.scales(pitch)]
         for edge in self.edges:
@@ -458,18 +397,9 @@ class _Problem:
         return np.concatenate(parts)
 
 
-def with_noise(edge: EdgePixels, predicted: NDArray[np.float64]) -> EdgePixels:
+def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
     """The same pixels with the noise that the residuals show, on the dark and the bright side.
 
-    Parameters
-    ----------
-    edge : EdgePixels
-        The pixels.
-    predicted : ndarray
-        Their radiance by a fit.
-
-    Notes
-    -----
     The variance goes straight from that of the dark side to that of the bright one, as the noise
     of the light does.
     """
@@ -490,9 +420,7 @@ def with_noise(edge: EdgePixels, predicted: NDArray[np.float64]) -> EdgePixels:
     return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
 
 
-def _response(
-    model: PSFModel, values: NDArray[np.float64], line: EdgeLine, edge: EdgePixels
-) -> EdgeResponse:
+def _response(model: PSFModel, values: Array, line: EdgeLine, edge: EdgePixels) -> EdgeResponse:
     return edge_response(
         lambda frequency: model.transfer(values, frequency, line.normal),
         line.normal,
@@ -501,9 +429,7 @@ def _response(
     )
 
 
-def _straight_line(
-    x: NDArray[np.float64], y: NDArray[np.float64], sigma: NDArray[np.float64]
-) -> tuple[float, float]:
+def _straight_line(x: Array, y: Array, sigma: Array) -> tuple[float, float]:
     """Value at x = 0 and slope of the straight line through points, by least squares."""
     weight = sigma**-2.0
     middle = float(weight @ x / weight.sum()), float(weight @ y / weight.sum())

@@ -15,6 +15,7 @@ from scipy.special import chndtr, gamma, j0, j1, kve, ndtr
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA
+from chipglow.quantities import Array
 
 _SAMPLES_PER_FOOTPRINT: Final = 8
 _PERIODS: Final = 64
@@ -26,6 +27,7 @@ which moves the width by a third of its standard uncertainty where noise is 1/20
 _TAIL_ENERGY: Final = 0.9999
 _KERNEL_NODES: Final = 3
 _MOST_SIDE: Final = 1025
+_LARGEST_WIDTH: Final = 1e-3
 _LENGTHS: Final = ("fwhm", "diameter")
 _EVEN_DISC: Final = 30.0
 """A disc of so many deviations of its blur is half as bright at its rim, within its 2000th."""
@@ -35,59 +37,53 @@ _MOST_WIDTHS: Final = 60.0
 
 
 class PSFModel(ABC):
-    """A family of point spread functions of the optics alone.
-
-    Attributes
-    ----------
-    name : str
-        How it is called.
-    parameters : tuple of str
-        Names of its parameters; `is_length` says which are in m, others are pure numbers.
-    """
+    """A family of point spread functions of the optics alone."""
 
     name: str
     parameters: tuple[str, ...]
+    """Names of its parameters; `is_length` tells which are in m, others are pure numbers."""
 
     @abstractmethod
     def starts(self, fwhm: float) -> list[list[float]]:
-        """Parameters to begin a fit with, for about this full width at half maximum in m."""
+        """Initial parameters of a fit, for about this full width at half maximum in m."""
 
     @abstractmethod
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """Least and greatest parameters, for a pitch and an extent of the image in m."""
+        """Smallest and largest parameters, for a pitch and an extent of the image in m."""
 
     @abstractmethod
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
-        """Optical transfer function.
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
+        """Optical transfer function at frequencies in 1/m along an angle in rad."""
 
-        Parameters
-        ----------
-        values : ndarray
-            The parameters.
-        frequency : ndarray
-            Spatial frequencies in 1/m, 0 or more.
-        angle : float
-            Direction of the frequencies in rad, counterclockwise from x.
-        """
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        """Light per area, up to a factor, at positions in m from the middle."""
+        raise NotImplementedError
 
-    @abstractmethod
-    def fwhm(self, values: NDArray[np.float64]) -> float:
+    def sampling(self, values: Array) -> tuple[float, float]:
+        """Distance up to which the kernel reaches, and its spacing, in m."""
+        raise NotImplementedError
+
+    def fwhm(self, values: Array) -> float:
         """Full width at half maximum of the optics' point spread function in m."""
+        zero = np.zeros(())
+        half = float(self.density(values, zero, zero)) / 2
+        reach, _ = self.sampling(values)
+        return 2 * float(
+            brentq(lambda r: float(self.density(values, np.array(r), zero)) - half, 0.0, reach)
+        )
 
-    @abstractmethod
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
+    def psf(self, values: Array) -> PointSpreadFunction:
         """The optics' point spread function, for a camera of order ``optics``."""
+        return MeasuredPSF(
+            *sampled_kernel(lambda x, y: self.density(values, x, y), *self.sampling(values))
+        )
 
-    def mean_transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def mean_transfer(self, values: Array, frequency: Array) -> Array:
         """Mean of the transfer function over all directions."""
         return self.transfer(values, frequency, 0.0)
 
-    def scales(self, pitch: float) -> NDArray[np.float64]:
-        """What a step of 1 in a fit means for each parameter."""
+    def scales(self, pitch: float) -> Array:
+        """Size of a step of 1 in a fit, for each parameter."""
         return np.array([pitch if is_length(name) else 1.0 for name in self.parameters])
 
 
@@ -98,31 +94,24 @@ def is_length(parameter: str) -> bool:
 
 @dataclass(frozen=True)
 class GaussianModel(PSFModel):
-    """A round Gaussian."""
+    """A round Gaussian; its transfer function is exp(−2π²σ²f²)."""
 
     name = "gaussian"
     parameters = ("fwhm",)
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.02 * pitch], [min(extent, 1e-3)]
+        return [0.02 * pitch], [min(extent, _LARGEST_WIDTH)]
 
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
-        """exp(−2π²σ²f²)."""
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         return _gaussian_transfer(values[0], frequency)
 
-    def fwhm(self, values: NDArray[np.float64]) -> float:
-        """See `PSFModel.fwhm`."""
+    def fwhm(self, values: Array) -> float:
         return float(values[0])
 
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
+    def psf(self, values: Array) -> PointSpreadFunction:
         return GaussianPSF(float(values[0]))
 
 
@@ -139,93 +128,59 @@ class GaussianTailModel(PSFModel):
     parameters = ("core_fwhm", "tail_fraction", "tail_ratio")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[0.9 * fwhm, fraction, ratio] for fraction, ratio in ((0.1, 4.0), (0.25, 1.5))]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.02 * pitch, 0.0, 0.72], [min(extent, 1e-3), 0.95, extent / pitch]
+        return [0.02 * pitch, 0.0, 0.72], [min(extent, _LARGEST_WIDTH), 0.95, extent / pitch]
 
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
-        """Sum of the core's and the tail's."""
-        core, fraction, length = self._numbers(values)
-        tail = (1 + (2 * pi * length * frequency) ** 2) ** -1.5
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
+        core, fraction, ratio = values
+        tail = (1 + (2 * pi * ratio * core * frequency) ** 2) ** -1.5
         return np.asarray((1 - fraction) * _gaussian_transfer(core, frequency) + fraction * tail)
 
-    def fwhm(self, values: NDArray[np.float64]) -> float:
-        """See `PSFModel.fwhm`."""
-        half = self._density(values, np.array(0.0)) / 2
-        far = 2.0 * max(1.0, values[2]) * values[0]
-        found = brentq(lambda r: float(self._density(values, np.array(r)) - half), 0.0, far)
-        return 2 * float(found)
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        core, fraction, ratio = values
+        sigma, length, radius = core / FWHM_PER_SIGMA, ratio * core, np.hypot(x, y)
+        gauss = np.exp(-(radius**2) / (2 * sigma**2)) / sigma**2
+        tail = np.exp(-radius / length) / length**2
+        return np.asarray((1 - fraction) * gauss + fraction * tail)
 
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
-        core, fraction, length = self._numbers(values)
+    def sampling(self, values: Array) -> tuple[float, float]:
+        core, fraction, length = float(values[0]), float(values[1]), float(values[2] * values[0])
         reach = 2.0 * core
         # Of the tail, (1 + r / length) exp(−r / length) is beyond r.
         while fraction * (1 + reach / length) * exp(-reach / length) > 1 - _TAIL_ENERGY:
             reach += 0.5 * length
-        return sampled_psf(lambda x, y: self._density(values, np.hypot(x, y)), reach, core / 8)
-
-    def _numbers(self, values: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Width of the core in m, fraction of the tail, length of the tail in m."""
-        core, fraction, ratio = values
-        return float(core), float(fraction), float(ratio * core)
-
-    def _density(
-        self, values: NDArray[np.float64], radius: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        core, fraction, length = self._numbers(values)
-        sigma = core / FWHM_PER_SIGMA
-        gauss = np.exp(-(radius**2) / (2 * sigma**2)) / sigma**2
-        tail = np.exp(-radius / length) / length**2
-        return np.asarray(((1 - fraction) * gauss + fraction * tail) / (2 * pi))
+        return reach, core / 8
 
 
 @dataclass(frozen=True)
 class AnnularModel(PSFModel):
-    """Diffraction of a round pupil with a round obstruction; see `AnnularAperturePSF`.
-
-    Parameters
-    ----------
-    wavelength : float
-        In m. Only its ratio to the numerical aperture is known from an image.
-    """
+    """Diffraction of a round pupil with a round obstruction; see `AnnularAperturePSF`."""
 
     wavelength: float
+    """In m. Only its ratio to the numerical aperture is known from an image."""
     name = "annular aperture"
     parameters = ("numerical_aperture", "obscured_area")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         aperture = min(0.9, 0.49 * self.wavelength / fwhm)
         return [[aperture, area] for area in (0.02, 0.12, 0.35)]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
         return [max(1e-4, 0.4 * self.wavelength / extent), 0.0], [1.0, 0.81]
 
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         """Area that the pupil shares with itself when shifted (O'Neill, 1956), over its own."""
         inner = sqrt(max(values[1], 0.0))
         shift = frequency * self.wavelength / values[0]
         shared = _lens(1.0, 1.0, shift) - 2 * _lens(1.0, inner, shift) + _lens(inner, inner, shift)
-        return np.asarray(shared / (pi * (1 - inner**2)))
+        return shared / (pi * (1 - inner**2))
 
-    def fwhm(self, values: NDArray[np.float64]) -> float:
-        """See `PSFModel.fwhm`."""
-        return self._aperture(values).fwhm
+    def fwhm(self, values: Array) -> float:
+        return self.psf(values).fwhm
 
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
-        return self._aperture(values)
-
-    def _aperture(self, values: NDArray[np.float64]) -> AnnularAperturePSF:
+    def psf(self, values: Array) -> PointSpreadFunction:
         aperture, area = min(float(values[0]), 1.0), float(np.clip(values[1], 0.0, 0.81))
         return AnnularAperturePSF(self.wavelength, aperture, sqrt(area))
 
@@ -234,8 +189,6 @@ class AnnularModel(PSFModel):
 class MoffatModel(PSFModel):
     """Light as (1 + (r / a)²)^(−exponent): a core with tails that fall as a power of the radius.
 
-    Notes
-    -----
     A. F. J. Moffat, Astronomy and Astrophysics 3 (1969) 455. The transfer function is Hankel's
     transform, 2 (π a f)^(β−1) K_(β−1)(2π a f) / Γ(β−1) of the exponent β (Basset's integral).
     """
@@ -244,17 +197,12 @@ class MoffatModel(PSFModel):
     parameters = ("fwhm", "exponent")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm, 1.8], [fwhm, 3.5]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.02 * pitch, 1.2], [min(extent, 1e-3), 20.0]
+        return [0.02 * pitch, 1.2], [min(extent, _LARGEST_WIDTH), 20.0]
 
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
-        """That of the notes."""
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         cycles = 2 * pi * self._radius(values) * frequency
         order = float(values[1]) - 1
         bessel = kve(order, _MOFFAT_NODES) * np.exp(-_MOFFAT_NODES)
@@ -264,25 +212,21 @@ class MoffatModel(PSFModel):
         result = np.where(cycles < _MOFFAT_NODES[0], 1.0, 0.0)
         some = (cycles >= _MOFFAT_NODES[0]) & (cycles < _MOFFAT_NODES[-1])
         result[some] = curve(np.log(cycles[some]))
-        return np.asarray(result)
+        return result
 
-    def fwhm(self, values: NDArray[np.float64]) -> float:
-        """See `PSFModel.fwhm`."""
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        return np.asarray((1 + (x**2 + y**2) / self._radius(values) ** 2) ** -values[1])
+
+    def sampling(self, values: Array) -> tuple[float, float]:
+        fwhm, exponent = values.tolist()
+        # (1 + (r / a)²)^(1 − exponent) of the light is beyond r.
+        reach = self._radius(values) * sqrt((1 - _TAIL_ENERGY) ** (1 / (1 - exponent)) - 1)
+        return max(min(reach, _MOST_WIDTHS * fwhm), 2 * fwhm), fwhm / 8
+
+    def fwhm(self, values: Array) -> float:
         return float(values[0])
 
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
-        """See `PSFModel.psf`; the kernel ends where a ten-thousandth of the light is beyond."""
-        exponent, radius = float(values[1]), self._radius(values)
-        # (1 + (r / a)²)^(1 − exponent) of the light is beyond r.
-        reach = radius * sqrt((1 - _TAIL_ENERGY) ** (1 / (1 - exponent)) - 1)
-        reach = min(reach, _MOST_WIDTHS * float(values[0]))
-
-        def density(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.asarray((1 + (x**2 + y**2) / radius**2) ** -exponent)
-
-        return sampled_psf(density, max(reach, 2 * float(values[0])), float(values[0]) / 8)
-
-    def _radius(self, values: NDArray[np.float64]) -> float:
+    def _radius(self, values: Array) -> float:
         """The length a in m."""
         return float(values[0]) / (2 * sqrt(2 ** (1 / float(values[1])) - 1))
 
@@ -299,68 +243,34 @@ class DefocusedDiscModel(PSFModel):
     parameters = ("disc_diameter", "blur_fwhm")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm, 0.2 * fwhm], [fwhm, 0.6 * fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        return [0.1 * pitch, 0.02 * pitch], [min(extent, 1e-3)] * 2
+        return [0.1 * pitch, 0.02 * pitch], [min(extent, _LARGEST_WIDTH)] * 2
 
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
-        """Product of the disc's and the Gaussian's."""
-        argument = pi * values[0] * frequency
-        safe = np.where(argument == 0.0, 1.0, argument)
-        disc = np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
-        return np.asarray(disc * _gaussian_transfer(values[1], frequency))
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
+        return disc_transfer(values[0] / 2 * frequency) * _gaussian_transfer(values[1], frequency)
 
-    def fwhm(self, values: NDArray[np.float64]) -> float:
-        """See `PSFModel.fwhm`."""
-        radius, sigma = self._lengths(values)
-        if radius > _EVEN_DISC * sigma:
-            return float(values[0])
-        half = self._density(values, np.array(0.0)) / 2
-        far = radius + 3 * sigma
-        found = brentq(lambda r: float(self._density(values, np.array(r)) - half), 0.0, far)
-        return 2 * float(found)
-
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
-        radius, sigma = self._lengths(values)
-        fine = max(min(radius / 8, sigma), radius / 40)
-
-        def density(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-            return self._density(values, np.hypot(x, y))
-
-        return sampled_psf(density, radius + 5 * sigma, fine)
-
-    def _lengths(self, values: NDArray[np.float64]) -> tuple[float, float]:
-        """Radius of the disc and standard deviation of the blur in m."""
-        return float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
-
-    def _density(
-        self, values: NDArray[np.float64], radius: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def density(self, values: Array, x: Array, y: Array) -> Array:
         """Light of the disc that the blur puts on a point: the noncentral chi-squared."""
-        disc, sigma = self._lengths(values)
+        disc, sigma, radius = values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y)
         if disc > _EVEN_DISC * sigma:
             return np.asarray(ndtr((disc - radius) / sigma))
         return np.asarray(chndtr((disc / sigma) ** 2, 2.0, (radius / sigma) ** 2))
 
+    def sampling(self, values: Array) -> tuple[float, float]:
+        radius, sigma = float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
+        return radius + 5 * sigma, max(min(radius / 8, sigma), radius / 40)
+
 
 @dataclass(frozen=True)
 class EllipticalModel(PSFModel):
-    """A Gaussian of another width in each direction.
-
-    Parameters
-    ----------
-    tilted : bool
-        Whether its axes may be tilted, for which edges of three orientations are needed; else they
-        are those of the image.
-    """
+    """A Gaussian of another width in each direction."""
 
     tilted: bool
+    """Whether its axes may be tilted, for which edges of three orientations are needed; else they
+    are those of the image.
+    """
     name = "elliptical gaussian"
 
     @property
@@ -369,89 +279,66 @@ class EllipticalModel(PSFModel):
         return ("fwhm_x", "fwhm_y", "correlation") if self.tilted else ("fwhm_x", "fwhm_y")
 
     def starts(self, fwhm: float) -> list[list[float]]:
-        """See `PSFModel.starts`."""
         return [[fwhm, fwhm, 0.0] if self.tilted else [fwhm, fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """See `PSFModel.bounds`."""
-        low, high = [0.02 * pitch] * 2, [min(extent, 1e-3)] * 2
+        low, high = [0.02 * pitch] * 2, [min(extent, _LARGEST_WIDTH)] * 2
         return ([*low, -0.99], [*high, 0.99]) if self.tilted else (low, high)
 
-    def transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
-    ) -> NDArray[np.float64]:
-        """That of a Gaussian with the width along the angle."""
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         along = np.array([cos(angle), sin(angle)])
         return _gaussian_transfer(sqrt(float(along @ self._squares(values) @ along)), frequency)
 
-    def mean_transfer(
-        self, values: NDArray[np.float64], frequency: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """See `PSFModel.mean_transfer`."""
+    def mean_transfer(self, values: Array, frequency: Array) -> Array:
         angles = np.arange(8) * pi / 8
         return np.asarray(
             np.mean([self.transfer(values, frequency, angle) for angle in angles], axis=0)
         )
 
-    def fwhm(self, values: NDArray[np.float64]) -> float:
+    def fwhm(self, values: Array) -> float:
         """Geometric mean of the two widths along the ellipse's axes in m."""
         return sqrt(sqrt(float(np.linalg.det(self._squares(values)))))
 
-    def axes(self, values: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Greatest and least width in m, and the direction of the greatest in rad from x."""
-        squares, directions = np.linalg.eigh(self._squares(values))
-        direction = float(np.arctan2(directions[1, 1], directions[0, 1])) % pi
-        return sqrt(float(squares[1])), sqrt(float(squares[0])), direction
-
-    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
-        """See `PSFModel.psf`."""
+    def density(self, values: Array, x: Array, y: Array) -> Array:
         inverse = np.linalg.inv(self._squares(values)) * FWHM_PER_SIGMA**2
-        greatest, least, _ = self.axes(values)
+        form = inverse[0, 0] * x**2 + 2 * inverse[0, 1] * x * y + inverse[1, 1] * y**2
+        return np.asarray(np.exp(-form / 2))
 
-        def density(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-            form = inverse[0, 0] * x**2 + 2 * inverse[0, 1] * x * y + inverse[1, 1] * y**2
-            return np.asarray(np.exp(-form / 2))
+    def sampling(self, values: Array) -> tuple[float, float]:
+        least, greatest = np.sqrt(np.linalg.eigvalsh(self._squares(values))).tolist()
+        return 2.0 * greatest, least / 8
 
-        return sampled_psf(density, 2.0 * greatest, least / 8)
-
-    def _squares(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _squares(self, values: Array) -> Array:
         both = values[2] * values[0] * values[1] if self.tilted else 0.0
         return np.array([[values[0] ** 2, both], [both, values[1] ** 2]])
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeResponse:
-    """Edge-spread function of optics and pixel, a curve through even samples.
-
-    Parameters
-    ----------
-    spacing : float
-        Distance of the samples in m; the one in the middle is on the edge.
-    edge, line : ndarray
-        Edge-spread function, from 0 on the dark side to 1 on the bright one, and its derivative,
-        the line-spread function in 1/m, shape (n,), n odd.
-    """
+    """Edge-spread function of optics and pixel, a curve through even samples."""
 
     spacing: float
-    edge: NDArray[np.float64]
-    line: NDArray[np.float64]
+    """Distance of the samples in m; the one in the middle is on the edge."""
+    edge: Array
+    line: Array
+    """Edge-spread function, from 0 on the dark side to 1 on the bright one, and its derivative,
+    the line-spread function in 1/m, shape (n,), n odd.
+    """
 
-    def __call__(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, distance: Array) -> Array:
         """Edge-spread function at distances in m (Hermite's cubic); beyond the samples the last."""
         k, t = self._place(distance)
         rise = self.edge[k + 1] - self.edge[k]
         first, last = self.spacing * self.line[k], self.spacing * self.line[k + 1]
         bend, twist = 3 * rise - 2 * first - last, first + last - 2 * rise
-        return np.asarray(self.edge[k] + t * (first + t * (bend + t * twist)))
+        return self.edge[k] + t * (first + t * (bend + t * twist))
 
-    def slope(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slope(self, distance: Array) -> Array:
         """Line-spread function at distances in m, in 1/m, by straight lines."""
         k, t = self._place(distance)
-        return np.asarray(self.line[k] + t * (self.line[k + 1] - self.line[k]))
+        return self.line[k] + t * (self.line[k + 1] - self.line[k])
 
-    def _place(
-        self, distance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _place(self, distance: Array) -> tuple[NDArray[np.int64], Array]:
         """Sample before each distance, and how far on the way to the next one it is."""
         last = self.edge.size - 1
         place = np.clip(np.asarray(distance) / self.spacing + last // 2, 0.0, last)
@@ -460,25 +347,12 @@ class EdgeResponse:
 
 
 def edge_response(
-    transfer: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    transfer: Callable[[Array], Array],
     angle: float,
     footprint: float,
     reach: float,
 ) -> EdgeResponse:
-    """Edge-spread function of optics and pixel.
-
-    Parameters
-    ----------
-    transfer : callable
-        Transfer function of the optics over the frequency in 1/m.
-    angle : float
-        Direction of the edge's normal in rad. A square footprint that is looked at under an angle
-        acts as two slits of the lengths side |cos| and side |sin|, one after the other.
-    footprint : float
-        Side of the sensitive square in m.
-    reach : float
-        Largest distance from the edge in m that is asked for.
-    """
+    """Edge-spread function of optics and pixel."""
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
     frequency = np.arange(count // 2 + 1, dtype=np.float64) / (count * step)
@@ -492,39 +366,19 @@ def edge_response(
     return EdgeResponse(step, 0.5 + edge[index] + index / count, line[index])
 
 
-def footprint_transfer(
-    frequency: NDArray[np.float64], angle: float, footprint: float
-) -> NDArray[np.float64]:
+def footprint_transfer(frequency: Array, angle: float, footprint: float) -> Array:
     """Transfer function of a square pixel along a direction; shapes and units as above."""
     across, down = footprint * cos(angle), footprint * sin(angle)
-    return np.asarray(np.sinc(frequency * across) * np.sinc(frequency * down))
+    return np.sinc(frequency * across) * np.sinc(frequency * down)
 
 
 def disc_response(
-    frequency: NDArray[np.float64],
+    frequency: Array,
     diameter: float,
-    radii: NDArray[np.float64],
+    radii: Array,
     footprint: float,
-) -> NDArray[np.float64]:
-    """Weights that make of a transfer function the signal in the middle of a bright disc.
-
-    Parameters
-    ----------
-    frequency : ndarray
-        Even frequencies in 1/m from 0, shape (n,).
-    diameter : float
-        The disc's in m.
-    radii : ndarray
-        Distances from its middle in m of the pixels whose mean is taken.
-    footprint : float
-        Side of the sensitive square in m.
-
-    Returns
-    -------
-    ndarray
-        Shape (n,): the product with the optics' transfer function, averaged over directions, is
-        the signal as a fraction of that of an endless source: R ∫ H(f) J0(2πfρ) J1(2πfR) 2π df.
-    """
+) -> Array:
+    """Weights that make of a transfer function the signal in the middle of a bright disc."""
     radius = diameter / 2
     angles = ((np.arange(12) + 0.5) * pi / 24).tolist()
     square = np.zeros_like(frequency)
@@ -539,31 +393,12 @@ def disc_response(
     return np.asarray(weight)
 
 
-def sampled_psf(
-    density: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
-    reach: float,
-    spacing: float,
-) -> MeasuredPSF:
-    """Point spread function of a density over the plane; parameters as of `sampled_kernel`."""
-    return MeasuredPSF(*sampled_kernel(density, reach, spacing))
-
-
 def sampled_kernel(
-    density: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    density: Callable[[Array, Array], Array],
     reach: float,
     spacing: float,
-) -> tuple[NDArray[np.float64], float]:
-    """Kernel of a density over the plane, integrated over squares, and their side in m.
-
-    Parameters
-    ----------
-    density : callable
-        Light per area at x and y in m, in any unit.
-    reach : float
-        Half side of the kernel in m.
-    spacing : float
-        Side of a square in m; coarser if the kernel would be very large.
-    """
+) -> tuple[Array, float]:
+    """Kernel of a density over the plane, integrated over squares, and their side in m."""
     spacing = max(spacing, 2 * reach / (_MOST_SIDE - 1))
     half = ceil(reach / spacing)
     node, weight = np.polynomial.legendre.leggauss(_KERNEL_NODES)
@@ -576,12 +411,19 @@ def sampled_kernel(
     return kernel, spacing
 
 
-def _gaussian_transfer(fwhm: float, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+def disc_transfer(cycles: Array) -> Array:
+    """Transfer function of an even disc over frequency times radius."""
+    argument = 2 * pi * cycles
+    safe = np.where(argument == 0.0, 1.0, argument)
+    return np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
+
+
+def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
     sigma = fwhm / FWHM_PER_SIGMA
-    return np.asarray(np.exp(-2 * (pi * sigma * frequency) ** 2))
+    return np.exp(-2 * (pi * sigma * frequency) ** 2)
 
 
-def _lens(large: float, small: float, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lens(large: float, small: float, distance: Array) -> Array:
     """Area that two discs of these radii share, their middles at a distance."""
     if small == 0.0:
         return np.zeros_like(distance)
@@ -593,4 +435,4 @@ def _lens(large: float, small: float, distance: NDArray[np.float64]) -> NDArray[
     product = product * (apart - small + large) * (apart + small + large)
     triangle = np.sqrt(np.maximum(product, 0.0)) / 2
     area = large**2 * first + small**2 * second - triangle
-    return np.asarray(np.where(apart <= large - small, pi * small**2, area))
+    return np.where(apart <= large - small, pi * small**2, area)

@@ -14,17 +14,21 @@ from functools import partial
 from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 from scipy.optimize import nnls
-from scipy.special import j1
 
 from chipglow.camera import MeasuredPSF
-from chipglow.laboratory.psf.edge_spread import EdgeSpread
 from chipglow.laboratory.psf.psf_fit import ApertureSignals, EdgePixels, ModelFit
-from chipglow.laboratory.psf.psf_models import disc_response, edge_response, sampled_kernel
+from chipglow.laboratory.psf.psf_models import (
+    disc_response,
+    disc_transfer,
+    edge_response,
+    sampled_kernel,
+)
+from chipglow.quantities import Array
 from chipglow.uncertainty import Cause, Component, Estimate
 
-Values: TypeAlias = NDArray[np.float64]
+Values: TypeAlias = Array
 
 FIT: Final = "psf fit"
 """Name of the component of uncertainty that the noise of the images makes."""
@@ -38,36 +42,28 @@ _ROUGHER: Final = 4
 _REPEATS: Final = 24
 
 
-def psf_cause(name: str, content: NDArray[np.float64], errors: int) -> Cause:
+def psf_cause(name: str, content: Array, errors: int) -> Cause:
     """A cause of errors of one point spread function, the same in another run."""
     return Cause(name, hashlib.sha256(content.tobytes()).hexdigest()[:16], errors)
 
 
 @dataclass(frozen=True, eq=False)
 class RadialPSF:
-    """A round point spread function of the optics, ring by ring.
+    """A round point spread function of the optics, ring by ring."""
 
-    Parameters
-    ----------
-    edges : ndarray
-        Radii in m that limit the rings, from 0, shape (n + 1,).
-    estimate : Estimate
-        Fraction of the light in each ring, shape (n,); what is missing to 1 lies beyond. Its
-        component `FIT` is by the noise, and by how much the fractions change when they are let be
-        rougher.
-    model : ndarray
-        Fraction of the light of the best model in each ring, shape (n,).
-    smoothness : float
-        Weight of the smoothness.
-    """
-
-    edges: NDArray[np.float64]
+    edges: Array
+    """Radii in m that limit the rings, from 0, shape (n + 1,)."""
     estimate: Estimate
-    model: NDArray[np.float64]
+    """Fraction of the light in each ring, shape (n,); what is missing to 1 lies beyond. Its
+    component `FIT` is by the noise, and by how much the fractions change when they are let be
+    rougher.
+    """
+    model: Array
+    """Fraction of the light of the best model in each ring, shape (n,)."""
     smoothness: float
 
     @property
-    def fractions(self) -> NDArray[np.float64]:
+    def fractions(self) -> Array:
         """Values of `estimate`."""
         return self.estimate.values
 
@@ -80,14 +76,14 @@ class RadialPSF:
         return _ring_width(self.edges, self.fractions) - _ring_width(self.edges, self.model)
 
     @property
-    def radius(self) -> NDArray[np.float64]:
+    def radius(self) -> Array:
         """Middles of the rings in m."""
-        return np.asarray((self.edges[1:] + self.edges[:-1]) / 2)
+        return (self.edges[1:] + self.edges[:-1]) / 2
 
     @property
-    def density(self) -> NDArray[np.float64]:
+    def density(self) -> Array:
         """Light per area in 1/m²."""
-        return np.asarray(self.fractions / (np.pi * np.diff(self.edges**2)))
+        return self.fractions / (np.pi * np.diff(self.edges**2))
 
     @property
     def encircled(self) -> Estimate:
@@ -109,11 +105,11 @@ class RadialPSF:
         """The same kernel of the best model: with what the rings are too coarse for."""
         return MeasuredPSF(*self._kernel(self.model))
 
-    def _kernel(self, fractions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def _kernel(self, fractions: Array) -> tuple[Array, float]:
         """Kernel of light that is shared among the rings so, and its spacing in m."""
         radius, density = self.radius, fractions / np.diff(self.edges**2)
 
-        def at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        def at(x: Array, y: Array) -> Array:
             return np.interp(np.hypot(x, y), radius, density, right=0.0)
 
         return sampled_kernel(at, float(self.edges[-1]), float(self.edges[1]))
@@ -122,33 +118,18 @@ class RadialPSF:
 def radial_psf(
     fit: ModelFit,
     edges: Sequence[EdgePixels],
-    spreads: Sequence[EdgeSpread],
+    curves: Sequence[xr.Dataset],
     apertures: ApertureSignals | None,
     generator: np.random.Generator,
 ) -> RadialPSF:
     """Invert edge-spread functions and signals of apertures.
 
-    Parameters
-    ----------
-    fit : ModelFit
-        Where the edges are; of it come the edges' and the apertures' backgrounds and steps.
-    edges : sequence of EdgePixels
-        The edges' pixels.
-    spreads : sequence of EdgeSpread
-        Their edge-spread functions.
-    apertures : ApertureSignals, optional
-        Signals of apertures.
-    generator : numpy.random.Generator
-        For the repeats with other noise that give the uncertainty.
-
-    Notes
-    -----
     The weight of the smoothness is the one with the least sum of squared residuals and twice the
     number of free fractions that it leaves (Mallows, 1973). What it hides is
     estimated by the change with a hundredth of that weight. The repeats draw the model too.
     """
     radii = _radii(fit, edges)
-    design, left = _rows(fit, edges, spreads, apertures, radii)
+    design, left = _rows(fit, edges, curves, apertures, radii)
     penalty = _penalty(radii, _core(fit, edges))
     fractions_by = _shares_by(fit, radii)
     model = fractions_by(fit.values)
@@ -186,9 +167,7 @@ def _ring_width(edges: Values, fractions: Values) -> float:
     return 2 * float(radius[last] + fraction * (radius[last + 1] - radius[last]))
 
 
-def _drawn(
-    fit: ModelFit, edges: Sequence[EdgePixels], generator: np.random.Generator
-) -> NDArray[np.float64]:
+def _drawn(fit: ModelFit, edges: Sequence[EdgePixels], generator: np.random.Generator) -> Array:
     """Parameters of the model as other noise would have given them, shape (repeat, parameter)."""
     values, vectors = np.linalg.eigh(fit.covariance)
     spread = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -197,18 +176,18 @@ def _drawn(
     return np.asarray(np.clip(drawn, low, high))
 
 
-def _effects(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _effects(values: Array) -> Array:
     """What the repeats (from row 2 on) and the rougher solution (row 1) change, (value, error)."""
     repeats = values[2:]
     away = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
     return np.concatenate([[values[1] - values[0]], away]).T.copy()
 
 
-def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> NDArray[np.float64]:
+def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> Array:
     """Limits of the rings: even in the core, in proportion to the radius beyond."""
     core = _core(fit, edges)
     last = 0.8 * min(edge.reach for edge in edges)
-    return np.asarray(core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1)))
+    return core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1))
 
 
 def _core(fit: ModelFit, edges: Sequence[EdgePixels]) -> float:
@@ -218,24 +197,25 @@ def _core(fit: ModelFit, edges: Sequence[EdgePixels]) -> float:
 def _rows(
     fit: ModelFit,
     edges: Sequence[EdgePixels],
-    spreads: Sequence[EdgeSpread],
+    curves: Sequence[xr.Dataset],
     apertures: ApertureSignals | None,
-    radii: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    radii: Array,
+) -> tuple[Array, Array]:
     """Design, and what the model leaves of the data, over the noise, of bins and apertures."""
     rows, data = [], []
-    for found, pixels, spread in zip(fit.edges, edges, spreads, strict=True):
+    for found, pixels, one in zip(fit.edges, edges, curves, strict=True):
+        uncertainty = one["esf_uncertainty"].values
         columns = [
             edge_response(
                 partial(_ring_transfer, radii, k),
                 found.line.normal,
                 pixels.footprint,
                 pixels.reach,
-            )(spread.distance)
+            )(one["distance"].values)
             for k in range(radii.size - 1)
         ]
-        rows.append(np.array(columns).T / spread.uncertainty[:, None])
-        data.append(spread.residual / spread.uncertainty)
+        rows.append(np.array(columns).T / uncertainty[:, None])
+        data.append(one["esf_residual"].values / uncertainty)
     if apertures is not None:
         transfers = [_ring_transfer(radii, k, apertures.frequency) for k in range(radii.size - 1)]
         sigma = apertures.sigma / fit.source
@@ -246,23 +226,16 @@ def _rows(
     return np.concatenate(rows), np.concatenate(data)
 
 
-def _ring_transfer(
-    radii: NDArray[np.float64], k: int, frequency: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _ring_transfer(radii: Array, k: int, frequency: Array) -> Array:
     """Transfer function of an even ring."""
     inner, outer = radii[k], radii[k + 1]
-    whole = outer**2 * _jinc(frequency * outer) - inner**2 * _jinc(frequency * inner)
+    whole = outer**2 * disc_transfer(frequency * outer) - inner**2 * disc_transfer(
+        frequency * inner
+    )
     return np.asarray(whole / (outer**2 - inner**2))
 
 
-def _jinc(cycles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Transfer function of an even disc over frequency times radius."""
-    argument = 2 * np.pi * cycles
-    safe = np.where(argument == 0.0, 1.0, argument)
-    return np.asarray(np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe))
-
-
-def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+def _penalty(radii: Array, width: float) -> Array:
     """Second differences from ring to ring; beyond the last one there is nothing.
 
     They are those of the density in the core, which is flat there, and of the density times the
@@ -271,10 +244,10 @@ def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
     middles = (radii[1:] + radii[:-1]) / 2
     weighted = np.diag((middles**2 + width**2) / np.diff(radii**2))
     padded = np.concatenate([weighted[:1], weighted, np.zeros((1, middles.size))])
-    return np.asarray(np.diff(padded, n=2, axis=0) * 1e3)
+    return np.diff(padded, n=2, axis=0) * 1e3
 
 
-def _shares_by(fit: ModelFit, radii: NDArray[np.float64]) -> Callable[[Values], Values]:
+def _shares_by(fit: ModelFit, radii: Array) -> Callable[[Values], Values]:
     """What gives the fraction of a model's light in each ring by the model's parameters."""
     frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
     middle = np.zeros(1)
@@ -286,11 +259,11 @@ def _shares_by(fit: ModelFit, radii: NDArray[np.float64]) -> Callable[[Values], 
 
 
 def _solved(
-    design: NDArray[np.float64],
-    data: NDArray[np.float64],
-    penalty: NDArray[np.float64],
-    model: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    design: Array,
+    data: Array,
+    penalty: Array,
+    model: Array,
+) -> Array:
     matrix = np.concatenate([design, penalty])
     wanted = np.concatenate([data, penalty @ model])
     # The normal equations are small, whatever the number of bins.
@@ -301,10 +274,10 @@ def _solved(
 
 
 def _criterion(
-    design: NDArray[np.float64],
-    data: NDArray[np.float64],
-    penalty: NDArray[np.float64],
-    fractions: NDArray[np.float64],
+    design: Array,
+    data: Array,
+    penalty: Array,
+    fractions: Array,
 ) -> float:
     """Squared residuals, and twice the trace of what makes fitted data of data."""
     left = data - design @ fractions

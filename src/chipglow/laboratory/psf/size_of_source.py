@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import UNUSABLE, Flag, Measurement
 from chipglow.laboratory.psf.psf_fit import ApertureSignals
+from chipglow.quantities import Array
 
 _LEAST_APERTURES: Final = 3
 _FEWEST_OUTSIDE: Final = 20
@@ -16,30 +17,17 @@ _FEWEST_OUTSIDE: Final = 20
 
 @dataclass(frozen=True, eq=False)
 class ApertureImage:
-    """A round aperture before a source of even radiance.
-
-    Parameters
-    ----------
-    diameter : float
-        In m, on the object.
-    radiance : ndarray
-        In W/(m² sr), NaN where it is not usable, shape (y, x).
-    x, y : ndarray
-        Positions of columns and rows in m.
-    name : str
-        What it is called in messages.
-
-    Raises
-    ------
-    ValueError
-        If the diameter is not positive.
-    """
+    """A round aperture before a source of even radiance."""
 
     diameter: float
-    radiance: NDArray[np.float64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    """In m, on the object."""
+    radiance: Array
+    """In W/(m² sr), NaN where it is not usable, shape (y, x)."""
+    x: Array
+    y: Array
+    """Positions of columns and rows in m."""
     name: str
+    """What it is called in messages."""
 
     def __post_init__(self) -> None:
         if not 0 < self.diameter < np.inf:
@@ -47,22 +35,7 @@ class ApertureImage:
 
 
 def aperture_image(measurement: Measurement, diameter: float, name: str) -> ApertureImage:
-    """The mean of a measurement's frames as an image of an aperture.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        One frame or several of the same aperture.
-    diameter : float
-        Its diameter in m.
-    name : str
-        What it is called in messages.
-
-    Raises
-    ------
-    ValueError
-        If the diameter is not positive.
-    """
+    """The mean of a measurement's frames as an image of an aperture."""
     usable = (np.bitwise_or.reduce(measurement.flags, axis=0) & (UNUSABLE | Flag.REPLACED)) == 0
     radiance = np.where(usable, measurement.radiance.mean(axis=0), np.nan)
     raster = measurement.raster
@@ -74,18 +47,6 @@ def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> Apert
 
     The middle is the centroid of what is brighter than half; the signal is the mean of the pixels
     within a pitch of it, whose distances from the middle are kept.
-
-    Parameters
-    ----------
-    images : sequence of ApertureImage
-        Three apertures or more before the same source.
-    footprint : float
-        Side of a pixel's sensitive square in m.
-
-    Raises
-    ------
-    ValueError
-        If there are too few, or an image shows no aperture within its edges.
     """
     if len({image.diameter for image in images}) < _LEAST_APERTURES:
         raise ValueError(
@@ -109,7 +70,7 @@ class _Middle:
 
     signal: float
     sigma: float
-    radii: NDArray[np.float64]
+    radii: Array
     outside: float
 
 
@@ -152,7 +113,7 @@ def _middle(image: ApertureImage) -> _Middle:
     return _Middle(signal, max(sigma / number**0.5, least), away[inner], outside)
 
 
-def _noise(radiance: NDArray[np.float64], outside: NDArray[np.bool_]) -> float:
+def _noise(radiance: Array, outside: NDArray[np.bool_]) -> float:
     """Noise of a pixel in W/(m² sr), from the differences of neighbours outside the aperture."""
     pairs = outside[:, 1:] & outside[:, :-1]
     if pairs.sum() < _FEWEST_OUTSIDE:

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from chipglow.quantities import Array
+
 _BASES: Final = 4
 _NEAREST: Final = 3
 _NEIGHBOURS: Final = 8
@@ -23,23 +25,15 @@ _CONTRADICTED: Final = 2
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Where the dots of an image are.
+    """Where the dots of an image are."""
 
-    Parameters
-    ----------
-    pixels : ndarray
-        Columns and rows, shape (n, 2).
-    shape : tuple of int
-        Rows and columns of the image.
-    margin : float
-        How far from the image's border, in pixels, a dot is surely found.
-    """
-
-    pixels: NDArray[np.float64]
+    pixels: Array
+    """Columns and rows, shape (n, 2)."""
     shape: tuple[int, ...]
     margin: float
+    """How far from the image's border, in pixels, a dot is surely found."""
 
-    def shows(self, pixels: NDArray[np.float64]) -> int:
+    def shows(self, pixels: Array) -> int:
         """How many of these places are within the image's margin."""
         last = np.array([self.shape[1] - 1.0, self.shape[0] - 1.0]) - self.margin
         return int(((pixels > self.margin) & (pixels < last)).all(axis=1).sum())
@@ -47,37 +41,18 @@ class Arrangement:
 
 @dataclass(frozen=True)
 class DotMatch:
-    """Which dots are the same.
-
-    Parameters
-    ----------
-    first, second : ndarray
-        Numbers of the dots in both images that belong together, shape (n,).
-    warnings : tuple of str
-        Why it cannot be trusted, a sentence each.
-    """
+    """Which dots are the same."""
 
     first: NDArray[np.int64]
     second: NDArray[np.int64]
+    """Numbers of the dots in both images that belong together, shape (n,)."""
     warnings: tuple[str, ...]
+    """Why it cannot be trusted, a sentence each."""
 
 
 def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
     """Match dots by their arrangement.
 
-    Parameters
-    ----------
-    first, second : Arrangement
-        The dots of both images.
-
-    Raises
-    ------
-    ValueError
-        If the arrangements do not match: fewer than six dots, or less than half of those that
-        both images should show.
-
-    Notes
-    -----
     Each pair of neighbours in the one is put on each in the other, not mirrored, turned by up to
     30 degrees, the image's width half to twice as wide; the best of these placements are fitted by
     an affine map. A dot that the other image should show, and does not, speaks against a placement
@@ -111,7 +86,7 @@ def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
 class _Placement:
     """An affine map (2, 3), the pairs that match, and the dots that speak against it."""
 
-    matrix: NDArray[np.float64]
+    matrix: Array
     pairs: NDArray[np.int64]
     contradictions: int
 
@@ -124,7 +99,7 @@ class _Placement:
 
 
 def _rivals(
-    best: _Placement, judged: list[_Placement], first: NDArray[np.float64], spacing: float
+    best: _Placement, judged: list[_Placement], first: Array, spacing: float
 ) -> tuple[str, ...]:
     """A warning for the best other placement that hardly more speaks against."""
     others = [
@@ -144,12 +119,12 @@ def _rivals(
 
 
 def _hypotheses(
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
+    first: Array,
+    second: Array,
     nominal: float,
     tree: KDTree,
     spacing: float,
-) -> list[NDArray[np.float64]]:
+) -> list[Array]:
     """Similarities that put a pair of neighbours on another, most matches first: (2, 3) each."""
     middle = np.argsort(np.hypot(*(first - np.median(first, axis=0)).T))[:_BASES]
     near = KDTree(first).query(first[middle], min(_NEAREST + 1, len(first)))[1][:, 1:]
@@ -174,10 +149,8 @@ def _hypotheses(
     return [matrix for _, matrix in found[:_TRIED]]
 
 
-def _distinct(
-    matrices: list[NDArray[np.float64]], first: NDArray[np.float64], spacing: float
-) -> list[NDArray[np.float64]]:
-    kept: list[NDArray[np.float64]] = []
+def _distinct(matrices: list[Array], first: Array, spacing: float) -> list[Array]:
+    kept: list[Array] = []
     for matrix in matrices:
         if all(_distance(matrix, other, first) > spacing / 2 for other in kept):
             kept.append(matrix)
@@ -187,8 +160,8 @@ def _distinct(
 
 
 def _fitted(
-    matrix: NDArray[np.float64], first: NDArray[np.float64], tree: KDTree, spacing: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    matrix: Array, first: Array, tree: KDTree, spacing: float
+) -> tuple[Array, NDArray[np.int64]] | None:
     """Affine map of the matches near a placement, and these: (2, n)."""
     whole = np.column_stack([first, np.ones(len(first))])
     pairs = _pairs(whole @ matrix.T, tree, spacing)
@@ -202,7 +175,7 @@ def _fitted(
     return matrix, pairs
 
 
-def _pairs(placed: NDArray[np.float64], tree: KDTree, spacing: float) -> NDArray[np.int64]:
+def _pairs(placed: Array, tree: KDTree, spacing: float) -> NDArray[np.int64]:
     """Dots that are each other's nearest and near, shape (2, n)."""
     distance, which = tree.query(placed)
     back = KDTree(placed).query(tree.data)[1]
@@ -211,7 +184,7 @@ def _pairs(placed: NDArray[np.float64], tree: KDTree, spacing: float) -> NDArray
 
 
 def _contradictions(
-    matrix: NDArray[np.float64],
+    matrix: Array,
     first: Arrangement,
     second: Arrangement,
     pairs: NDArray[np.int64],
@@ -223,9 +196,7 @@ def _contradictions(
     return second.shows(np.asarray(there)) + first.shows(np.asarray(back))
 
 
-def _distance(
-    one: NDArray[np.float64], other: NDArray[np.float64], places: NDArray[np.float64]
-) -> float:
+def _distance(one: Array, other: Array, places: Array) -> float:
     """Median distance of where two maps put places."""
     apart = places @ (one - other)[:, :2].T + (one - other)[:, 2]
     return float(np.median(np.hypot(apart[:, 0], apart[:, 1])))

@@ -11,6 +11,7 @@ from scipy.special import erfc
 
 from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
 from chipglow.laboratory.registration.registration import Model, PointFit, Registration, fit_points
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -42,39 +43,25 @@ _NOT_MIRRORED: Final = (
 
 @dataclass(frozen=True)
 class Dots:
-    """Dots of one size in an image.
+    """Dots of one size in an image."""
 
-    Parameters
-    ----------
-    pixels : ndarray
-        Column and row of their middles, from 0 in the middle of the upper left pixel, shape (n, 2).
-    uncertainty : ndarray
-        Standard uncertainty of a column or a row in pixels, shape (n,).
-    radius : float
-        Of most of them, in pixels.
-    bright : bool
-        Whether they are brighter than what is around them.
+    pixels: Array
+    """Column and row of their middles, from 0 in the middle of the upper left pixel, shape (n, 2).
     """
-
-    pixels: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
+    uncertainty: Array
+    """Standard uncertainty of a column or a row in pixels, shape (n,)."""
     radius: float
+    """Of most of them, in pixels."""
     bright: bool
+    """Whether they are brighter than what is around them."""
 
 
 @dataclass(frozen=True)
 class DotFit:
-    """A registration from dots that both cameras saw.
-
-    Parameters
-    ----------
-    points : PointFit
-        The registration, with the dots that were seen in both and their residuals.
-    infrared, visible : Dots
-        All that were found.
-    """
+    """A registration from dots that both cameras saw."""
 
     points: PointFit
+    """The registration, with the dots that were seen in both and their residuals."""
     infrared: Dots
     visible: Dots
 
@@ -140,20 +127,6 @@ def fit_dots(
 def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     """Find the dots of a target, brighter or darker than what is around them.
 
-    Parameters
-    ----------
-    image : ndarray
-        Brightness, NaN where it is not known; shape (rows, columns).
-    name : str
-        What to call it in an error.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than six.
-
-    Notes
-    -----
     Extrema of the normalised Laplacian of Gaussians over place and size (Lindeberg, Int. J. Comput.
     Vision 30 (1998) 79) that are round: of these the group of like size, contrast and sign that
     stands out most. The middle is that of a disc with a soft edge, in light that falls off
@@ -181,7 +154,7 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     )
 
 
-def _strengths(image: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _strengths(image: Array) -> tuple[Array, Array]:
     """Sizes in pixels, and the normalised Laplacian of each, shape (size, y, x)."""
     count = int(np.log(min(image.shape) * _GREATEST_SIZE / _LEAST_SIZE) / np.log(_NEXT_SIZE))
     sizes = _LEAST_SIZE * _NEXT_SIZE ** np.arange(max(count, 1) + 1)
@@ -189,9 +162,7 @@ def _strengths(image: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray
     return np.asarray(sizes), np.stack(found)
 
 
-def _blobs(
-    image: NDArray[np.float64], sizes: NDArray[np.float64], strength: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _blobs(image: Array, sizes: Array, strength: Array) -> Array:
     """Column, row, size and strength of the strongest round extrema, shape (n, 4)."""
     level, row, column = np.nonzero((strength == maximum_filter(strength, 3)) & (strength > 0))
     size, found = sizes[level], strength[level, row, column]
@@ -204,7 +175,7 @@ def _blobs(
     return _apart(blobs[_roundness(image, blobs) > _ROUND])
 
 
-def _apart(blobs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _apart(blobs: Array) -> Array:
     """Blobs in order of strength, without those that lie on a stronger one."""
     left, kept = blobs, []
     while len(left):
@@ -213,7 +184,7 @@ def _apart(blobs: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array(kept).reshape(-1, 4)
 
 
-def _roundness(image: NDArray[np.float64], blobs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _roundness(image: Array, blobs: Array) -> Array:
     """Determinant of the Hessian over that of a circle with the same trace: 1 if round."""
     found = np.zeros(len(blobs))
     for size in np.unique(blobs[:, 2]):
@@ -226,12 +197,12 @@ def _roundness(image: NDArray[np.float64], blobs: NDArray[np.float64]) -> NDArra
     return found
 
 
-def _weight(blobs: NDArray[np.float64]) -> float:
+def _weight(blobs: Array) -> float:
     """Squares of the strength, of which many small blobs of noise have less than some of dots."""
     return float((blobs[:, 3] ** 2 * blobs[:, 2]).sum())
 
 
-def _alike(blobs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _alike(blobs: Array) -> Array:
     """The group of like size and strength with the greatest weight."""
     best = blobs[:0]
     for size, strength in blobs[:, 2:].tolist():
@@ -253,20 +224,18 @@ class _Disc:
     softness: float
     contrast: float
     size: float
-    residual: NDArray[np.float64]
+    residual: Array
 
-    def brightness(
-        self, columns: NDArray[np.float64], rows: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def brightness(self, columns: Array, rows: Array) -> Array:
         """Over that of the ground."""
         distance = np.hypot(columns - self.column, rows - self.row)
         return np.asarray(self.contrast * erfc((distance - self.radius) / self.softness) / 2)
 
 
 def _discs(
-    image: NDArray[np.float64],
+    image: Array,
     known: NDArray[np.bool_],
-    blobs: NDArray[np.float64],
+    blobs: Array,
     bright: bool,
 ) -> list[_Disc]:
     """Discs of like radius at blobs, fitted again without the skirts of their neighbours."""
@@ -290,7 +259,7 @@ def _settled(before: list[_Disc], discs: list[_Disc]) -> bool:
     return len(before) == len(discs) and max(moves, default=0.0) < _SETTLED
 
 
-def _without(image: NDArray[np.float64], discs: list[_Disc]) -> NDArray[np.float64]:
+def _without(image: Array, discs: list[_Disc]) -> Array:
     """An image without the discs."""
     rest = image.copy()
     for disc in discs:
@@ -302,7 +271,7 @@ def _without(image: NDArray[np.float64], discs: list[_Disc]) -> NDArray[np.float
 
 def _window(
     shape: tuple[int, ...], column: float, row: float, reach: float
-) -> tuple[tuple[slice, slice], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[tuple[slice, slice], Array, Array]:
     """The part of an image round a place, and its columns and rows."""
     part = (
         slice(max(round(row - reach), 0), min(round(row + reach) + 1, shape[0])),
@@ -320,7 +289,7 @@ def _like(found: list[_Disc | None], bright: bool) -> list[_Disc]:
 
 
 def _disc(
-    image: NDArray[np.float64],
+    image: Array,
     known: NDArray[np.bool_],
     column: float,
     row: float,
@@ -339,7 +308,7 @@ def _disc(
     scale = float(np.ptp(values[used]))
     target = values[used] / scale
 
-    def residual(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(p: Array) -> Array:
         edge = (np.hypot(x - p[0], y - p[1]) - p[2]) / p[3]
         light = 1.0 + p[6] * x + p[7] * y
         return np.asarray((p[4] * erfc(edge) / 2 + p[5]) * light - target)
@@ -379,7 +348,7 @@ def _correlation(discs: list[_Disc]) -> float:
     return float(np.sqrt(max(sums / max(squares, 1e-300), 1.0)))
 
 
-def _systematic(found: Registration, raster: Raster) -> NDArray[np.float64]:
+def _systematic(found: Registration, raster: Raster) -> Array:
     """Covariance of shift, turn and scale that are a little wrong in the same way for all dots."""
     left, right, bottom, top = raster.extent
     middle = np.array([(left + right) / 2, (bottom + top) / 2])

@@ -12,6 +12,7 @@ from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import WIDTH
 from chipglow.drawing.scales import HEAT, KELVIN, VERMILLION
 from chipglow.laboratory.registration.registration import Registration
+from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 
 _FACE: Final = 3e-3
@@ -26,25 +27,9 @@ def draw_registration(
     raster: Raster,
     visible: NDArray[Any],
     tool: Tool | None = None,
-    points: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    points: tuple[Array, Array] | None = None,
 ) -> Figure:
-    """Draw the infrared image, and the visible picture with the infrared one laid over it.
-
-    Parameters
-    ----------
-    registration : Registration
-        The map.
-    temperature : ndarray
-        Radiance temperature in K, NaN where there is none, shape `raster.shape`.
-    raster : Raster
-        The infrared pixels.
-    visible : ndarray
-        Brightness, shape (rows, columns).
-    tool : Tool, optional
-        Its outline is drawn on both.
-    points : tuple of ndarray, optional
-        Points that were given: positions in m, and visible columns and rows.
-    """
+    """Draw the infrared image, and the visible picture with the infrared one laid over it."""
     celsius = np.asarray(temperature) - KELVIN
     limits = scales.ends(celsius, 0.5, 99.8, 1.0)
     with drawing.style():
@@ -82,11 +67,6 @@ def blink_pictures(
     """Visible picture, and the infrared image as the visible camera would have it.
 
     Parameters are those of `draw_registration`.
-
-    Returns
-    -------
-    tuple of ndarray
-        Two pictures of one size to show in turns, red, green and blue, shape (rows, columns, 3).
     """
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - KELVIN, raster, shape)
@@ -100,7 +80,7 @@ def _rendered(
     registration: Registration,
     visible: NDArray[Any],
     tool: Tool | None,
-    celsius: NDArray[np.float64] | None = None,
+    celsius: Array | None = None,
     limits: tuple[float, float] = (0.0, 1.0),
 ) -> NDArray[np.uint8]:
     height = _BLINK_WIDTH * visible.shape[0] / visible.shape[1]

@@ -54,13 +54,7 @@ class RegistrationDescription(Settings[Registration]):
 
 
 def write_registration(registration: Registration, path: str | Path) -> None:
-    """Write a registration to a YAML file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write a registration to a YAML file."""
     finite = np.isfinite(registration.degrees_of_freedom)
     data = {
         "model": registration.model,

@@ -20,6 +20,7 @@ from chipglow.laboratory.registration.registration import (
     mapped_places,
     parameter_basis,
 )
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -55,29 +56,21 @@ _CLIMB: Final = {"gtol": 1e-7, "maxiter": 100}
 
 @dataclass(frozen=True)
 class ImageFit:
-    """A registration from the images themselves.
-
-    Parameters
-    ----------
-    registration : Registration
-        The map.
-    information : float
-        Mutual information of the images as they lie on each other, in bits a pixel.
-    common_edges : float
-        How well their edges lie on each other: what the registration makes as great as it can.
-    placement : float
-        Mutual information times common edges of the best of many placements, at a quarter of the
-        resolution.
-    by_chance : ndarray
-        The same for infrared images that are turned over and moved round, so that they have
-        nothing to do with the visible picture, shape (n,).
-    """
+    """A registration from the images themselves."""
 
     registration: Registration
     information: float
+    """Mutual information of the images as they lie on each other, in bits a pixel."""
     common_edges: float
+    """How well their edges lie on each other: what the registration makes as great as it can."""
     placement: float
-    by_chance: NDArray[np.float64]
+    """Mutual information times common edges of the best of many placements, at a quarter of the
+    resolution.
+    """
+    by_chance: Array
+    """The same for infrared images that are turned over and moved round, so that they have
+    nothing to do with the visible picture, shape (n,).
+    """
 
 
 def fit_images(
@@ -167,21 +160,21 @@ class _Level:
     `scale` is the number of visible pixels a sample.
     """
 
-    places: NDArray[np.float64]
+    places: Array
     bins: NDArray[np.int64]
-    edges: NDArray[np.float64]
+    edges: Array
     sharp: NDArray[np.bool_]
     blocks: NDArray[np.int64]
     codes: NDArray[np.int64]
-    lines: NDArray[np.float64]
+    lines: Array
     bin_image: NDArray[np.int64]
-    edge_image: NDArray[np.float64]
+    edge_image: Array
     known: NDArray[np.bool_]
     pitch: float
     scale: float
 
     @cached_property
-    def directions(self) -> NDArray[np.float64]:
+    def directions(self) -> Array:
         return np.ascontiguousarray(self.lines[..., :2])
 
     @property
@@ -202,10 +195,10 @@ def _levels(
 
 
 def _level(
-    infrared: NDArray[np.float64],
+    infrared: Array,
     known: NDArray[np.bool_],
     raster: Raster,
-    visible: NDArray[np.float64],
+    visible: Array,
     step: int,
     scale: float,
 ) -> _Level:
@@ -236,7 +229,7 @@ def _level(
     )
 
 
-def _edges(image: NDArray[np.float64], scale: float, faint: float) -> NDArray[np.float64]:
+def _edges(image: Array, scale: float, faint: float) -> Array:
     """Gradient a sample, over the contrast of the surroundings and what is faint: (2, y, x)."""
     down, right = np.gradient(image)
     mean = gaussian_filter(image, _WINDOW * scale)
@@ -245,7 +238,7 @@ def _edges(image: NDArray[np.float64], scale: float, faint: float) -> NDArray[np
     return np.asarray(np.stack([right, down]) * scale / np.sqrt(variance + faint**2))
 
 
-def _sharp(edges: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _sharp(edges: Array) -> NDArray[np.bool_]:
     """The fewest samples that have nearly all of the squares of the edges."""
     squares = (edges**2).sum(axis=-1)
     order = np.argsort(squares)[::-1]
@@ -253,12 +246,12 @@ def _sharp(edges: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(squares >= least)
 
 
-def _noise(image: NDArray[np.float64]) -> float:
+def _noise(image: Array) -> float:
     """Standard deviation of the noise: of a pixel's distance from the median around it."""
     return 1.4826 * float(np.median(np.abs(image - median_filter(image, 3))))
 
 
-def _binned(image: NDArray[np.float64]) -> NDArray[np.int64]:
+def _binned(image: Array) -> NDArray[np.int64]:
     """Bins of equal width from nearly the least to nearly the greatest value."""
     low, high = np.percentile(image, _ENDS)
     fraction = (image - low) / max(high - low, np.finfo(float).tiny)
@@ -273,9 +266,7 @@ def _frame(raster: Raster, shape: tuple[int, ...]) -> NormalisedFrame:
     return NormalisedFrame(centre, radius, middle, radius * shape[1] / (right - left))
 
 
-def _pixels(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _pixels(level: _Level, frame: NormalisedFrame, matrix: Array) -> Array:
     unit = mapped_places(matrix, frame.unit(level.places))
     return unit * frame.pixel_scale + frame.pixel_centre
 
@@ -288,9 +279,9 @@ def _sample(level: _Level, frame: NormalisedFrame) -> float:
 # The choice among placements
 
 
-def _placements(level: _Level, frame: NormalisedFrame) -> list[NDArray[np.float64]]:
+def _placements(level: _Level, frame: NormalisedFrame) -> list[Array]:
     """The best placements on a grid that are apart from each other, the best first."""
-    found: list[tuple[float, NDArray[np.float64]]] = []
+    found: list[tuple[float, Array]] = []
     for scale, turn in product(_SCALES, _TURNS):
         matrix = np.eye(3)
         angle = radians(turn)
@@ -300,7 +291,7 @@ def _placements(level: _Level, frame: NormalisedFrame) -> list[NDArray[np.float6
     if not found:
         raise ValueError("images: they do not lie on each other, expected views of one thing")
     found.sort(key=lambda entry: entry[0], reverse=True)
-    kept: list[NDArray[np.float64]] = []
+    kept: list[Array] = []
     for _, matrix in found:
         if all(_apart(matrix, other, level, frame) > _APART for other in kept):
             kept.append(matrix)
@@ -312,9 +303,9 @@ def _placements(level: _Level, frame: NormalisedFrame) -> list[NDArray[np.float6
 def _shifted_scores(
     level: _Level,
     frame: NormalisedFrame,
-    matrix: NDArray[np.float64],
+    matrix: Array,
     bins: NDArray[np.int64],
-    edges: NDArray[np.float64],
+    edges: Array,
 ) -> Iterator[tuple[float, tuple[float, float]]]:
     """Mutual information times common edges for each shift on the grid."""
     pixels = _pixels(level, frame, matrix)
@@ -328,9 +319,9 @@ def _shifted_scores(
 
 def _score(
     level: _Level,
-    pixels: NDArray[np.float64],
+    pixels: Array,
     bins: NDArray[np.int64],
-    edges: NDArray[np.float64],
+    edges: Array,
 ) -> float | None:
     """Mutual information times common edges of samples at pixels; None if too few overlap."""
     column, row = np.rint(pixels).astype(np.int64).T
@@ -344,21 +335,19 @@ def _score(
     return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
 
 
-def _shared(joint: NDArray[np.float64]) -> float:
+def _shared(joint: Array) -> float:
     """Mutual information in nats of a joint histogram, times its sum: all that is shared."""
     apart = np.outer(joint.sum(axis=1), joint.sum(axis=0))
     filled = joint > 0
     return float((joint[filled] * np.log(joint[filled] * joint.sum() / apart[filled])).sum())
 
 
-def _against_chance(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
-) -> tuple[float, NDArray[np.float64]]:
+def _against_chance(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[float, Array]:
     """Best score over all shifts: of the image, and of images that have nothing to do with it."""
     linear = matrix.copy()
     linear[:2, 2] = 0.0
 
-    def best(bins: NDArray[np.int64], edges: NDArray[np.float64]) -> float:
+    def best(bins: NDArray[np.int64], edges: Array) -> float:
         scores = _shifted_scores(level, frame, linear, bins, edges)
         return max((score for score, _ in scores), default=0.0)
 
@@ -374,15 +363,13 @@ def _against_chance(
     return best(level.bins, level.edges), np.array(chance)
 
 
-def _shifted(matrix: NDArray[np.float64], shift: tuple[float, float]) -> NDArray[np.float64]:
+def _shifted(matrix: Array, shift: tuple[float, float]) -> Array:
     moved = matrix.copy()
     moved[:2, 2] += shift
     return moved
 
 
-def _apart(
-    one: NDArray[np.float64], other: NDArray[np.float64], level: _Level, frame: NormalisedFrame
-) -> float:
+def _apart(one: Array, other: Array, level: _Level, frame: NormalisedFrame) -> float:
     """Distance of two maps of the image in samples: where it is greatest, of two corners."""
     corners = frame.unit(level.places[[0, -1]])
     apart = mapped_places(one, corners) - mapped_places(other, corners)
@@ -392,20 +379,18 @@ def _apart(
 # The climb
 
 
-def _last(fit: tuple[NDArray[np.float64], float]) -> float:
+def _last(fit: tuple[Array, float]) -> float:
     return fit[1]
 
 
-def _settled(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], float]:
+def _settled(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[Array, float]:
     """The similarity near a matrix with the best score, and that."""
     basis = _scaled_basis(level, frame, matrix, "similarity")
 
-    def moved(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(matrix + (basis @ parameters).reshape(3, 3))
+    def moved(parameters: Array) -> Array:
+        return matrix + (basis @ parameters).reshape(3, 3)
 
-    def loss(parameters: NDArray[np.float64]) -> float:
+    def loss(parameters: Array) -> float:
         pixels = _pixels(level, frame, moved(parameters))
         return -(_score(level, pixels, level.bins, level.edges) or 0.0)
 
@@ -414,17 +399,15 @@ def _settled(
 
 
 def _narrowed(
-    coarse: _Level, middle: _Level, frame: NormalisedFrame, candidates: list[NDArray[np.float64]]
-) -> list[NDArray[np.float64]]:
+    coarse: _Level, middle: _Level, frame: NormalisedFrame, candidates: list[Array]
+) -> list[Array]:
     """Candidates after a search at a quarter and at half of the resolution, the best first."""
     found = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
     fits = sorted((_settled(middle, frame, matrix) for matrix in found), key=_last)
     return [matrix for matrix, _ in fits[::-1]]
 
 
-def _surveyed(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
-) -> list[NDArray[np.float64]]:
+def _surveyed(level: _Level, frame: NormalisedFrame, matrix: Array) -> list[Array]:
     """The best similarities on a grid of shifts, turns and scales around a matrix."""
     basis = _scaled_basis(level, frame, matrix, "similarity")
     unit, thin = frame.unit(level.places[::_THINNED]), slice(None, None, _THINNED)
@@ -439,12 +422,12 @@ def _surveyed(
 
 
 def _climb(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], model: Model
-) -> tuple[NDArray[np.float64], float]:
+    level: _Level, frame: NormalisedFrame, matrix: Array, model: Model
+) -> tuple[Array, float]:
     """Matrix of the most common edges near a matrix, and those."""
     basis = _scaled_basis(level, frame, matrix, model)
 
-    def loss(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def loss(parameters: Array) -> tuple[float, Array]:
         moved = matrix + (basis @ parameters).reshape(3, 3)
         common, slopes, _ = _common_edges(level, frame, moved, basis)
         return -common, -slopes.sum(axis=0)
@@ -453,17 +436,15 @@ def _climb(
     return matrix + (basis @ found.x).reshape(3, 3), -float(found.fun)
 
 
-def _scaled_basis(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], model: Model
-) -> NDArray[np.float64]:
+def _scaled_basis(level: _Level, frame: NormalisedFrame, matrix: Array, model: Model) -> Array:
     """Basis by which a parameter of 1 moves the image's corner by one sample."""
     mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
     return parameter_basis(model, mirrored) * _sample(level, frame)
 
 
 def _common_edges(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], basis: NDArray[np.float64]
-) -> tuple[float, NDArray[np.float64], NDArray[np.bool_]]:
+    level: _Level, frame: NormalisedFrame, matrix: Array, basis: Array
+) -> tuple[float, Array, NDArray[np.bool_]]:
     """Mean of (g_i . g_v)^2, what each sharp sample adds to its slope, and which of them do."""
     places, edges = frame.unit(level.places[level.sharp]), level.edges[level.sharp]
     pixels = mapped_places(matrix, places) * frame.pixel_scale + frame.pixel_centre
@@ -481,7 +462,7 @@ def _common_edges(
     return common, np.einsum("ni,nik->nk", pull, slopes), here
 
 
-def _between(fields: NDArray[np.float64], pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between(fields: Array, pixels: Array) -> Array:
     """Fields of shape (rows, columns, k) between their pixels, bilinear, shape (n, k)."""
     first = np.floor(np.minimum(pixels, np.array(fields.shape[1::-1]) - 1.000001)).astype(np.int64)
     (right, down), (column, row) = (pixels - first).T[..., None], first.T
@@ -490,9 +471,7 @@ def _between(fields: NDArray[np.float64], pixels: NDArray[np.float64]) -> NDArra
     return np.asarray(upper * (1 - down) + lower * down)
 
 
-def _window(
-    pixels: NDArray[np.float64], shape: tuple[int, ...], fade: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _window(pixels: Array, shape: tuple[int, ...], fade: float) -> tuple[Array, Array]:
     """Weight of samples, falling to 0 at the picture's border, and its slope by the pixel."""
     last = np.array([shape[1] - 1.0, shape[0] - 1.0])
     room = np.minimum(pixels, last - pixels) / fade
@@ -504,7 +483,7 @@ def _window(
 # The verdict
 
 
-def _information(level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]) -> float:
+def _information(level: _Level, frame: NormalisedFrame, matrix: Array) -> float:
     """Mutual information in bits a sample."""
     column, row = np.rint(_pixels(level, frame, matrix)).astype(np.int64).T
     rows, columns = level.codes.shape
@@ -515,7 +494,7 @@ def _information(level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float
 
 
 def _rivals(
-    fits: list[tuple[NDArray[np.float64], float]], level: _Level, frame: NormalisedFrame
+    fits: list[tuple[Array, float]], level: _Level, frame: NormalisedFrame
 ) -> tuple[str, ...]:
     """A warning for the best other placement that is nearly as good."""
     best, most = fits[0]
@@ -540,12 +519,12 @@ def _unsure(found: Registration, raster: Raster) -> tuple[str, ...]:
 
 
 def _sandwich(
-    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], basis: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], bool]:
+    level: _Level, frame: NormalisedFrame, matrix: Array, basis: Array
+) -> tuple[Array, bool]:
     """Covariance of the parameters, and whether there is no optimum."""
     count, step = basis.shape[1], 0.25
 
-    def slope(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slope(parameters: Array) -> Array:
         moved = matrix + (basis @ parameters).reshape(3, 3)
         return np.asarray(_common_edges(level, frame, moved, basis)[1].sum(axis=0))
 

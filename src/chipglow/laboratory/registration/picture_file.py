@@ -19,28 +19,7 @@ _TURN: Final = 600
 
 
 def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
-    """Read what a visible camera saw.
-
-    Parameters
-    ----------
-    path : str or Path
-        A picture, of several pages or not, or a file that `read_recording` knows, such as CINE.
-    interval : float, optional
-        Time between frames in s, for files that do not say it; without it pictures are numbered,
-        a second apart.
-
-    Returns
-    -------
-    Recording
-        Brightness as counts; of colours their luminance.
-
-    Raises
-    ------
-    ValueError
-        If it is no picture, or cut short; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """Read what a visible camera saw."""
     path = Path(path)
     if path.suffix.lower() in PICTURE_SUFFIXES:
         frames = _frames(path)
@@ -76,20 +55,7 @@ def _brightness(page: Image.Image) -> NDArray[np.float32]:
 
 
 def write_blink(pictures: tuple[NDArray[np.uint8], ...], path: str | Path) -> None:
-    """Write pictures that are shown in turns, again and again, as a GIF.
-
-    Parameters
-    ----------
-    pictures : tuple of ndarray
-        Red, green and blue, shape (rows, columns, 3), all of one size.
-    path : str or Path
-        The file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
+    """Write pictures that are shown in turns, again and again, as a GIF."""
     first, *others = (Image.fromarray(picture).quantize(255) for picture in pictures)
     with atomic_path(path) as temporary:
         first.save(temporary, "GIF", save_all=True, append_images=others, duration=_TURN, loop=0)

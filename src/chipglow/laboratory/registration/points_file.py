@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.text import read_small_text
 
@@ -19,33 +19,8 @@ _HALF: Final = 0.5
 
 def read_points(
     path: str | os.PathLike[str], raster: Raster, shape: tuple[int, int]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read points from a CSV file.
-
-    Parameters
-    ----------
-    path : path-like
-        First line ``x_um,y_um,visible_column,visible_row`` or
-        ``infrared_column,infrared_row,visible_column,visible_row``, then a point a line. Columns
-        and rows count from 0 in the middle of the upper left pixel.
-    raster : Raster
-        The infrared pixels.
-    shape : tuple of int
-        Rows and columns of the visible picture.
-
-    Returns
-    -------
-    positions, pixels : ndarray
-        x and y in m, and visible columns and rows, each of shape (n, 2).
-
-    Raises
-    ------
-    ValueError
-        If the file is no such table or a point is outside an image; the message names the file
-        and the line.
-    OSError
-        If it cannot be read.
-    """
+) -> tuple[Array, Array]:
+    """Read points from a CSV file."""
     path = Path(path)
     lines = read_small_text(path).rstrip().splitlines()
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
@@ -75,8 +50,8 @@ def _point(path: Path, line: int, row: list[str]) -> list[float]:
 
 def _check_inside(
     path: Path,
-    points: NDArray[np.float64],
-    positions: NDArray[np.float64],
+    points: Array,
+    positions: Array,
     raster: Raster,
     shape: tuple[int, int],
 ) -> None:

@@ -14,39 +14,24 @@ from chipglow.laboratory.registration.time_alignment import (
     region_signals,
     simultaneous_frames,
 )
+from chipglow.quantities import Array
 from chipglow.text import Notes
 
 
 @dataclass(frozen=True, eq=False)
 class RecordingAlignment:
-    """The clocks of two recordings; made by `align_recordings`.
-
-    Parameters
-    ----------
-    clocks : TimeAlignment
-        How they go by each other.
-    infrared_times : ndarray
-        When each infrared integration began in s, shape (n,).
-    visible_frames : list of ndarray
-        Numbers of the visible frames that were exposed within each, from 0.
-    notes : Notes
-        Assumptions, and warnings of the clocks.
-    """
+    """The clocks of two recordings; made by `align_recordings`."""
 
     clocks: TimeAlignment
-    infrared_times: NDArray[np.float64]
+    """How they go by each other."""
+    infrared_times: Array
+    """When each infrared integration began in s, shape (n,)."""
     visible_frames: list[NDArray[np.int64]]
+    """Numbers of the visible frames that were exposed within each, from 0."""
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every infrared frame, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``infrared_frame``, ``infrared_time_us`` and ``visible_frames``, their numbers
-            with blanks between them.
-        """
+        """Every infrared frame, a row each."""
         return pd.DataFrame(
             {
                 "infrared_frame": np.arange(self.infrared_times.size),
@@ -62,26 +47,7 @@ def align_recordings(
     visible: Recording,
     region: tuple[float, float, float, float],
 ) -> RecordingAlignment:
-    """Find the offset of two cameras' clocks by the mean brightness of a region.
-
-    Parameters
-    ----------
-    registration : Registration
-        Where the infrared image is in the visible picture.
-    infrared : Measurement
-        Frames of the infrared camera.
-    visible : Recording
-        Frames of the visible one. Without an integration time it is taken to be exposed all the
-        time.
-    region : tuple of float
-        Left, bottom, right and top in m, in the measurement's coordinates.
-
-    Raises
-    ------
-    ValueError
-        If the measurement states no integration time, the region is outside an image, or as
-        `align_times`.
-    """
+    """Find the offset of two cameras' clocks by the mean brightness of a region."""
     if "integration_time" not in infrared.data.attrs:
         raise ValueError("the measurement does not state its integration_time")
     integration = float(infrared.data.attrs["integration_time"])
@@ -101,15 +67,7 @@ def align_recordings(
     return RecordingAlignment(clocks, times, within, notes)
 
 
-def infrared_radiance(measurement: Measurement, frame: int) -> NDArray[np.float64]:
-    """Radiance of a frame as `fit_images` and `fit_dots` take it: NaN where a pixel is dead.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Frames of the infrared camera.
-    frame : int
-        Number of the frame, from 0.
-    """
+def infrared_radiance(measurement: Measurement, frame: int) -> Array:
+    """Radiance of a frame as `fit_images` and `fit_dots` take it: NaN where a pixel is dead."""
     dead = measurement.flags[frame] & Flag.DEAD > 0
     return np.where(dead, np.nan, measurement.radiance[frame])

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -29,21 +30,13 @@ _BEST_PICKED: Final = 0.02
 
 
 class Geometry(NamedTuple):
-    """How a visible picture lies on an infrared image.
-
-    Parameters
-    ----------
-    pixel_size : float
-        Side of a visible pixel in m.
-    turn : float
-        In degrees.
-    mirrored : bool
-        Whether one is the mirror image of the other.
-    """
+    """How a visible picture lies on an infrared image."""
 
     pixel_size: float
+    """Side of a visible pixel in m."""
     turn: float
     mirrored: bool
+    """Whether one is the mirror image of the other."""
 
 
 @dataclass(frozen=True)
@@ -53,35 +46,20 @@ class Registration:
     A position (x, y) in m becomes (column, row) = (X / W, Y / W) with
     (X, Y, W) = `matrix` (x, y, 1). Columns and rows count from 0 in the middle of the upper left
     pixel.
-
-    Parameters
-    ----------
-    matrix : ndarray
-        Shape (3, 3), its last element 1.
-    covariance : ndarray
-        Covariance of the elements of the matrix, row by row, shape (9, 9).
-    model : {"similarity", "affine", "homography"}
-        What the matrix may be.
-    method : {"points", "dots", "mutual-information"}
-        How it was found.
-    degrees_of_freedom : float
-        Of the covariance: Student's t with so many gives the intervals; infinite for mutual
-        information.
-    notes : Notes
-        Assumptions, and reasons why it may be wrong.
-
-    Raises
-    ------
-    ValueError
-        If a shape or a value is impossible.
     """
 
-    matrix: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    matrix: Array
+    """Shape (3, 3), its last element 1."""
+    covariance: Array
+    """Covariance of the elements of the matrix, row by row, shape (9, 9)."""
     model: Model
     method: Method
     degrees_of_freedom: float = np.inf
+    """Of the covariance: Student's t with so many gives the intervals; infinite for mutual
+    information.
+    """
     notes: Notes = field(default_factory=Notes)
+    """Assumptions, and reasons why it may be wrong."""
 
     def __post_init__(self) -> None:
         for name, value, shape in (
@@ -104,42 +82,31 @@ class Registration:
                 f"registration: degrees_of_freedom is {self.degrees_of_freedom!r}, expected over 0"
             )
 
-    def pixels(self, positions: ArrayLike) -> NDArray[np.float64]:
+    def pixels(self, positions: ArrayLike) -> Array:
         """Column and row in the visible picture of positions x, y in m, shape (..., 2)."""
         return mapped_places(self.matrix, np.asarray(positions, np.float64))
 
-    def positions(self, pixels: ArrayLike) -> NDArray[np.float64]:
+    def positions(self, pixels: ArrayLike) -> Array:
         """Position x, y in m of columns and rows of the visible picture, shape (..., 2)."""
         back = np.asarray(np.linalg.inv(self.matrix), np.float64)
         return mapped_places(back, np.asarray(pixels, np.float64))
 
-    def pixel_covariance(self, positions: ArrayLike) -> NDArray[np.float64]:
+    def pixel_covariance(self, positions: ArrayLike) -> Array:
         """Covariance of `pixels` in pixels², shape (..., 2, 2)."""
         slope = element_slopes(self.matrix, np.asarray(positions, np.float64))
-        return np.asarray(slope @ self.covariance @ np.swapaxes(slope, -1, -2))
+        return slope @ self.covariance @ np.swapaxes(slope, -1, -2)
 
-    def position_covariance(self, positions: ArrayLike) -> NDArray[np.float64]:
-        """Covariance in m² of the position that is found for the pixel of each position.
-
-        Parameters
-        ----------
-        positions : array_like
-            x and y in m, shape (..., 2).
-
-        Returns
-        -------
-        ndarray
-            Shape (..., 2, 2).
-        """
+    def position_covariance(self, positions: ArrayLike) -> Array:
+        """Covariance in m² of the position that is found for the pixel of each position."""
         back = np.linalg.inv(self.jacobian(positions))
-        return np.asarray(back @ self.pixel_covariance(positions) @ np.swapaxes(back, -1, -2))
+        return back @ self.pixel_covariance(positions) @ np.swapaxes(back, -1, -2)
 
-    def jacobian(self, positions: ArrayLike) -> NDArray[np.float64]:
+    def jacobian(self, positions: ArrayLike) -> Array:
         """Pixels per m at positions: derivative of column and row by x and y, (..., 2, 2)."""
         places = np.asarray(positions, np.float64)
         depth = _depth(self.matrix, places)[..., None, None]
         pixels = self.pixels(places)[..., None]
-        return np.asarray((self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth)
+        return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
         """Standard uncertainty of a mapped position in m: median and greatest over an image.
@@ -159,25 +126,8 @@ class Registration:
         turn = float(np.degrees(np.arctan2(-slope[1, 0] * np.sign(area), slope[0, 0])))
         return Geometry(1 / float(np.sqrt(abs(area))), turn, area > 0)
 
-    def warp(
-        self, image: NDArray[np.floating], raster: Raster, shape: tuple[int, int]
-    ) -> NDArray[np.float64]:
-        """An infrared image as the visible camera would have it.
-
-        Parameters
-        ----------
-        image : ndarray
-            Values on the infrared camera's pixels, shape `raster.shape`.
-        raster : Raster
-            The pixels.
-        shape : tuple of int
-            Rows and columns of the visible picture.
-
-        Returns
-        -------
-        ndarray
-            The value of the nearest pixel for each visible pixel, NaN where there is none.
-        """
+    def warp(self, image: NDArray[np.floating], raster: Raster, shape: tuple[int, int]) -> Array:
+        """An infrared image as the visible camera would have it."""
         rows, columns = np.indices(shape)
         place = self.positions(np.stack([columns, rows], axis=-1))
         column = np.floor((place[..., 0] - raster.left) / raster.spacing)
@@ -190,38 +140,21 @@ class Registration:
 
 @dataclass(frozen=True)
 class PointFit:
-    """A registration from points that were seen in both images.
-
-    Parameters
-    ----------
-    registration : Registration
-        The map.
-    residuals : ndarray
-        Found less given column and row of each point in visible pixels, shape (n, 2).
-    scatter : float
-        Standard deviation of a point's column or row in visible pixels: of both pickings.
-    misplaced : ndarray
-        Whether a point lies farther off than the others make likely, shape (n,).
-    positions, pixels : ndarray
-        The points: x and y in m, and column and row in the visible picture, each of shape (n, 2).
-    """
+    """A registration from points that were seen in both images."""
 
     registration: Registration
-    residuals: NDArray[np.float64]
+    residuals: Array
+    """Found less given column and row of each point in visible pixels, shape (n, 2)."""
     scatter: float
+    """Standard deviation of a point's column or row in visible pixels: of both pickings."""
     misplaced: NDArray[np.bool_]
-    positions: NDArray[np.float64]
-    pixels: NDArray[np.float64]
+    """Whether a point lies farther off than the others make likely, shape (n,)."""
+    positions: Array
+    pixels: Array
+    """The points: x and y in m, and column and row in the visible picture, each of shape (n, 2)."""
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point, a row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``point``, from 1, ``x_um``, ``y_um``, ``visible_column``, ``visible_row``, and
-            how far off it is found in visible pixels, ``residual``.
-        """
+        """Every point, a row each."""
         return pd.DataFrame(
             {
                 "point": np.arange(1, len(self.positions) + 1),
@@ -306,29 +239,19 @@ def fit_points(
 
 @dataclass(frozen=True)
 class NormalisedFrame:
-    """Coordinates in which the numbers of a registration are of the order of 1.
+    """Coordinates in which the numbers of a registration are of the order of 1."""
 
-    Parameters
-    ----------
-    centre : ndarray
-        x and y in m that become 0.
-    scale : float
-        Length in m that becomes 1; y is turned round, so that it grows down as rows do.
-    pixel_centre : ndarray
-        Column and row that become 0.
-    pixel_scale : float
-        Visible pixels that become 1.
-    """
-
-    centre: NDArray[np.float64]
+    centre: Array
+    """x and y in m that become 0."""
     scale: float
-    pixel_centre: NDArray[np.float64]
+    """Length in m that becomes 1; y is turned round, so that it grows down as rows do."""
+    pixel_centre: Array
+    """Column and row that become 0."""
     pixel_scale: float
+    """Visible pixels that become 1."""
 
     @classmethod
-    def around(
-        cls, positions: NDArray[np.float64], pixels: NDArray[np.float64]
-    ) -> "NormalisedFrame":
+    def around(cls, positions: Array, pixels: Array) -> "NormalisedFrame":
         """The middle of points, and their distance from it, in both images."""
         centre, pixel_centre = positions.mean(axis=0), pixels.mean(axis=0)
         spreads = (
@@ -338,17 +261,15 @@ class NormalisedFrame:
         scale, pixel_scale = spreads
         return cls(centre, scale, pixel_centre, pixel_scale)
 
-    def unit(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unit(self, positions: Array) -> Array:
         """Positions in these coordinates."""
-        return np.asarray((positions - self.centre) / self.scale * [1.0, -1.0])
+        return (positions - self.centre) / self.scale * [1.0, -1.0]
 
-    def unit_pixels(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unit_pixels(self, pixels: Array) -> Array:
         """Columns and rows in these coordinates."""
-        return np.asarray((pixels - self.pixel_centre) / self.pixel_scale)
+        return (pixels - self.pixel_centre) / self.pixel_scale
 
-    def undone(
-        self, matrix: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
         """A matrix in these coordinates, and its covariance, for m and pixels."""
         before, after = self._sides()
         whole = after @ matrix @ before
@@ -360,7 +281,7 @@ class NormalisedFrame:
         full[2, 2] = 1.0
         return full, slope @ covariance @ slope.T
 
-    def _sides(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _sides(self) -> tuple[Array, Array]:
         x, y = self.centre / self.scale
         before = np.array([[1 / self.scale, 0, -x], [0, -1 / self.scale, y], [0, 0, 1]])
         column, row = self.pixel_centre
@@ -368,7 +289,7 @@ class NormalisedFrame:
         return before, after
 
 
-def parameter_basis(model: Model, mirrored: bool) -> NDArray[np.float64]:
+def parameter_basis(model: Model, mirrored: bool) -> Array:
     """Elements of a matrix by the parameters of a model, shape (9, parameters).
 
     The matrix is this times the parameters, and 1 for its last element.
@@ -384,19 +305,19 @@ def parameter_basis(model: Model, mirrored: bool) -> NDArray[np.float64]:
 
 
 def _least(
-    found: NDArray[np.float64], target: NDArray[np.float64], model: Model, mirrored: bool
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    found: Array, target: Array, model: Model, mirrored: bool
+) -> tuple[Array, Array, Array, Array]:
     """Basis, residuals, their slopes and the matrix of the least squares."""
     basis, last = parameter_basis(model, mirrored), np.eye(3)[2]
 
-    def matrix_of(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    def matrix_of(parameters: Array) -> Array:
         return (basis @ parameters).reshape(3, 3) + np.outer(last, last)
 
-    def residual(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray((mapped_places(matrix_of(parameters), found) - target).ravel())
+    def residual(parameters: Array) -> Array:
+        return (mapped_places(matrix_of(parameters), found) - target).ravel()
 
-    def slope(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray((element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k))
+    def slope(parameters: Array) -> Array:
+        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k)
 
     k = basis.shape[1]
     begin = _direct(found, target) if model == "homography" else _linear(found, target, basis)
@@ -404,14 +325,12 @@ def _least(
     return basis, residual(fit.x), slope(fit.x), matrix_of(fit.x)
 
 
-def _linear(
-    found: NDArray[np.float64], target: NDArray[np.float64], basis: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _linear(found: Array, target: Array, basis: Array) -> Array:
     slopes = (element_slopes(np.eye(3), found) @ basis).reshape(target.size, -1)
     return np.asarray(np.linalg.lstsq(slopes, target.ravel())[0])
 
 
-def _direct(found: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+def _direct(found: Array, target: Array) -> Array:
     """The direct linear solution of a homography: the least singular vector."""
     whole = np.concatenate([found, np.ones((len(found), 1))], axis=1)
     none = np.zeros_like(whole)
@@ -425,9 +344,7 @@ def _direct(found: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[
     return np.asarray(vector[:8] / vector[8])
 
 
-def _checked(
-    positions: ArrayLike, pixels: ArrayLike, model: Model
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _checked(positions: ArrayLike, pixels: ArrayLike, model: Model) -> tuple[Array, Array]:
     given, seen = np.asarray(positions, np.float64), np.asarray(pixels, np.float64)
     if model not in MODELS:
         raise ValueError(f"model: {model!r}, expected {', '.join(MODELS)}")
@@ -459,9 +376,7 @@ def _orientations(model: Model) -> tuple[bool, ...]:
     return (False, True) if model == "similarity" else (False,)
 
 
-def _misplaced(
-    residual: NDArray[np.float64], hat: NDArray[np.float64], variance: float, freedom: int
-) -> NDArray[np.bool_]:
+def _misplaced(residual: Array, hat: Array, variance: float, freedom: int) -> NDArray[np.bool_]:
     """The F test of every point against the scatter of the others, 1 % over all points."""
     count = residual.size // 2
     if freedom <= 2 or variance <= _EXACT**2:
@@ -476,18 +391,16 @@ def _misplaced(
     return misplaced
 
 
-def _depth(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _depth(matrix: Array, places: Array) -> Array:
     return np.asarray(places @ matrix[2, :2] + matrix[2, 2])
 
 
-def mapped_places(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def mapped_places(matrix: Array, places: Array) -> Array:
     """What a matrix makes of places, shape (..., 2)."""
-    return np.asarray(
-        (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
-    )
+    return (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
 
 
-def element_slopes(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def element_slopes(matrix: Array, places: Array) -> Array:
     """Derivative of what a matrix maps places to by its elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares, minimize_scalar
 from scipy.special import stdtr
 
 from chipglow.laboratory.registration.registration import Registration
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 
 _FEWEST: Final = 6
@@ -28,48 +29,37 @@ class TimeAlignment:
     """How the visible camera's clock goes by the infrared camera's.
 
     Visible time = infrared time + `offset` + `drift` (infrared time - `reference`).
-
-    Parameters
-    ----------
-    offset : float
-        In s, at the reference.
-    drift : float
-        In s/s; 0 where it was not asked for.
-    reference : float
-        In s of the infrared camera's clock.
-    covariance : ndarray
-        Covariance of offset and drift, shape (2, 2).
-    correlation : float
-        Of both signals as they lie on each other.
-    degrees_of_freedom : float
-        Of the covariance.
-    warnings : tuple of str
-        Why it cannot be trusted, a sentence each.
     """
 
     offset: float
+    """In s, at the reference."""
     drift: float
+    """In s/s; 0 where it was not asked for."""
     reference: float
-    covariance: NDArray[np.float64]
+    """In s of the infrared camera's clock."""
+    covariance: Array
+    """Covariance of offset and drift, shape (2, 2)."""
     correlation: float
+    """Of both signals as they lie on each other."""
     degrees_of_freedom: float
     warnings: tuple[str, ...] = ()
+    """Why it cannot be trusted, a sentence each."""
 
-    def visible_time(self, infrared_time: NDArray[np.float64]) -> NDArray[np.float64]:
+    def visible_time(self, infrared_time: Array) -> Array:
         """Times of the visible camera's clock in s."""
         return infrared_time + self.offset + self.drift * (infrared_time - self.reference)
 
-    def uncertainty(self, infrared_time: NDArray[np.float64]) -> NDArray[np.float64]:
+    def uncertainty(self, infrared_time: Array) -> Array:
         """Standard uncertainty of `visible_time` in s."""
         slope = np.stack([np.ones_like(infrared_time), infrared_time - self.reference], axis=-1)
         return np.asarray(np.sqrt(((slope @ self.covariance) * slope).sum(axis=-1)))
 
 
 def align_times(
-    infrared_times: NDArray[np.float64],
-    infrared_signal: NDArray[np.float64],
-    visible_times: NDArray[np.float64],
-    visible_signal: NDArray[np.float64],
+    infrared_times: Array,
+    infrared_signal: Array,
+    visible_times: Array,
+    visible_signal: Array,
     drift: bool = False,
 ) -> TimeAlignment:
     """Find the offset of two clocks from one signal that both cameras saw.
@@ -123,9 +113,9 @@ def align_times(
 
 def simultaneous_frames(
     alignment: TimeAlignment,
-    infrared_times: NDArray[np.float64],
+    infrared_times: Array,
     integration_time: float,
-    visible_times: NDArray[np.float64],
+    visible_times: Array,
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
     """Visible frames that were exposed within each infrared integration.
@@ -162,32 +152,8 @@ def region_signals(
     raster: Raster,
     visible: NDArray[np.generic],
     region: tuple[float, float, float, float],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean brightness of one region in every frame of both cameras.
-
-    Parameters
-    ----------
-    registration : Registration
-        Where the region is in the visible pictures.
-    infrared : ndarray
-        Radiance, shape (time, y, x).
-    raster : Raster
-        The infrared pixels.
-    visible : ndarray
-        Brightness, shape (frame, row, column).
-    region : tuple of float
-        Left, bottom, right and top in m.
-
-    Returns
-    -------
-    tuple of ndarray
-        A number for every infrared and for every visible frame.
-
-    Raises
-    ------
-    ValueError
-        If the region is outside an image.
-    """
+) -> tuple[Array, Array]:
+    """Mean brightness of one region in every frame of both cameras."""
     left, bottom, right, top = region
     columns = (raster.x >= left) & (raster.x <= right)
     rows = (raster.y >= bottom) & (raster.y <= top)
@@ -202,7 +168,7 @@ def region_signals(
     return np.asarray(hot, np.float64), np.asarray(bright, np.float64)
 
 
-def _check(name: str, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+def _check(name: str, times: Array, values: Array) -> None:
     if times.ndim != 1 or times.shape != values.shape:
         raise ValueError(
             f"{name} signal: {values.size} values for {times.size} times, expected as many"
@@ -215,7 +181,7 @@ def _check(name: str, times: NDArray[np.float64], values: NDArray[np.float64]) -
         raise ValueError(f"{name} signal: does not change, expected an event that is seen in it")
 
 
-def _smoothed(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _smoothed(signal: Array) -> Array:
     """Least squares with a penalty on second differences, chosen by cross-validation."""
     parts = dct(signal, norm="ortho")
     rough = (2 - 2 * np.cos(np.pi * np.arange(signal.size) / signal.size)) ** 2
@@ -230,11 +196,11 @@ def _smoothed(signal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _correlations(
-    times: NDArray[np.float64],
-    target: NDArray[np.float64],
-    visible_times: NDArray[np.float64],
+    times: Array,
+    target: Array,
+    visible_times: Array,
     spline: CubicSpline,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Offsets in s on a grid, and the correlation at each."""
     step = float(np.median(np.diff(visible_times))) / 3
     low = visible_times[0] - np.quantile(times, 1 - _LEAST_OVERLAP)
@@ -251,7 +217,7 @@ def _correlations(
     return offsets, np.concatenate(found)
 
 
-def _correlation(target: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _correlation(target: Array, values: Array) -> Array:
     """Correlation of each row of values with the target where both are known, shape (n,)."""
     known = np.isfinite(values)
     count = np.maximum(known.sum(axis=1, keepdims=True), 1)
@@ -265,12 +231,12 @@ def _correlation(target: NDArray[np.float64], values: NDArray[np.float64]) -> ND
 
 
 def _refined(
-    times: NDArray[np.float64],
-    target: NDArray[np.float64],
+    times: Array,
+    target: Array,
     spline: CubicSpline,
     begin: float,
     drift: bool,
-) -> tuple[tuple[float, float], NDArray[np.float64], float, float]:
+) -> tuple[tuple[float, float], Array, float, float]:
     """Offset and drift of least squares, their covariance, degrees of freedom, correlation."""
     known = np.isfinite(spline(times + begin))
     times, target = times[known], target[known]
@@ -279,7 +245,7 @@ def _refined(
     unit = float(np.median(np.diff(spline.x)))
     scale = np.array([unit, unit / span] if drift else [unit])
 
-    def residual(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    def residual(parameters: Array) -> Array:
         shift = scale * parameters[2:]
         moved = times + begin + shift[0] + (shift[1] * times if drift else 0.0)
         values = spline(np.clip(moved, first, last))
@@ -313,9 +279,7 @@ def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]
     return (f"A correlation of {correlation:.2f} is no better than that of unrelated signals.",)
 
 
-def _rivals(
-    offsets: NDArray[np.float64], correlations: NDArray[np.float64], best: int, count: int
-) -> tuple[str, ...]:
+def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> tuple[str, ...]:
     """A warning for the best other offset that is nearly as likely, beyond the best one's peak."""
     squares = correlations**2
     below = squares < squares[best] / 2
