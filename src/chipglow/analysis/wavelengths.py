@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from chipglow.analysis.cut import Progress, find_cut, middle_frame, spread_starts
-from chipglow.analysis.images import Array, around, pixel_phases
+from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
 from chipglow.analysis.places import PointPlace
 from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
@@ -341,18 +341,20 @@ def _draws(
     """
     duration = cameras[0].integration_time
     views = views_of(surface, scene, cameras)
-    exposures = late = expose_views(scene, views, spot.start, duration)
+    exposures = expose_views(scene, views, spot.start, duration)
+    images = late = [ExposureImages(one, shares_blur=True) for one in exposures]
     if plan.delay:
-        late = expose_views(scene, views, spot.start + plan.delay, duration)
+        delayed = expose_views(scene, views, spot.start + plan.delay, duration)
+        late = [ExposureImages(one, shares_blur=True) for one in delayed]
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
     pixels = [
         np.transpose(
             [
-                _of_pixel(phase, exposure, later, centre, plan.misregistration)
+                _of_pixel(phase, seen, later, centre, plan.misregistration)
                 for phase, centre in zip(pixel_phases(camera, phases), centres, strict=True)
             ]
         )
-        for camera, exposure, later in zip(cameras, exposures, late, strict=True)
+        for camera, seen, later in zip(cameras, images, late, strict=True)
     ]
     part, window = around(scene.raster, centres)
     at_centres = partial(sample, raster=window, points=centres)
@@ -461,30 +463,23 @@ def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
 
 
 def _of_pixel(
-    camera: Camera,
-    exposure: Exposure,
-    late: Exposure,
-    centre: Array,
-    distance: float,
+    camera: Camera, images: ExposureImages, late: ExposureImages, centre: Array, distance: float
 ) -> list[float]:
     """Radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
-    raster = exposure.raster
 
-    def read(camera: Camera, of: Exposure, shift: tuple[float, float] = (0.0, 0.0)) -> float:
+    def read(camera: Camera, of: ExposureImages, shift: tuple[float, float] = (0.0, 0.0)) -> float:
         # The pixel that looks elsewhere is one of a grid that begins within the first pixel.
         corner = np.mod(np.array(camera.offset) + np.multiply(shift, [1, -1]), camera.pitch)
         moved = replace(camera, offset=(float(corner[0]), float(corner[1])))
-        return float(nearest(_image(moved, of), moved.pixels(raster), centre + shift))
+        pixels = moved.pixels(of.exposure.raster)
+        return float(nearest(of.radiance(moved), pixels, centre + shift))
 
-    own = read(camera, exposure)
+    shifts = [(distance * x, distance * y) for x, y in _DIRECTIONS]
     return [
-        read(_ideal(camera), exposure),
-        own,
-        own if late is exposure else read(camera, late),
-        *(
-            read(camera, exposure, (distance * x, distance * y)) if distance else own
-            for x, y in _DIRECTIONS
-        ),
+        read(_ideal(camera), images),
+        read(camera, images),
+        read(camera, late),
+        *(read(camera, images, shift) for shift in shifts),
     ]
 
 
