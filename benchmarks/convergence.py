@@ -1,10 +1,11 @@
 """How the cut depends on the cell: forces, segments, temperatures, width of the shear band.
 
-    python benchmarks/convergence.py [20 14 10 7 5] [--local]
+    python benchmarks/convergence.py [20 14 10 7 5] [--local] [--length 2]
 
 Cells in um; the finer, the longer: the time grows with the cube of their number. The paper's cut
-otherwise, over 2 mm: means are of what follows 0.7 mm, frames every 1 us. With --local the steel
-has no `NonlocalViscosity`: what fails is then as thin as two cells. Prints a Markdown table.
+otherwise, over a length in mm: means are of what follows 0.7 mm, frames every 1 us. With --local
+the steel has no `NonlocalViscosity`: what fails is then as thin as two cells. Prints a Markdown
+table.
 """
 
 import argparse
@@ -19,8 +20,8 @@ from chipglow.laboratory.chip import NoShearBandError, find_shear_band, segmenta
 from chipglow.scene import Material, Raster, ToolGeometry, sample
 
 CELLS = (20.0, 14.0, 10.0, 7.0, 5.0)
-CUT = CuttingConditions(cutting_length=2e-3)
-WINDOW = OutputWindow(0.7e-3, CUT.cutting_length, interval=1e-6, later_bands=0)
+LENGTH = 2e-3
+START = 0.7e-3
 RASTER = Raster(-560e-6, 460e-6, 2e-6, 270, 300)
 
 ACROSS = np.arange(-120e-6, 121e-6, 2e-6)
@@ -79,15 +80,15 @@ def rise_width(profile):
     return float(ACROSS[right[0]] - ACROSS[left[-1]]), float(profile[top])
 
 
-def row(cell, workpiece):
+def row(cell, length, workpiece):
     """Run one cut and return its row of the table."""
-    numerics = Numerics(cell=cell * 1e-6)
-    simulation = CuttingSimulation(CUT, workpiece=workpiece, numerics=numerics)
+    conditions, numerics = CuttingConditions(cutting_length=length), Numerics(cell=cell * 1e-6)
+    simulation = CuttingSimulation(conditions, workpiece=workpiece, numerics=numerics)
     fields = Fields(simulation.tool)
     start = perf_counter()
-    history = simulation.run(WINDOW, RASTER, fields.add)
+    history = simulation.run(OutputWindow(START, length, 1e-6, later_bands=0), RASTER, fields.add)
     seconds = perf_counter() - start
-    later = history.time * CUT.speed > WINDOW.start
+    later = history.time * conditions.speed > START
     segments = segmentation(history.time[later], history.cutting[later], history.thrust[later])
     rate, width, temperature_width, temperature = fields.active()
     return [
@@ -120,12 +121,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cells", nargs="*", type=float, help="cells in um")
     parser.add_argument("--local", action="store_true", help="without the nonlocal viscosity")
+    parser.add_argument("--length", type=float, default=1e3 * LENGTH, help="of the cut in mm")
     given = parser.parse_args()
     workpiece = replace(AISI_1045, nonlocal_viscosity=None) if given.local else AISI_1045
     print("| " + " | ".join(COLUMNS) + " |")
     print("|---" * len(COLUMNS) + "|")
     for cell in given.cells or CELLS:
-        print("| " + " | ".join(row(cell, workpiece)) + " |", flush=True)
+        print("| " + " | ".join(row(cell, given.length * 1e-3, workpiece)) + " |", flush=True)
 
 
 if __name__ == "__main__":

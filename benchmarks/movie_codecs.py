@@ -129,14 +129,16 @@ def measure(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pictures", type=int, default=6)
-    count = parser.parse_args().pictures
+    parser.add_argument("--codecs", nargs="*", default=[codec.name for codec in CODECS])
+    given = parser.parse_args()
+    count = given.pictures
     print(f"{ROWS} x {COLUMNS} pixels, {COLDEST:g} to {HOTTEST:g} K, {count} pictures")
     head = "| map | codec | kB a picture | RMS, K | 99 %, K | most, K | predicted RMS, K |"
     print(f"{head} wrong material |\n|{'---|' * 8}")
     with tempfile.TemporaryDirectory() as folder:
         for colours in MAPS:
             bands = f", {colours.bands} bands" if colours.bands else ""
-            for codec in CODECS:
+            for codec in (codec for codec in CODECS if codec.name in given.codecs):
                 found = measure(Path(folder), codec, colours, count)
                 print(
                     f"| {colours.name}{bands} | {codec.name} | {found['kilobytes']:.0f} "

@@ -1,7 +1,7 @@
 """Time to sample a mesh: the rasteriser beside VTK's probe and SciPy's interpolator.
 
 ``python benchmarks/rasterise.py`` prints a table; ``--file`` adds a whole frame of a million
-elements from a VTK file.
+elements from a VTK file, ``--fine`` sets how many columns of elements that mesh has.
 """
 
 import argparse
@@ -98,16 +98,15 @@ def interpolate(points: NDArray[np.float64], values: NDArray[np.float64]) -> NDA
     return found
 
 
-def whole_frame() -> None:
-    """A frame from file to samples: a million triangles with four fields."""
-    points, triangles = mesh_of(745, 674)
+def whole_frame(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> None:
+    """A frame from file to samples: triangles with four fields."""
     mesh = pyvista.PolyData.from_regular_faces(np.pad(points, ((0, 0), (0, 1))), triangles)
     grid = mesh.cast_to_unstructured_grid()
     grid.point_data["temperature"] = linear(points)
     grid.point_data["velocity"] = np.ones((len(points), 3))
     grid.cell_data["peeq"] = np.ones(len(triangles))
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "million.vtu"
+        path = Path(folder) / "frame.vtu"
         grid.save(path)
         source = MeshSource(path)
         size = path.stat().st_size / 1e6
@@ -129,11 +128,13 @@ def whole_frame() -> None:
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--file", action="store_true", help="a frame from a file too")
+    arguments.add_argument("--fine", type=int, default=745, help="columns of the fine mesh")
     chosen = arguments.parse_args()
+    fine = mesh_of(chosen.fine, round(chosen.fine * 674 / 745))
     compare(*mesh_of(236, 215), peers=True)
-    compare(*mesh_of(745, 674), peers=False)
+    compare(*fine, peers=False)
     if chosen.file:
-        whole_frame()
+        whole_frame(*fine)
 
 
 if __name__ == "__main__":

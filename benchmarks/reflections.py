@@ -1,6 +1,7 @@
 """How much of the paper's missing 100 °C at the rake face reflections explain.
 
-    python benchmarks/reflections.py [--draws 40] [--study quick.yaml] [--cell 40]
+    python benchmarks/reflections.py [--draws 40] [--angles 30 45 60 75] [--study quick.yaml]
+        [--cell 40]
 
 Measures the hottest square of the row beside the rake face (its Figure 7) in one instant of the
 quick study, or of a study's cut or scene, with the light that rake face and chip's side reflect on
@@ -11,7 +12,7 @@ and tool are drawn; the tool is as warm as it was cut, or as the chip that it to
 """
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi, radians
@@ -41,6 +42,7 @@ MISSING = 100.0
 INSTANT = 0.5
 CHIPS = {"chip 1": CHIP_1, "chip 2": CHIP_2}
 ANGLES = (30.0, 75.0)
+SHAPES = (30.0, 45.0, 60.0, 75.0)
 RADII = (50e-6, 200e-6)
 SEED = 17
 
@@ -154,11 +156,11 @@ def explained(faces: dict[str, Face], draws: int) -> list[list[str]]:
     return rows
 
 
-def by_shape(faces: dict[str, Face]) -> list[list[str]]:
+def by_shape(faces: dict[str, Face], angles: Iterable[float]) -> list[list[str]]:
     """Table of what one wedge adds, by its angle and its kind of reflection."""
     rows = [["angle / °", *(f"{tool}, {name} / K" for tool in faces for name in CHIPS), "mirror"]]
     for mirror in (0.0, 1.0):
-        for angle in (30.0, 45.0, 60.0, 75.0):
+        for angle in angles:
             wedge = Wedge(angle=radians(angle), mirror=mirror)
             added = [
                 _added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()
@@ -182,6 +184,7 @@ def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--draws", type=int, default=40, help="draws of each row, 2 or more")
+    parser.add_argument("--angles", nargs="*", type=float, default=SHAPES, help="in degrees")
     parser.add_argument("--study", type=Path, help="a study whose cut or scene is looked at")
     parser.add_argument("--cell", type=float, help="side of a cell of the cut in um")
     given = parser.parse_args()
@@ -192,7 +195,7 @@ def main() -> None:
     scene, camera = open_scene(path), study.camera.build()
     make: Callable[[bool], Face] = partial(Face.of, scene, camera)
     faces = {"as cut": make(False), "as warm as the chip": make(True)}
-    print(aligned(by_shape(faces)))
+    print(aligned(by_shape(faces, given.angles)))
     print(aligned(explained(faces, given.draws)))
 
 

@@ -1,10 +1,10 @@
 """What softening does to the chip: the paper's cut with different laws of flow stress and damage.
 
-    python benchmarks/softening.py [--cell 14] [NAME ...]
+    python benchmarks/softening.py [--cell 14] [--length 2.6] [NAME ...]
 
-Cell in um. Prints a Markdown table: forces, segments, degree of segmentation, shear band. The TANH
-law has the constants of Ti-6Al-4V (Ducobu et al. 2017, a 1.1, b 0.4, c 12, d 1) on the Johnson-Cook
-law of AISI 1045, for want of published ones for steel.
+Cell in um, length of the cut in mm. Prints a Markdown table: forces, segments, degree of
+segmentation, shear band. The TANH law has the constants of Ti-6Al-4V (Ducobu et al. 2017, a 1.1,
+b 0.4, c 12, d 1) on the Johnson-Cook law of AISI 1045, for want of published ones for steel.
 """
 
 import argparse
@@ -17,6 +17,7 @@ from experiments import cut
 
 from chipglow.cutting import (
     AISI_1045,
+    CuttingConditions,
     CuttingSimulation,
     HyperbolicTangent,
     JohnsonCookDamage,
@@ -58,10 +59,15 @@ CASES = {
 }
 
 
-def row(name: str, cell: float) -> list[str]:
+def row(name: str, cell: float, length: float) -> list[str]:
     """Run one cut and return its row of the table."""
-    simulation = CuttingSimulation(workpiece=CASES[name], numerics=Numerics(cell=cell))
-    chip, history, seconds = cut(simulation, WINDOW)
+    simulation = CuttingSimulation(
+        CuttingConditions(cutting_length=length),
+        workpiece=CASES[name],
+        numerics=Numerics(cell=cell),
+    )
+    window = replace(WINDOW, end=min(WINDOW.end, length))
+    chip, history, seconds = cut(simulation, window)
     values = (
         (chip.cutting_mean / 1e3, "{:.0f}"),
         (chip.cutting_swing / 1e3, "{:.0f}"),
@@ -80,6 +86,8 @@ def row(name: str, cell: float) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cell", type=float, default=14.0)
+    length = 1e3 * CuttingConditions().cutting_length
+    parser.add_argument("--length", type=float, default=length)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(CASES))
     given = parser.parse_args()
     if unknown := set(given.names) - set(CASES):
@@ -91,7 +99,9 @@ def main() -> None:
     )
     print("|---" * 11 + "|")
     for name in given.names or CASES:
-        print("| " + " | ".join(row(name, given.cell * 1e-6)) + " |", flush=True)
+        print(
+            "| " + " | ".join(row(name, given.cell * 1e-6, given.length * 1e-3)) + " |", flush=True
+        )
 
 
 if __name__ == "__main__":

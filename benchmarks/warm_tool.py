@@ -1,6 +1,6 @@
 """How much hotter the rake face is when the tool has been cutting for long.
 
-    python benchmarks/warm_tool.py [--cell 20] [--length 2]
+    python benchmarks/warm_tool.py [--cell 20] [--length 2] [cold] [steady]
 
 Cuts the paper's chip with a cold tool and with a steady one, and prints the mean temperature within
 15 um of the rake face along the contact, in the chip and in the tool, over the frames of the last
@@ -59,15 +59,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cell", type=float, default=20.0, help="side of a cell in um")
     parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
+    parser.add_argument("tools", nargs="*", metavar="TOOL", help="cold or steady; both by default")
     given = parser.parse_args()
     cold = CuttingSimulation(
         conditions=CuttingConditions(cutting_length=given.length * 1e-3),
         numerics=Numerics(given.cell * 1e-6),
     )
     head = ["tool", "chip / °C", "tool / °C", "contact / um", "Fc / (N/mm)", "Ft / (N/mm)"]
-    steady = replace(cold, tool_temperature=ToolBody())
-    rows = [head, row("cold", cold), row("steady", steady)]
-    print(aligned(rows))
+    tools = {"cold": cold, "steady": replace(cold, tool_temperature=ToolBody())}
+    print(aligned([head, *(row(name, tools[name]) for name in given.tools or tools)]))
 
 
 if __name__ == "__main__":

@@ -72,7 +72,10 @@ html_title = "chipglow"
 html_math_renderer = "mathml"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
-html_sidebars = {"**": ["all-pages"]}
+html_sidebars = {
+    "generated/**": ["api-page"],
+    **{pages: ["all-pages"] for pages in ("*", "gallery/**", "[dlu]*/**")},
+}
 html_theme_options = {
     "show_toc_level": 2,
     "navigation_with_keys": False,

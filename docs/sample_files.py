@@ -79,10 +79,9 @@ _made: Final[list[TemporaryDirectory[str]]] = []
 
 def write_archive(page: str, path: Path) -> None:
     """Write the files of one page into an archive."""
-    with TemporaryDirectory() as name, ZipFile(path, "w", ZIP_DEFLATED) as archive:
-        write_samples(page, Path(name))
-        for file in sorted(path for path in Path(name).rglob("*") if path.is_file()):
-            archive.write(file, file.relative_to(name))
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for file in sorted(path for path in folder(page).rglob("*") if path.is_file()):
+            archive.write(file, file.relative_to(folder(page)))
 
 
 def a_scene(folder: Path) -> None:

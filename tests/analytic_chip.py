@@ -6,6 +6,7 @@ whose angle drifts with time. Every quantity that the analyses look for is an at
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import cos, log, radians, sin, tan
 
 import numpy as np
@@ -69,6 +70,7 @@ class AnalyticChip:
         """Fraction of the band's full strength: 1 when fully grown."""
         return float(np.exp(-(((time - self.grown_at) / 18e-6) ** 2)))
 
+    @lru_cache(maxsize=3)  # noqa: B019
     def scene(self) -> Scene:
         """The scene with its force history."""
         frames = [self._fields(time) for time in self.times]

@@ -9,8 +9,11 @@ from typing import NamedTuple
 
 import pytest
 from hypothesis import settings
+from numba import set_num_threads
+from PIL import Image
 
 from chipglow.cutting import FLOW_LAWS
+from chipglow.drawing import drawing
 from chipglow.io.sandbox import Sandbox, _failure
 from chipglow.io.sources import SourceError
 
@@ -20,9 +23,9 @@ MOST_SECONDS = 1200
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-# The same examples on every machine; --hypothesis-profile=search draws new ones. The first example
-# of a test may compile, so that no example has a time limit.
-settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
+# The same examples on every machine, and so few; --hypothesis-profile=search draws more, and new
+# ones. The first example of a test may compile, so that no example has a time limit.
+settings.register_profile("fixed", max_examples=40, derandomize=True, database=None, deadline=None)
 settings.register_profile("search", derandomize=False, deadline=None, print_blob=True)
 settings.load_profile("fixed")
 
@@ -36,8 +39,24 @@ class QuickStudy(NamedTuple):
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with what needs the quick study: one process makes it while others have other tests."""
-    items.sort(key=lambda item: "quick_study" not in getattr(item, "fixturenames", ()))
+    """Begin with what needs the pages or the quick study: what one process makes, and none awaits.
+
+    The first process of pytest-xdist begins at the first test, the second in the middle.
+    """
+    makers = ("site", "quick_study")
+
+    def place(item):
+        names = getattr(item, "fixturenames", ())
+        return next((place for place, name in enumerate(makers) if name in names), len(makers))
+
+    items.sort(key=place)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread(worker_id):
+    """Kernels have one thread in each process of pytest-xdist: the others have the other cores."""
+    if worker_id != "master":
+        set_num_threads(1)
 
 
 @pytest.fixture(scope="session")
@@ -93,6 +112,19 @@ def reproduce_quick(folder):
     )
     assert run.returncode == 0, run.stderr
     (folder / "printed.txt").write_text(run.stdout, encoding="utf-8")
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures of a report are files of one pixel: drawing them takes longer than all the rest."""
+
+    def save(figure, folder, name):
+        png, svg = folder / f"{name}.png", folder / f"{name}.svg"
+        Image.new("RGB", (1, 1)).save(png)
+        svg.write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
+        return png, svg
+
+    monkeypatch.setattr(drawing, "save", save)
 
 
 @pytest.fixture

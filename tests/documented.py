@@ -62,10 +62,13 @@ def blocks(page):
 
 
 class Reader:
-    """Someone who types what a page shows, in a folder with its sample files."""
+    """Someone who types what a page shows, in a folder with its sample files.
 
-    def __init__(self, folder):
-        self.folder = folder
+    Commands whose results the folder already holds, ``done``, are not run again.
+    """
+
+    def __init__(self, folder, done=()):
+        self.folder, self.done = folder, done
         self.names, self.variables, self.material = {"__name__": "__main__"}, "", None
         for name in ("benchmarks", "docs"):
             (folder / name).symlink_to(ROOT / name)
@@ -92,6 +95,8 @@ class Reader:
 
     def type(self, line):
         """Run one line of a shell; chipglow in this process, which has it loaded."""
+        if line in self.done:
+            return
         if re.match(r"[A-Z]+=", line):
             self.variables += line + "\n"
             return

@@ -29,7 +29,10 @@ PATIENCE = 180_000  # ms: of a machine with much else to do
 
 pytest.importorskip("panel", reason="needs the extra app")
 playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not installed")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not installed"),
+]
 
 EXACT = re.compile("^Exact picture")
 

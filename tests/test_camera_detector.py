@@ -440,6 +440,7 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
         assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
 
 
+@pytest.mark.slow
 def test_every_headline_draw_of_a_cut_has_noise_of_its_own():
     """The noise is that of the detector, and another in each draw, chip and exposure."""
     detector = Detector(

@@ -47,7 +47,7 @@ analysis: {{exposures: 3, psf_widths: [8 um, 12 um]}}
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, undrawn, monkeypatch):
     monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
     work = tmp_path / "work"
     work.mkdir()
@@ -307,7 +307,9 @@ def write_foreign_chip(path, scene):
     np.savez(path, material=material, **fields)
 
 
-def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, chip_scene):
+def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(
+    folder, runs, chip_scene, read_here
+):
     write_foreign_chip(folder / "chip.npz", chip_scene)
     described = {
         "source": "chip.npz",

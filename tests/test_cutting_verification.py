@@ -23,7 +23,7 @@ from cases import (
         motion.vibrations,
         heat.conduction,
         surface_heat.surface_flux,
-        surface_heat.moving_source,
+        pytest.param(surface_heat.moving_source, marks=pytest.mark.slow),
         expansion.bent,
         plasticity.adiabatic_shear,
         plasticity.friction,

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
@@ -25,18 +26,18 @@ def page_id(page):
 
 
 @pytest.fixture
-def reader(tmp_path, quick_study, own_laws, monkeypatch):
-    """A reader whose cache holds the scene of the quick study."""
+def reader(tmp_path, quick_study, own_laws, read_here, undrawn, monkeypatch):
+    """A reader who has run the quick study."""
     cache, folder = tmp_path / "cache", tmp_path / "work"
     cache.mkdir()
-    folder.mkdir()
+    shutil.copytree(quick_study.results, folder / "chipglow-paper")
     known = {scene.name for scene in quick_study.cache.glob("scene-*.nc")}
     for name in known:
         os.link(quick_study.cache / name, cache / name)
     monkeypatch.setenv("CHIPGLOW_CACHE", str(cache))
     monkeypatch.setattr(plt, "show", lambda: None)
     matplotlib.use("Agg")
-    yield Reader(folder)
+    yield Reader(folder, done=("chipglow reproduce --quick",))
     plt.close("all")
     assert {scene.name for scene in cache.iterdir()} == known, "a page makes its reader wait"
 

@@ -149,7 +149,7 @@ def test_propagation_is_that_of_monte_carlo():
     assert high - low == pytest.approx(2 * row.estimate.expanded_uncertainty(), rel=0.02)
 
 
-def coverage(observe, repeats=200):
+def coverage(observe, repeats=100):
     """How often the 95 % interval of the body's mean holds the truth."""
     put_in = table_1()
     area = Area("body", "body", np.arange(40)[None, :] + np.zeros((30, 1)) < 16, True)
@@ -170,8 +170,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
         image.data["radiance"].values[:] = radiance
         return determine_emissivity([image], heating)
 
-    # 190 of 200 expected, standard deviation 3.1: three of them.
-    assert 181 <= coverage(observe) <= 199
+    # 95 of 100 expected, standard deviation 2.2: three of them. Of intervals half as wide 67 would
+    # hold, and of those twice as wide all with a probability of 0.99.
+    assert 88 <= coverage(observe) <= 99
 
 
 @pytest.mark.parametrize("frames", [2, 3, 8])
@@ -180,7 +181,7 @@ def test_intervals_of_chance_alone_hold_the_truth(frames):
         image = measured(put_in, frames=frames, noise=3.0, seed=generator, drift=2.0)
         return determine_emissivity([image], HEATING)
 
-    assert 181 <= coverage(observe) <= 199
+    assert 88 <= coverage(observe) <= 99
 
 
 def test_intervals_from_noise_alone_are_not_too_short():
@@ -191,7 +192,7 @@ def test_intervals_from_noise_alone_are_not_too_short():
 
     # Half the time chance makes frames differ by less than the noise would; the interval is then
     # that of the noise, otherwise longer: never too short.
-    assert coverage(observe) >= 181
+    assert coverage(observe) >= 88
 
 
 def test_drift_and_noise_are_told_apart():
@@ -237,7 +238,7 @@ def test_the_difference_of_two_regions_is_known_better_than_either():
     heating = Heating(TRUTH, 293.0, 4.0, 2.0, 3.0)
     put_in = table_1((0.42, 0.001), (0.53, 0.001))
     generator, differences = np.random.default_rng(8), []
-    for _ in range(400):
+    for _ in range(100):
         true, around, wrong = generator.normal((TRUTH, 293.0, 0.0), (4.0, 2.0, 3.0))
         image = measured(put_in, true, around, frames=3, drift=5.0, seed=generator)
         radiance = BAND.radiance(BAND.temperature(image.radiance) + wrong)
@@ -246,8 +247,8 @@ def test_the_difference_of_two_regions_is_known_better_than_either():
         differences.append(rows["shear band"].mean - rows["chip body"].mean)
     (a, b), (_, d) = emissivity_covariance([rows["shear band"], rows["chip body"]])
     stated = np.sqrt(a - 2 * b + d)
-    # 400 differences: the standard deviation is known to 3.5 %; three of them.
-    assert np.std(differences) == pytest.approx(stated, rel=0.11)
+    # 100 differences: the standard deviation is known to 7 %; three of them.
+    assert np.std(differences) == pytest.approx(stated, rel=0.21)
     assert stated < 0.25 * rows["shear band"].estimate.standard_uncertainty
 
 
@@ -290,7 +291,7 @@ def test_the_line_is_as_uncertain_as_it_says(temperatures):
     generator = np.random.default_rng(5)
     lines = [
         heated_series(generator, temperatures, generator.normal((0.0, 0.0), (2.0, 1.0)))
-        for _ in range(150)
+        for _ in range(60)
     ]
     for index, reference in ((1, 2e-4), (0, None)):
         off = np.array(
@@ -300,9 +301,9 @@ def test_the_line_is_as_uncertain_as_it_says(temperatures):
             ]
         )
         stated = np.sqrt(np.mean([line.estimate.covariance()[index, index] for line in lines]))
-        # 150 standard deviations: 5.8 % of one; three of them.
-        assert off.std() == pytest.approx(stated, rel=0.18)
-        assert abs(off.mean()) < 3 * stated / 150**0.5
+        # The standard deviation of 60 is known to 9.2 %; three of that.
+        assert off.std() == pytest.approx(stated, rel=0.28)
+        assert abs(off.mean()) < 3 * stated / 60**0.5
 
 
 def test_scatter_about_the_line_counts():

@@ -38,6 +38,7 @@ def found_in(seen):
     ]
 
 
+@pytest.mark.slow
 def test_the_face_is_within_its_stated_uncertainty(found_in):
     """24 images: an expanded uncertainty of k = 2 shall hold in 95 %, so in 21 or more of them.
 
@@ -59,6 +60,7 @@ def test_the_face_is_within_its_stated_uncertainty(found_in):
     assert min(within_angle, within_place, within_tip) >= 21
 
 
+@pytest.mark.slow
 def test_squares_of_a_found_tool_are_within_the_uncertainty_of_its_place(found_in):
     """The clean image, read by the found and by the true tool: only the tool's place differs."""
     e_n = []

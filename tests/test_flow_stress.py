@@ -54,6 +54,7 @@ def documented():
     return names
 
 
+@pytest.mark.slow
 def test_law_of_the_documentation_is_what_the_solver_follows(own_laws):
     """Isothermal simple shear at 1e5 /s; the law and its arguments are all in the result."""
     names = documented()

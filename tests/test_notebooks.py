@@ -15,6 +15,7 @@ def notebook(request):
     return nbformat.read(request.param, as_version=4)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of the kernel's transport, not of ours
 def test_a_notebook_runs_from_top_to_bottom_without_a_warning(notebook, tmp_path):
     client = NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}})

@@ -142,7 +142,7 @@ def own_result():
     return analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, camera, plan)
 
 
-def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
+def test_the_paper_stands_beside_its_own_study_only(own_result, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
     assert all(row.paper is None for row in result_rows(own_result, titanium))
     write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)

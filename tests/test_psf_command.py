@@ -107,15 +107,14 @@ def test_apertures_come_from_a_list(folder):
         load_apertures("apertures.yaml")
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
-def test_the_picture_shows_clipped_pixels_too(folder, suffix):
+def test_the_picture_shows_clipped_pixels_too(folder):
     flags = np.zeros((1, 40, 40), np.uint8)
     flags[0, 5, 5] = Flag.DEAD
     write_edge(folder / "dead.nc", edge=annular_edge(4.45e-6, 0.28, 0.35), flags=flags)
-    code, output = psf("dead.nc", "--plot", f"psf.{suffix}")
+    code, output = psf("dead.nc", "--plot", "psf.svg")
     assert code == 0
     assert "kind: annular-aperture, wavelength: 4.45 um" in output
-    assert (folder / f"psf.{suffix}").stat().st_size > 1000
+    assert (folder / "psf.svg").stat().st_size > 1000
 
 
 def test_a_region_is_cut_out(folder):

@@ -397,7 +397,7 @@ def test_a_width_is_found_where_the_series_meets_the_value():
     assert crossing(widths, np.array([-10.0, -30.0, -50.0]), -60.0) is None
 
 
-def test_what_is_missing_is_left_out_and_unknown_is_null(result, tmp_path):
+def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_path):
     segments = tuple(replace(segment, sweep=float("nan")) for segment in result.cut.segments)
     ideal = replace(result.camera, psf=None, lower_limit=None)
     unseen = result.data.copy()
@@ -421,7 +421,7 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, tmp_path):
     assert "no period" in row.explanation
 
 
-def test_a_part_that_fails_is_shown_with_its_reason_beside_the_others(result, tmp_path):
+def test_a_part_that_fails_is_shown_with_its_reason_beside_the_others(result, undrawn, tmp_path):
     """The analysis names one part; a figure that cannot be drawn is another."""
     reason = "region chip 1 body: reaches over columns 50.34 to 81.35"
     data = result.data.drop_vars("ridge_distance")

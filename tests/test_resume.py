@@ -30,7 +30,7 @@ from chipglow.study import cut, is_cut, kept_progress, load_study, running
 STUDY = """
 cutting:
   cutting_length: 0.1 mm
-  numerics: {cell: 20 um}
+  numerics: {cell: 40 um}
   window: {start: 0.02 mm, end: 0.1 mm, interval: 0.5 us}
   field_of_view: {left: -100 um, top: 200 um, spacing: 5 um, rows: 36, columns: 27}
 """
@@ -129,7 +129,7 @@ def killed_run(study, rng, *options):
         while not any(left > before for left in progress_of_all(study)):
             assert process.poll() is None, process.stderr.read()
             time.sleep(0.002)
-        time.sleep(rng.uniform(0.0, 0.15))
+        time.sleep(rng.uniform(0.0, 0.05))
         process.send_signal(signal.SIGKILL)
         process.communicate()
     assert process.returncode == -signal.SIGKILL

@@ -208,7 +208,7 @@ analysis:
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, undrawn, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_scene(plate(), tmp_path / "plate.nc")
     (tmp_path / "study.yaml").write_text(STUDY)

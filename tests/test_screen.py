@@ -112,6 +112,7 @@ def test_the_doctor_finds_what_is_missing(monkeypatch):
     assert "packages: numpy (too old)" in result.stderr
 
 
+@pytest.mark.slow
 def test_threads_sleep_while_they_wait_unless_told_otherwise(monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY")
     assert "; passive while they wait" in run_piped("doctor").stdout

@@ -83,6 +83,7 @@ def cold():
     )
 
 
+@pytest.mark.slow
 def test_a_long_cut_settles_and_the_next_one_begins_warm(cold):
     simulation = replace(cold, tool_temperature=BODY)
     steady = simulation.steady_tool()

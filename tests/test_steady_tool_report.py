@@ -67,7 +67,7 @@ def test_a_scene_warmer_by_some_degrees_is_warmer_by_these_in_the_table(own, ste
         assert 0.5 * WARMER < rows[f"rake_peak_{name}_degC"].difference[0] < WARMER
 
 
-def test_the_report_shows_both_and_what_the_paper_misses(own, steady, tmp_path):
+def test_the_report_shows_both_and_what_the_paper_misses(own, steady, undrawn, tmp_path):
     text = "title: A study\n"
     report = write_report(own, tmp_path, "A study", text, {}, study=Study(), steady=steady)
     page = report.read_text(encoding="utf-8").replace("\u00a0", " ")

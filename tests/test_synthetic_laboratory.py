@@ -107,6 +107,7 @@ def typed(*arguments):
     return result.output
 
 
+@pytest.mark.slow
 def test_the_commands_find_the_same_as_the_functions(experiment, tmp_path):
     """What a user types on the same files: the numbers are those of `Evaluation`."""
     typed(

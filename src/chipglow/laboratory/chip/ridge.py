@@ -1,6 +1,7 @@
 """A ridge that leads from the cutting edge outward: found about the edge, smoothed, climbed."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, pi, radians
 from typing import Final
 
@@ -49,6 +50,7 @@ class PolarGrid:
     """Angle between neighbours in rad."""
 
     @classmethod
+    @lru_cache(maxsize=2)
     def about(cls, tool: Tool, raster: Raster) -> "PolarGrid":
         """Places about a tool's edge that reach over a raster."""
         edge = tool.edge_point
@@ -111,12 +113,8 @@ class PolarGrid:
         anywhere: bool,
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         total = np.where(allowed, score, -np.inf)
-        came_from = np.full(total.shape, _NOWHERE)
-        for i in range(1, self.radii.size):
-            before, choice = self._best_before(total[i - 1], i)
-            goes_on = before > 0.0 if anywhere else np.ones(before.size, np.bool_)
-            came_from[i] = np.where(goes_on, choice, _NOWHERE)
-            total[i] += np.where(goes_on, before, 0.0)
+        slopes = self.radii * self.angle_step / self.radius_step
+        came_from = _add_up(total, slopes, anywhere)
         ends = ends & np.isfinite(total)
         if not ends.any():
             raise NoShearBandError("shear band: no path leads from the edge through the chip")
@@ -127,28 +125,30 @@ class PolarGrid:
             columns.append(int(came_from[last + 1 - len(columns), columns[-1]]))
         return np.arange(last + 1 - len(columns), last + 1), np.array(columns[::-1])
 
-    def _best_before(self, total: Array, i: int) -> tuple[Array, NDArray[np.int64]]:
-        """Greatest sum within reach at the radius before, less a little for turning."""
-        slope = self.radii[i] * self.angle_step / self.radius_step
-        reach = max(1, min(ceil(_STEEPEST / slope), total.size - 1))
-        turns = np.arange(-reach, reach + 1)
-        best, came_from = _greatest_within_reach(total, _STRAIGHTNESS * (turns * slope) ** 2)
-        return best, came_from
-
 
 @njit(cache=True, nogil=True)
-def _greatest_within_reach(total, penalty):  # type: ignore[no-untyped-def]
-    """For each place the greatest of the totals about it less their penalties, and its index."""
-    best, came_from = np.empty(total.size), np.empty(total.size, np.int64)
-    reach = penalty.size // 2
-    for i in range(total.size):
-        low = max(i - reach, 0)
-        best[i], came_from[i] = total[low] - penalty[low - i + reach], low
-        for j in range(low + 1, min(i + reach + 1, total.size)):
-            value = total[j] - penalty[j - i + reach]
-            if value > best[i]:
-                best[i], came_from[i] = value, j
-    return best, came_from
+def _add_up(total, slopes, anywhere):  # type: ignore[no-untyped-def]
+    """Add to each place the greatest sum within reach at the radius before; return its index.
+
+    A step costs a little for turning. Where a path may begin anywhere, one of no gain is not
+    continued.
+    """
+    radii, angles = total.shape
+    came_from = np.full(total.shape, _NOWHERE)
+    for i in range(1, radii):
+        reach = max(1, min(ceil(_STEEPEST / slopes[i]), angles - 1))
+        penalty = _STRAIGHTNESS * (np.arange(-reach, reach + 1) * slopes[i]) ** 2
+        for column in range(angles):
+            low = max(column - reach, 0)
+            best, choice = total[i - 1, low] - penalty[low - column + reach], low
+            for j in range(low + 1, min(column + reach + 1, angles)):
+                value = total[i - 1, j] - penalty[j - column + reach]
+                if value > best:
+                    best, choice = value, j
+            if best > 0.0 or not anywhere:
+                came_from[i, column] = choice
+                total[i, column] += best
+    return came_from
 
 
 def off_face(points: Array, tool: Tool) -> NDArray[np.bool_]:

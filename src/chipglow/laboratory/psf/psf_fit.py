@@ -7,7 +7,7 @@ fitted with the rest, broaden nothing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import cos, inf, log, pi, sin, sqrt
 from typing import Final
 
@@ -421,11 +421,19 @@ def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
 
 
 def _response(model: PSFModel, values: Array, line: EdgeLine, edge: EdgePixels) -> EdgeResponse:
+    return _response_along(model, tuple(values), line.normal, edge.footprint, edge.reach)
+
+
+@lru_cache(maxsize=16)
+def _response_along(
+    model: PSFModel, values: tuple[float, ...], normal: float, footprint: float, reach: float
+) -> EdgeResponse:
+    """Edge response of a model; the residuals and their derivative ask for the same one."""
     return edge_response(
-        lambda frequency: model.transfer(values, frequency, line.normal),
-        line.normal,
-        edge.footprint,
-        edge.reach,
+        lambda frequency: model.transfer(np.array(values), frequency, normal),
+        normal,
+        footprint,
+        reach,
     )
 
 

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, cos, exp, pi, sin, sqrt
 from typing import Final
 
@@ -204,11 +205,7 @@ class MoffatModel(PSFModel):
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         cycles = 2 * pi * self._radius(values) * frequency
-        order = float(values[1]) - 1
-        bessel = kve(order, _MOFFAT_NODES) * np.exp(-_MOFFAT_NODES)
-        nodes = 2 * (_MOFFAT_NODES / 2) ** order * bessel / gamma(order)
-        # Bessel's function is slow, and smooth over the logarithm.
-        curve = CubicSpline(np.log(_MOFFAT_NODES), nodes)
+        curve = _moffat_curve(float(values[1]) - 1)
         result = np.where(cycles < _MOFFAT_NODES[0], 1.0, 0.0)
         some = (cycles >= _MOFFAT_NODES[0]) & (cycles < _MOFFAT_NODES[-1])
         result[some] = curve(np.log(cycles[some]))
@@ -229,6 +226,14 @@ class MoffatModel(PSFModel):
     def _radius(self, values: Array) -> float:
         """The length a in m."""
         return float(values[0]) / (2 * sqrt(2 ** (1 / float(values[1])) - 1))
+
+
+@lru_cache(maxsize=4)
+def _moffat_curve(order: float) -> CubicSpline:
+    """Moffat's transform over the logarithm; Bessel's function is slow, and smooth over it."""
+    bessel = kve(order, _MOFFAT_NODES) * np.exp(-_MOFFAT_NODES)
+    nodes = 2 * (_MOFFAT_NODES / 2) ** order * bessel / gamma(order)
+    return CubicSpline(np.log(_MOFFAT_NODES), nodes)
 
 
 @dataclass(frozen=True)
@@ -355,8 +360,8 @@ def edge_response(
     """Edge-spread function of optics and pixel."""
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
-    frequency = np.arange(count // 2 + 1, dtype=np.float64) / (count * step)
-    response = transfer(frequency) * footprint_transfer(frequency, angle, footprint)
+    frequency, square = _footprint_along(count, step, angle, footprint)
+    response = transfer(frequency) * square
     integral = np.zeros(frequency.size, dtype=np.complex128)
     integral[1:] = response[1:] / (2j * pi * frequency[1:])
     line, edge = fft.irfft(np.stack([response, integral]), count) / step
@@ -364,6 +369,15 @@ def edge_response(
     index = np.arange(-half, half + 1)
     # The series is that of an edge less a ramp over the whole period.
     return EdgeResponse(step, 0.5 + edge[index] + index / count, line[index])
+
+
+@lru_cache(maxsize=16)
+def _footprint_along(
+    count: int, step: float, angle: float, footprint: float
+) -> tuple[Array, Array]:
+    """Frequencies of samples at a distance, and the footprint's transfer function there."""
+    frequency = np.arange(count // 2 + 1, dtype=np.float64) / (count * step)
+    return frequency, footprint_transfer(frequency, angle, footprint)
 
 
 def footprint_transfer(frequency: Array, angle: float, footprint: float) -> Array:
