@@ -216,7 +216,7 @@ class BandPlace(Place):
         # A camera shows no strain rate: the hottest is the centre for who has the image alone.
         hottest = _lowest_near(distance, -across[1], pixels.spacing)
         lowest = _lowest_near(distance, across[1] - across[0], inf)
-        return across[:, [np.argmin(np.abs(distance)), hottest, lowest]].T
+        return across[:, [int(np.argmin(np.abs(distance))), hottest, lowest]].T
 
     def outline(self) -> NDArray[np.float64]:
         return self.band.ridge.points
