@@ -155,3 +155,20 @@ def own_laws():
     yield
     FLOW_LAWS._own.clear()
     FLOW_LAWS._own.update(before)
+
+
+@pytest.fixture(scope="session")
+def chip_analysis():
+    """The paper's camera on the analytic chip: eight draws in one segment."""
+    from analytic_chip import AnalyticChip
+
+    from chipglow.analysis import Plan, analyse
+    from chipglow.camera import Camera
+    from chipglow.surface import CHIP_1, CHIP_2
+
+    return analyse(
+        AnalyticChip(frames=60).scene(),
+        {"chip 1": CHIP_1, "chip 2": CHIP_2},
+        Camera(psf_order="detector"),
+        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
+    )

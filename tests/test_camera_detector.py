@@ -41,7 +41,7 @@ from chipglow.io import read_measurement, write_measurement, write_scene
 from chipglow.radiometry import Band
 from chipglow.report import write_report
 from chipglow.report.facts import Facts
-from chipglow.report.rows import camera_rows
+from chipglow.report.rows import all_rows
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, errors, load_study, study_text
 from chipglow.surface import CHIP_1, CHIP_2
@@ -399,7 +399,7 @@ def looked_at(folder, **camera):
     return errors(study)
 
 
-def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
+def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
     """Pixel phases differ by their noise too; the same study gives the same numbers again."""
     section = {
         "response": {
@@ -429,9 +429,9 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
     assert "detector_response" in measurement.data.attrs
     image = noisy.data.image_measured.sel(effects="all").values[0]
     np.testing.assert_allclose(image, measurement.radiance_temperature()[0], rtol=1e-12)
-    rows = {row.key: row.here for row in camera_rows(Facts(noisy))}
+    rows = {row.key: row.here for row in all_rows(Facts(noisy))["camera"]}
     assert rows["netd_half_K"] == calibration.half_netd
-    assert camera_rows(Facts(quiet)) == []
+    assert all_rows(Facts(quiet))["camera"] == []
     for result, told in ((noisy, True), (quiet, False)):
         folder = tmp_path / str(told)
         folder.mkdir()

@@ -8,9 +8,9 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import Distribution, Plan, analyse
+from chipglow.analysis import Distribution
 from chipglow.analysis.reductions import Headline
-from chipglow.camera import AnnularAperturePSF, Camera
+from chipglow.camera import AnnularAperturePSF
 from chipglow.cli import progress
 from chipglow.radiometry import Band
 from chipglow.report import result_rows, write_report
@@ -18,7 +18,6 @@ from chipglow.scene import Raster
 from chipglow.study import Study, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.camera_presets import CAMERAS
-from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.text import DescriptionError
 
 NAMES = ("rake face", "mid-contact", "chip 2")
@@ -134,27 +133,19 @@ def test_what_is_left_to_the_paper_is_said():
     assert list(left_to_the_paper(whole)) == []
 
 
-@pytest.fixture(scope="module")
-def own_result():
-    plan = Plan(exposures=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6))
-    scene = AnalyticChip().scene()
-    camera = Camera(integration_time=5e-6)
-    return analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, camera, plan)
-
-
-def test_the_paper_stands_beside_its_own_study_only(own_result, undrawn, tmp_path):
+def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
-    assert all(row.paper is None for row in result_rows(own_result, titanium))
-    write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)
+    assert all(row.paper is None for row in result_rows(chip_analysis, titanium))
+    write_report(chip_analysis, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     told = page[page.index("<main>") : page.index('<div class="part" id="study">')]
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()
-    assert any(row.paper is not None for row in result_rows(own_result, Study.quick()))
+    assert any(row.paper is not None for row in result_rows(chip_analysis, Study.quick()))
     # Nor beside what somebody analyses without a study, nor if one thing of it is another.
     for study in (None, Study(camera={"integration_time": "20 us"})):
-        assert all(row.paper is None for row in result_rows(own_result, study))
+        assert all(row.paper is None for row in result_rows(chip_analysis, study))
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():

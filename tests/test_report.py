@@ -12,22 +12,19 @@ import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
-from analytic_chip import AnalyticChip
 from PIL import Image
 
-from chipglow.analysis import Distribution, Plan, analyse, one_draw, with_errors
-from chipglow.camera import Camera
+from chipglow.analysis import Distribution, one_draw, with_errors
 from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
-from chipglow.report.rows import cause_rows, chip_rows, error_rows, part_rows
+from chipglow.report.rows import all_rows
 from chipglow.report.visible import visible_picture
 from chipglow.scene import Line, Material
 from chipglow.study import Study
-from chipglow.surface import CHIP_1, CHIP_2
 
 TITLE = "My <i>own</i> study"
 REMARKS = ["Assumed: the moon is made of <b>cheese</b>."]
@@ -52,13 +49,8 @@ SETTINGS = table_2(PAPERS)
 
 
 @pytest.fixture(scope="module")
-def result():
-    return analyse(
-        AnalyticChip(frames=60).scene(),
-        {"chip 1": CHIP_1, "chip 2": CHIP_2},
-        Camera(psf_order="detector"),
-        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
-    )
+def result(chip_analysis):
+    return chip_analysis
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +65,8 @@ def of_cut(result, **changes):
 @pytest.fixture(scope="module")
 def folder(result, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    report = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS, PAPERS)
-    assert report == folder / "report.html"
+    path = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS, PAPERS)
+    assert path == folder / "report.html"
     return folder
 
 
@@ -141,15 +133,13 @@ def test_the_page_stands_alone_and_escapes_text(page, result, facts):
     assert page.seen.count("script") == 1 and not {"b", "i", "link"} & set(page.seen)
     shown = "".join(page.text)
     assert STUDY in shown
-    sentences = sentences_of(facts)
-    for value in (*PROVENANCE.values(), *REMARKS, *sentences):
+    for value in (*PROVENANCE.values(), *REMARKS, *sentences_of(facts)):
         assert value in shown
-    for row in (*result_rows(result, PAPERS), *chip_rows(facts)):
-        texts = (row.paper_text, row.here_text, row.interval_text, row.one_draw_text)
-        for part in (row.quantity, *texts, row.explanation):
-            assert part in shown
-    for row in cause_rows(error_rows(facts)):
-        assert row.unit == "%" or all(text in shown for text in row.cells)
+    rows = all_rows(facts)
+    for row in (*rows["errors"], *rows["cut"], *rows["chip"]):
+        causes = () if row.unit != "°C" else row.draws.parts if row.draws else ()
+        names = ("quantity", "paper", "mean", "interval", "one-draw", *causes)
+        assert all(row.cells[name] in shown for name in names) and row.explanation in shown
     headings = [f"{number}:" for number in PAPER_FIGURES.values()] + ["Table 1:", "Table 2:"]
     places = [shown.index(heading) for heading in headings]
     assert places == sorted(places)
@@ -161,7 +151,7 @@ def test_the_page_stands_alone_and_escapes_text(page, result, facts):
 
 
 def sentences_of(facts):
-    return [sentence.text for sentence in answer(facts, error_rows(facts)).statements]
+    return [sentence.text for sentence in answer(facts, all_rows(facts)["errors"])]
 
 
 def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, facts):
@@ -231,15 +221,15 @@ def test_images_go_through_time_and_without_script_stand_still(result, facts, fo
 
 
 def test_the_parts_of_an_error_are_all_of_it(result, facts):
-    rows = {row.key: row for row in part_rows(facts, error_rows(facts))}
+    rows = {row.key: row for row in all_rows(facts)["errors"] if row.parts}
     assert list(rows) == ["rake_error_degC", "band_error_degC", "band_worst_error_degC"]
     for row in rows.values():
         total = sum(part.values for part in row.parts.values())
-        np.testing.assert_allclose(total, row.error.values, atol=1e-9)
+        np.testing.assert_allclose(total, row.draws.values, atol=1e-9)
     assert set(rows["band_error_degC"].parts) == {"psf", "motion", "footprint"}
     assert set(rows["band_worst_error_degC"].parts) == {"psf", "rest"}
     mean = Facts(replace(result, plan=replace(result.plan, reference="mean")))
-    assert all("motion" not in row.parts for row in part_rows(mean, error_rows(mean)))
+    assert all("motion" not in row.parts for row in all_rows(mean)["errors"])
 
 
 def test_inertia_that_is_too_much_is_said(result):
@@ -248,10 +238,10 @@ def test_inertia_that_is_too_much_is_said(result):
         forces = replace(result.cut.forces, inertia=inert)
         return {row.key: row for row in result_rows(of_cut(result, forces=forces))}
 
-    assert rows(0.02)["kinetic_fraction_percent"].here_text == "2.00 %"
+    assert rows(0.02)["kinetic_fraction_percent"].cells["mean"] == "2.00 %"
     assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_fraction_percent"].explanation
     assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
-    assert rows(0.009)["inertia_force_fraction_percent"].here_text == "0.40 %"
+    assert rows(0.009)["inertia_force_fraction_percent"].cells["mean"] == "0.40 %"
     assert "1/300 of this" in rows(0.009)["inertia_force_fraction_percent"].explanation
 
 
@@ -310,7 +300,7 @@ def test_the_summary_is_strict_json(folder, result, facts):
     assert set(summary["chip_uncertainty"]) <= set(summary["chip"])
 
 
-def test_the_arrays_come_back_with_units(folder, result, facts):
+def test_arrays_and_study_are_as_written(folder, result, facts):
     with xr.open_dataset(folder / "results.nc", engine="h5netcdf") as data:
         for name, values in result.data.data_vars.items():
             np.testing.assert_array_equal(data[name], values)
@@ -318,9 +308,6 @@ def test_the_arrays_come_back_with_units(folder, result, facts):
         np.testing.assert_array_equal(data["draws_band_measured_psf_portion"], drawn)
         assert all(data[name].attrs.get("units") for name in data.data_vars)
         assert data.attrs["provenance_Seed"] == "1"
-
-
-def test_the_study_is_kept_as_run(folder):
     assert (folder / "study.yaml").read_text(encoding="utf-8") == STUDY
 
 
@@ -341,7 +328,7 @@ def test_the_comparison_holds_what_the_paper_states(result):
     }
     assert rows["segment_period_us"].here == pytest.approx(72.0, rel=0.02)
     assert rows["band_width_um"].here == pytest.approx(20.0, rel=0.05)
-    assert rows["contact_length_um"].paper_text == "–"
+    assert rows["contact_length_um"].cells["paper"] == "–"
     assert all(row.explanation.endswith(".") for row in rows.values())
     assert rows["rake_error_degC"].published is PAPER["rake_error_degC"]
     frame = results_frame(result, PAPERS)
@@ -368,17 +355,19 @@ def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
 def test_numbers_are_printed_with_sign_unit_and_dash():
     paper = PaperValue(-42.0, "abstract")
     row = Row("error_degC", "Error", "°C", -35.4, uncertainty=3.1, published=paper)
-    assert (row.paper_text, row.here_text) == ("−42 °C", "−35 ± 3 °C")
-    assert (row.differs, row.differs_text, row.interval_text) == (True, "yes", "–")
+    names = ("paper", "mean", "interval", "one-draw", "differs")
+
+    def cells(row):
+        return tuple(row.cells[name] for name in names)
+
+    assert cells(row) == ("−42 °C", "−35 ± 3 °C", "–", "–", "yes")
     assert replace(row, uncertainty=3.4).differs is False
     rate = Row("rate_per_s", "Rate", "1/s", 123456.0, -3)
-    assert (rate.paper_text, rate.here_text) == ("–", "123 000 1/s")
-    assert rate.differs is None and rate.differs_text == "–"
+    assert cells(rate) == ("–", "123 000 1/s", "–", "–", "–")
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
     drawn = replace(row, here=draws.mean, draws=draws, one_draw=-30.0, uncertainty=None)
     # Four draws of one cause: Student's t of 3 degrees of freedom, 3.182 times 8.4 times 1.118.
-    assert (drawn.here_text, drawn.interval_text) == ("−41 ± 8 °C", "−71 to −11 °C")
-    assert (drawn.one_draw_text, drawn.differs_text) == ("−30 °C", "no")
+    assert cells(drawn) == ("−42 °C", "−41 ± 8 °C", "−71 to −11 °C", "−30 °C", "no")
 
 
 def test_the_place_of_the_papers_figure_is_stated():
@@ -407,7 +396,7 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_pa
     bare = replace(of_cut(result, forces=None, segments=segments), camera=ideal, data=unseen)
     write_report(bare, tmp_path, TITLE, STUDY, PROVENANCE, study=PAPERS)
     row = next(row for row in result_rows(bare) if row.key == "rake_error_degC")
-    assert (row.here_text, row.differs) == ("–", None)
+    assert (row.cells["mean"], row.differs) == ("–", None)
     assert row.one_draw == one_draw(result.data, "rake").error
     assert "outside the image" in row.explanation
     names = {path.stem for path in (tmp_path / "figures").iterdir()}
@@ -417,11 +406,11 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_pa
     segmentation = replace(result.cut.forces.segmentation, period=float("nan"))
     unknown = of_cut(result, forces=replace(result.cut.forces, segmentation=segmentation))
     row = next(r for r in result_rows(unknown) if r.key == "segment_period_us")
-    assert row.here is None and row.here_text == "–"
+    assert row.here is None and row.cells["mean"] == "–"
     assert "no period" in row.explanation
 
 
-def test_a_part_that_fails_is_shown_with_its_reason_beside_the_others(result, undrawn, tmp_path):
+def test_a_part_that_fails_is_shown_beside_the_others(result, undrawn, tmp_path):
     """The analysis names one part; a figure that cannot be drawn is another."""
     reason = "region chip 1 body: reaches over columns 50.34 to 81.35"
     data = result.data.drop_vars("ridge_distance")

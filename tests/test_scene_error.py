@@ -249,7 +249,7 @@ def test_the_command_reports_without_a_word_of_cutting(folder):
         assert all(data[name].attrs.get("units") for name in data.data_vars)
 
 
-def test_the_study_as_run_runs_again(folder):
+def test_the_study_as_run_runs_again(folder, undrawn):
     assert chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out").exit_code == 0
     done = chipglow("run", "out/study.yaml", "--out", "again")
     assert done.exit_code == 0, done.output
@@ -260,7 +260,7 @@ def test_the_study_as_run_runs_again(folder):
     assert first == second
 
 
-def test_one_emissivity_is_enough(folder):
+def test_one_emissivity_is_enough(folder, undrawn):
     (folder / "short.yaml").write_text("camera: {integration_time: 2 us, lower_limit: none}\n")
     done = chipglow(
         "error", "plate.nc", "--study", "short.yaml", "--emissivity", "0.5", "--out", "out"

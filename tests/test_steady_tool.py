@@ -76,10 +76,10 @@ def test_the_field_is_taken_over_to_a_finer_grid():
 
 @pytest.fixture(scope="module")
 def cold():
-    # Cells of 40 um and a small region, for time: the contact is 8 cells long.
+    # Cells of 40 um and a small region, for time: the contact is some 6 cells long.
     return CuttingSimulation(
-        conditions=CuttingConditions(feed=0.2e-3, cutting_length=0.3e-3),
-        numerics=Numerics(40e-6, upstream=0.36e-3, downstream=0.4e-3, height=0.56e-3),
+        conditions=CuttingConditions(feed=0.15e-3, cutting_length=0.3e-3),
+        numerics=Numerics(40e-6, upstream=0.32e-3, downstream=0.36e-3, height=0.48e-3),
     )
 
 

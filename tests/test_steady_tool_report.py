@@ -70,7 +70,7 @@ def test_a_scene_warmer_by_some_degrees_is_warmer_by_these_in_the_table(own, ste
 def test_the_report_shows_both_and_what_the_paper_misses(own, steady, undrawn, tmp_path):
     text = "title: A study\n"
     report = write_report(own, tmp_path, "A study", text, {}, study=Study(), steady=steady)
-    page = report.read_text(encoding="utf-8").replace("\u00a0", " ")
+    page = " ".join(report.read_text(encoding="utf-8").split())
     assert "Tool at steady-state temperature" in page
     assert "100 °C below the measured one" in page
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))

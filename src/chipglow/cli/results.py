@@ -17,7 +17,7 @@ from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
 from chipglow.report import result_rows, write_report
-from chipglow.report.paper import CITATION, stands_beside
+from chipglow.report.paper import CITATION
 from chipglow.study import Progress, Study, errors, run, study_text
 from chipglow.text import Notes
 
@@ -155,15 +155,15 @@ def _provenance(study: Study) -> dict[str, str]:
 
 def _print_table(analysis: Analysis, study: Study) -> None:
     """Print all results; with the paper's values if the study is the paper's."""
-    beside = stands_beside(study, analysis)
-    texts = {
-        "quantity": "quantity",
-        **({"the paper": "paper_text"} if beside else {"reference": "reference_text"}),
-        "here": "here_text",
-        "95 % interval": "interval_text",
-        **({"differs": "differs_text"} if beside else {}),
-    }
     rows = result_rows(analysis, study)
-    frame = pd.DataFrame([[getattr(row, name) for name in texts.values()] for row in rows])
-    frame.columns = list(texts)
+    compared = any(row.published for row in rows)
+    names = {
+        "quantity": "quantity",
+        **({"the paper": "paper"} if compared else {"reference": "reference"}),
+        "here": "mean",
+        "95 % interval": "interval",
+        **({"differs": "differs"} if compared else {}),
+    }
+    frame = pd.DataFrame([[row.cells[name] for name in names.values()] for row in rows])
+    frame.columns = list(names)
     current().table("results", frame)

@@ -2,12 +2,11 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from math import degrees, nan
+from math import degrees
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.cli.finish import figure, finish
@@ -32,13 +31,13 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     time = None if at is None else _time_in(scene, at)
     summary = scene_summary(scene, time)
     screen = current()
-    screen.facts("scene", _facts(scene, summary, path))
-    screen.heading(f"\nAt {microseconds(summary.times[summary.index])}:")
+    screen.facts("scene", _facts(scene, path))
+    screen.heading(f"\nAt {microseconds(scene.times[summary.index])}:")
     screen.facts("state", _state(summary))
     screen.heading()
     _show_fields(summary)
-    screen.values(raster_values(summary.raster, summary.times))
-    screen.values({"at_us": 1e6 * summary.times[summary.index]})
+    screen.values(raster_values(scene.raster, scene.times))
+    screen.values({"at_us": 1e6 * scene.times[summary.index]})
     show_attributes(_other_attributes(scene))
     finish(Notes(), (plot, figure(draw_scene, scene, time)))
     scene.data.close()
@@ -66,8 +65,8 @@ def _time_in(scene: Scene, at: str) -> float:
     return time
 
 
-def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
-    raster, times, data = summary.raster, summary.times, scene.data
+def _facts(scene: StoredScene, path: Path) -> _Rows:
+    raster, times, data = scene.raster, scene.times, scene.data
     yield from where_and_when("samples", raster, times)
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
@@ -136,18 +135,8 @@ def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
 
 def _show_fields(summary: SceneSummary) -> None:
     everywhere = f"in {len(summary.sampled)} frames"
-    columns = {name: name for name in ("field", "unit", "least", "median", "greatest")}
-    columns[everywhere] = "overall"
-    frame = pd.DataFrame(
-        {
-            "field": field.field.title,
-            "unit": field.field.unit,
-            **dict(zip(("least", "median", "greatest"), field.now or (nan,) * 3, strict=True)),
-            "overall": field.overall or (),
-        }
-        for field in summary.fields
-    )
-    current().table("fields", frame, columns, "Over the material", unbroken=("field",))
+    columns = {everywhere if name == "overall" else name: name for name in summary.fields}
+    current().table("fields", summary.fields, columns, "Over the material", unbroken=("field",))
 
 
 def show_attributes(attributes: Mapping[str, Any]) -> None:

@@ -222,8 +222,16 @@ def image_panels(panels: Sequence[ImagePanel], raster: Raster, tool: Tool | None
     for axes, panel in zip(grid.flat, panels, strict=False):
         panel.draw(figure, axes, raster, tool)
     for axes in grid.flat[len(panels) :]:
-        axes.remove()
+        leave_out(axes, grid[-2, 1] if rows > 1 else None, raster)
     return figure
+
+
+def leave_out(axes: Axes, above: Axes | None, raster: Raster) -> None:
+    """Remove an image and label the one above it, now the lowest of its column."""
+    axes.remove()
+    if above is not None:
+        above.set_xlabel(f"x / {length_unit(raster)[1]}")
+        above.tick_params(labelbottom=True)
 
 
 def draw_mean(

@@ -5,23 +5,15 @@ from chipglow.report.paper import QUICK
 from chipglow.report.report import write_report
 from chipglow.report.rows import Row, result_rows, results_frame
 from chipglow.report.scene_figure import draw_scene
-from chipglow.report.scene_summary import (
-    FieldSummary,
-    QualitySummary,
-    SceneSummary,
-    ShownField,
-    scene_summary,
-)
+from chipglow.report.scene_summary import QualitySummary, SceneSummary, scene_summary
 
 __all__ = [
     "QUICK",
     "CutPicture",
-    "FieldSummary",
     "MovieScales",
     "QualitySummary",
     "Row",
     "SceneSummary",
-    "ShownField",
     "cut_movie",
     "draw_scene",
     "result_rows",

@@ -1,47 +1,49 @@
 """The answer: the errors in sentences, each with its interval."""
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from math import isfinite
+from typing import Final, NamedTuple
 
 from chipglow.analysis import Distribution
 from chipglow.analysis.distribution import COVERAGE
-from chipglow.analysis.reductions import Headline
 from chipglow.quantities.format import quantity_text
-from chipglow.report.facts import Facts, texts
-from chipglow.report.page import Answer, Term
-from chipglow.report.paper import PAPER
+from chipglow.report.facts import Facts
+from chipglow.report.page import texts
 from chipglow.report.rows import MAIN, Row, draws_text, slug, spread_text
 
-_MAX_SENTENCES = 3
+_MAX_SENTENCES: Final = 3
 """Number of sentences; the tables hold all errors."""
 
 
-def answer(facts: Facts, rows: Sequence[Row]) -> Answer:
-    """Return a sentence for each main error: of a cut at fixed places, else at the first ones.
+class Statement(NamedTuple):
+    """A sentence on an error, and the id of its explanation on the page."""
 
-    Each refers to the explanation of its row.
-    """
-    links = {row.key: row.term.key for row in rows}
-    found = dict(list(_main(facts))[:_MAX_SENTENCES])
-    statements = [
-        Term(links[f"{slug(name)}_error_degC"], name, _sentence(facts, name, one))
-        for name, one in found.items()
+    text: str
+    link: str
+
+
+def answer(facts: Facts, errors: Sequence[Row]) -> list[Statement]:
+    """Return a sentence for each main error: of a cut at fixed places, else at the first ones."""
+    rows = {row.key: row for row in errors}
+    return [
+        Statement(_sentence(facts, name, rows), rows[f"{slug(name)}_error_degC"].link)
+        for name in islice(_main(facts), _MAX_SENTENCES)
     ]
-    several = any(one.error.draws > 1 for one in found.values())
-    return Answer(statements, facts.text(texts()["note"]) if several else "")
 
 
-def _main(facts: Facts) -> Iterator[tuple[str, Headline]]:
+def _main(facts: Facts) -> Iterator[str]:
     """Yield the first error at every place with every surface; of a cut its main ones."""
     places = set()
     for name, found in facts.headlines.items():
         place = (found.place, found.surface)
         if name in MAIN if facts.analysis.cut is not None else place not in places:
             places.add(place)
-            yield name, found
+            yield name
 
 
-def _sentence(facts: Facts, name: str, found: Headline) -> str:
+def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
+    found, row = facts.headlines[name], rows[f"{slug(name)}_error_degC"]
     template = texts()["answers"].get(name, texts()["answers"]["any"])
     values = {"name": name, "surface": found.surface, "error": error_text(found.error)}
     parts = [facts.text(template, **values)]
@@ -49,10 +51,9 @@ def _sentence(facts: Facts, name: str, found: Headline) -> str:
     if fraction is not None and fraction.mean > 0:  # blur may raise the temperature beside a band
         percent = spread_text(100 * fraction.mean, 100 * fraction.standard_deviation, "%", 0)
         parts.append(f"the point spread function accounts for {percent} of the error")
-    published = PAPER.get(f"{name}_error_degC") if facts.is_compared else None
-    if published is not None and found.error.draws > 1:
-        side = "outside" if found.error.differs_from(published.value) else "inside"
-        parts.append(f"the paper's {-published.value:.0f} °C lies {side} the interval")
+    if row.paper is not None and found.error.draws > 1:
+        side = "outside" if row.differs else "inside"
+        parts.append(f"the paper's {-row.paper:.0f} °C lies {side} the interval")
     return "; ".join(parts) + "."
 
 

@@ -106,7 +106,7 @@ def measurement(facts: Facts) -> Figure:
     for axes, name in zip(rows, names, strict=True):
         truth = shown.scene_radiance_temperature.sel(surface=name).values - KELVIN
         measured = shown.radiance_temperature.sel(surface=name).values - KELVIN
-        limits = _heat_limits(facts, truth)
+        limits = facts.heat_limits(truth)
         pixels = analysis.measurements[name].raster
         drawing.show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
         picture = drawing.show_image(axes[1], measured, pixels, analysis.tool, scales.HEAT, limits)
@@ -235,7 +235,7 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
                 own_width, colour = psf.fwhm * 1e6, _ORDERS[order][0]
                 _draw_point(axes, own_width, scale * draws.mean, colour, "PSF of this camera")
             place = data.place.sel(reading=name).item()
-            axes.set(title=f"{title}, {place}", ylabel="%" if scale == 100 else "°C")
+            axes.set(title=place, ylabel=f"{title} / {'%' if scale == 100 else '°C'}")
     for axes in grid[-1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
     _legend(figure, grid.flat, columns=2)
@@ -250,14 +250,6 @@ def _of(facts: Facts, title: str, surface: str) -> str:
 def _line_title(facts: Facts, line: str) -> str:
     title = {"rake": "across the rake face", "band": "across the shear band"}.get(line, line)
     return _of(facts, title, str(facts.data.line_surface.sel(line=line).item()))
-
-
-def _heat_limits(facts: Facts, truth: Array) -> tuple[float, float]:
-    """Return ends of a scale of temperatures in °C, the lower near the camera's lower limit."""
-    low, high = scales.ends(truth, 0.5, 99.9, 1.0)
-    limit = facts.analysis.camera.lower_limit
-    low = low if limit is None else max(limit - KELVIN - 50.0, low)
-    return low, max(high, low + 50.0)
 
 
 def _draws(values: Array) -> Array:
@@ -283,7 +275,8 @@ def _draw_published(axes: Axes, line: str) -> None:
     """Draw the published values on a line of a cut."""
     error, fraction = PAPER[f"{line}_error_degC"], PAPER[f"{line}_psf_fraction_percent"]
     _draw_point(axes, 0.0, error.value, BLUE, "the paper's error")
-    _draw_point(axes, 0.0, error.value * fraction.value / 100, VERMILLION, "the paper's PSF part")
+    portion = error.value * fraction.value / 100
+    _draw_point(axes, 0.0, portion, VERMILLION, "the paper's PSF contribution")
     worst = PAPER.get(f"{line}_worst_error_degC")
     if worst is not None:
         label = "the paper, beside the band"

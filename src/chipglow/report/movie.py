@@ -5,15 +5,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import ceil, floor, log10
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from chipglow.cutting import CuttingSimulation
@@ -103,51 +101,37 @@ class CutPicture:
         high = _AROUND + _PANEL * self._raster.rows / self._raster.columns
         height = 2 * round(min(max(high, _HEIGHTS[0]), _HEIGHTS[1]) / 2)
         self._figure = Figure(figsize=(_WIDTH / _DPI, height / _DPI), dpi=_DPI, layout="compressed")
-        self._canvas = _canvas(self._figure)
+        self._canvas = cast(Any, FigureCanvasAgg(self._figure))  # untyped
+        self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
         self._slowest = ends.rate[0]
         low, top = (limit - scales.KELVIN for limit in ends.temperature)
-        self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
-        left, middle, right = self._figure.subplots(1, 3, sharex=True, sharey=True)
-        rate = "plastic strain rate", "strain rate / (1/s)", scales.RATE
-        self._images = (
-            self._panel(left, "temperature", "temperature / °C", scales.HEAT, (low, top)),
-            self._panel(middle, "plastic strain", "plastic strain", scales.PLAIN, ends.strain),
-            self._panel(right, *rate, ends.rate, log=True),
+        looks: Any = (
+            ("temperature", "temperature / °C", scales.HEAT, (low, top), "max"),
+            ("plastic strain", "plastic strain", scales.PLAIN, ends.strain, "max"),
+            ("plastic strain rate", "strain rate / (1/s)", scales.RATE, ends.rate, "both"),
         )
-        for axes in (middle, right):
+        panels = self._figure.subplots(1, 3, sharex=True, sharey=True)
+        empty = np.full(self._raster.shape, np.nan, np.float32)
+        self._images = []
+        for axes, (title, label, colours, limits, extend) in zip(panels, looks, strict=True):
+            log = extend == "both"
+            image = drawing.show_image(
+                axes, empty, self._raster, self._tool, colours, limits, log=log
+            )
+            self._figure.colorbar(image, ax=axes, label=label, extend=extend, aspect=25)
+            axes.set_title(title)
+            axes.label_outer()
+            self._images.append(image)
+        for axes in panels[1:]:
             axes.fill(*(self._tool.outline(_FAR) * 1e6).T, color=_TOOL, zorder=1.5)
-        title = self._figure.suptitle(" ", fontsize=11)
-        self._title = title
-        self._moving: list[Artist] = [title]
-        for axes in (left, middle, right):
+        self._title = self._figure.suptitle(" ", fontsize=11)
+        self._moving: list[Artist] = [self._title]
+        for axes in panels:
             self._moving += [*axes.images, *axes.patches, *axes.lines]
         for artist in self._moving:
             artist.set_animated(True)
         self._canvas.draw()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
-
-    def _panel(
-        self,
-        axes: Axes,
-        title: str,
-        label: str,
-        colours: str,
-        limits: tuple[float, float],
-        *,
-        log: bool = False,
-    ) -> AxesImage:
-        empty = np.full(self._raster.shape, np.nan, np.float32)
-        image = drawing.show_image(axes, empty, self._raster, self._tool, colours, limits, log=log)
-        extend = "both" if log else "max"
-        self._figure.colorbar(image, ax=axes, label=label, extend=extend, aspect=25)
-        axes.set_title(title)
-        axes.label_outer()
-        return image
-
-
-def _canvas(figure: Figure) -> Any:
-    """Return the canvas of a figure, which Matplotlib does not type."""
-    return FigureCanvasAgg(figure)
 
 
 @contextmanager

@@ -1,145 +1,76 @@
-"""The report as one self-contained HTML page: what it is made of, and its Jinja2 template."""
+"""The Jinja2 environment of the report: its page, and the texts and expressions in YAML."""
 
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
+from importlib.resources import files
+from math import degrees, isfinite
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from chipglow import __version__
+from chipglow.quantities.format import quantity_text
+from chipglow.text.yaml_file import parse_yaml
+
+_IMPORT: Final = '{% from "sentences.txt" import gaussian_widths, main_cause, wings with context %}'
+_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=[°%µ]|[KN]\b|mm\b|1/s)|(?<=±) | (?=±)")
 
 
-class Term(NamedTuple):
-    """A word of the report: its id on the page, the word and its meaning."""
-
-    key: str
-    name: str
-    text: str = ""
-
-
-class Line(NamedTuple):
-    """A row of a table: texts, unit of the numbers, id of its explanation, and its source."""
-
-    texts: Sequence[str]
-    unit: str = ""
-    key: str = ""
-    where: str = ""
+@cache
+def texts(name: str = "texts") -> Mapping[str, Any]:
+    """Return the templates of all texts, or of those about the paper."""
+    text = files("chipglow.report").joinpath(f"{name}.yaml").read_text(encoding="utf-8")
+    parsed: Mapping[str, Any] = parse_yaml(text)
+    return parsed
 
 
-class Table(NamedTuple):
-    """A table with a paragraph above it; all columns but the first are numbers."""
-
-    text: str
-    heads: Sequence[Term]
-    lines: Sequence[Line]
+@cache
+def template(text: str) -> Template:
+    """Return the template of a text."""
+    return environment().from_string(f"{_IMPORT}{text}" if "{" in text else text)
 
 
-class FigureFile(NamedTuple):
-    """A figure as written: file name without ending, heading, figure of the paper, texts, PNG."""
-
-    name: str
-    title: str
-    paper: str
-    caption: str
-    alt: str
-    png: Path
-
-
-class Terms(NamedTuple):
-    """Words with their meanings, to which tables and sentences refer."""
-
-    terms: Sequence[Term]
-
-
-class Answer(NamedTuple):
-    """The sentences of the answer (each with the id of its explanation), and a note on reading."""
-
-    statements: Sequence[Term]
-    note: str
-
-
-class Remarks(NamedTuple):
-    """Sentences in boxes."""
-
-    sentences: Sequence[str]
-
-
-class Failure(NamedTuple):
-    """A part that could not be computed or drawn, and the reason."""
-
-    title: str
-    reason: str
-
-
-class Text(NamedTuple):
-    """A paragraph and preformatted text."""
-
-    text: str = ""
-    code: str = ""
-
-
-class Pairs(NamedTuple):
-    """Names with their values."""
-
-    rows: Sequence[tuple[str, str]]
-
-
-class Part(NamedTuple):
-    """Blocks under one heading; the template has a macro for each class of block.
-
-    Without a heading they belong to the section itself.
-    """
-
-    key: str
-    title: str
-    blocks: Sequence[Any]
-
-
-class Section(NamedTuple):
-    """A section of the page."""
-
-    key: str
-    title: str
-    parts: Sequence[Part]
-
-
-def page(title: str, sections: Sequence[Section]) -> str:
-    """Return the page as HTML, which loads nothing and runs its own script only."""
-    shown = [section for section in sections if section.parts]
-    template = environment().get_template("report.html")
-    return template.render(title=title, sections=shown, version=__version__)
+@cache
+def expression(text: str) -> Callable[[Mapping[str, Any]], Any]:
+    """Return the function of an expression."""
+    return environment().compile_expression(text)
 
 
 @cache
 def environment() -> Environment:
-    """Return the Jinja2 environment of the report's templates; it escapes all text."""
+    """Return the environment; it escapes text on the page only."""
     made = Environment(
-        loader=PackageLoader("chipglow.report"), autoescape=True, undefined=StrictUndefined
+        loader=PackageLoader("chipglow.report"),
+        autoescape=lambda name: name == "report.html",
+        undefined=StrictUndefined,
     )
-    made.filters |= {"shown": _shown, "data_url": _data_url, "has_digit": _has_digit, "kind": _kind}
+    made.filters |= {
+        "data_url": _data_url,
+        "degrees": degrees,
+        "mean": lambda values: float(np.mean(list(values))),
+        "median": lambda values: float(np.median(list(values))),
+        "number": _number,
+        "percent": lambda fraction: _number(100 * fraction, "%"),
+        "shown": _shown,
+        "um": lambda length: f"{length * 1e6:.3g} µm" if isfinite(length) else "of unknown length",
+    }
+    made.tests["numeric"] = lambda text: any(map(str.isdigit, text))
     return made
-
-
-_BEFORE_UNIT: Final = re.compile(r"(?<=\d) (?=[°%µ]|[KN]\b|mm\b|1/s)|(?<=±) | (?=±)")
-
-
-def _shown(text: str) -> Markup:
-    """Escape a text and keep each number on one line with its unit."""
-    return Markup(_BEFORE_UNIT.sub("\u00a0", str(escape(text))))
 
 
 def _data_url(png: Path) -> str:
     return f"data:image/png;base64,{b64encode(png.read_bytes()).decode('ascii')}"
 
 
-def _has_digit(text: str) -> bool:
-    return any(letter.isdigit() for letter in text)
+def _number(value: float, unit: str, decimals: int = 0) -> str:
+    number = float(value)
+    return quantity_text(number, unit, decimals) if isfinite(number) else "an unknown value"
 
 
-def _kind(block: Any) -> str:
-    """Return the name of a block's macro in the template."""
-    return type(block).__name__.lower()
+def _shown(text: str) -> Markup:
+    """Escape a text and keep each number on one line with its unit."""
+    return Markup(_BEFORE_UNIT.sub("\u00a0", str(escape(text))))

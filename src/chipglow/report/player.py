@@ -16,26 +16,19 @@ from PIL import Image
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text
-from chipglow.report.facts import Facts, texts, time_text
-from chipglow.scene import Raster, Tool
+from chipglow.report.facts import Facts, time_text
+from chipglow.report.page import texts
+from chipglow.scene import Raster
 
 _COLOURS: Final = 255
 
 
-class Mark(NamedTuple):
-    """A curve on all images, points in m of shape (n, 2); on those of one frame if it is given."""
-
-    points: NDArray[np.float64]
-    kind: str
-    frame: int | None = None
-
-
 class Curve(NamedTuple):
-    """A mark in the unit of the page's drawing."""
+    """A curve on all images, in the unit of the drawing; on those of one frame if it is given."""
 
     points: str
     kind: str
-    frame: int | None
+    frame: int | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +80,7 @@ class View:
 class Player:
     """Views of the same frames; `still` is shown first, without script and in print.
 
-    Tool and marks are drawn on all views; `times` are the captions of the frames.
+    The curves are drawn on all views; `times` are the captions of the frames.
     """
 
     title: str
@@ -96,28 +89,13 @@ class Player:
     times: Sequence[str]
     still: int
     raster: Raster
-    tool: Tool | None = None
-    marks: Sequence[Mark] = ()
+    curves: Sequence[Curve]
 
     @property
     def box(self) -> str:
         """View box of the drawing on an image."""
         left, right, bottom, top = self._extent
         return f"{left:.1f} {-top:.1f} {right - left:.1f} {top - bottom:.1f}"
-
-    @property
-    def curves(self) -> list[Curve]:
-        """Outline of the tool and marks in the drawing's unit."""
-        tool = [] if self.tool is None else [Mark(self.tool.outline(3e-3), "tool")]
-        factor = drawing.length_unit(self.raster)[0]
-        return [
-            Curve(
-                " ".join(f"{x:.1f},{-y:.1f}" for x, y in mark.points * factor),
-                mark.kind,
-                mark.frame,
-            )
-            for mark in (*tool, *self.marks)
-        ]
 
     @property
     def scale_bar(self) -> dict[str, Any]:
@@ -162,23 +140,27 @@ def exposure_player(facts: Facts) -> Player:
         ],
         still=int(analysis.data.attrs["shown_instant"]),
         raster=raster,
-        tool=analysis.tool,
-        marks=list(_marks(facts)),
+        curves=list(_curves(facts, drawing.length_unit(raster)[0])),
     )
 
 
-def _marks(facts: Facts) -> Iterator[Mark]:
-    """Yield where the errors are read and, of a cut, the ridge of the band in every exposure."""
+def _curves(facts: Facts, factor: float) -> Iterator[Curve]:
+    """Yield tool, places of the readings and, of a cut, the band's ridge in every exposure."""
     cut, still = facts.analysis.cut, int(facts.data.attrs["shown_instant"])
-    if cut:
-        for i, instant in enumerate(cut.one_segment):
-            if instant.band is not None:
-                yield Mark(instant.band.ridge.points, "ridge", i)
+    if facts.analysis.tool is not None:
+        yield Curve(_points(factor * facts.analysis.tool.outline(3e-3)), "tool")
+    for i, instant in enumerate(cut.one_segment if cut else ()):
+        if instant.band is not None:
+            yield Curve(_points(factor * instant.band.ridge.points), "ridge", i)
     for points in facts.read_curves():
         if len(points) > 1:
-            yield Mark(points, "line", still if cut else None)
+            yield Curve(_points(factor * points), "line", still if cut else None)
         else:
-            yield Mark(points.repeat(2, axis=0), "spot")
+            yield Curve(_points(factor * points.repeat(2, axis=0)), "spot")
+
+
+def _points(points: NDArray[np.float64]) -> str:
+    return " ".join(f"{x:.1f},{-y:.1f}" for x, y in points)
 
 
 def _views(facts: Facts) -> Iterator[View]:
@@ -186,10 +168,7 @@ def _views(facts: Facts) -> Iterator[View]:
     data = facts.data.isel(instant=slice(facts.starts)).sel(surface=facts.read_surfaces)
     reference, measured = data.reference_temperature - KELVIN, data.radiance_temperature - KELVIN
     error = measured - reference
-    low, high = scales.ends(reference.values, 0.5, 99.9, 1.0)
-    if facts.analysis.camera.lower_limit is not None:
-        low = max(facts.analysis.camera.lower_limit - KELVIN - 50.0, low)
-    heat = (low, max(high, low + 1.0))
+    heat = facts.heat_limits(reference.values)
     largest = scales.round_limit(error.values, 99.0, 10.0)
     for name in facts.read_surfaces:
         of = f", {name}" if len(facts.read_surfaces) > 1 else ""

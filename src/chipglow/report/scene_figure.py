@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
-from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE
+from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
@@ -60,7 +59,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         if has_quality and frame.quality is not None:
             _draw_quality(top, next(places), frame, frame.quality, raster, tool)
         for empty in places:
-            _leave_out(empty, grid[-2, 1] if rows > 1 else None)
+            drawing.leave_out(empty, grid[-2, 1] if rows > 1 else None, raster)
         solid = frame.material == Material.WORKPIECE
         below = bottom.subplots(histogram_rows, 2, squeeze=False)
         for axes, panel in zip(below.flat, panels, strict=False):
@@ -75,20 +74,20 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
 def _panels(frame: Frame) -> list[ImagePanel]:
     """Return panels of temperature and, if available, strain, strain rate and speed."""
     there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
-    temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
+    temperature = np.where(there, frame.temperature.astype(np.float64) - KELVIN, np.nan)
     heat = scales.ends(temperature, 0.1, 99.9)
-    panels = [ImagePanel("temperature", TEMPERATURE.label, temperature, heat, scales.HEAT)]
+    panels = [ImagePanel("temperature", "temperature / °C", temperature, heat, scales.HEAT)]
     if frame.plastic_strain is not None:
         strain = np.where(solid, frame.plastic_strain, np.nan)
         ends = (0.0, scales.ends(strain, 0.0, 99.9)[1])
-        panels.append(ImagePanel("plastic strain", STRAIN.label, strain, ends))
+        panels.append(ImagePanel("plastic strain", "plastic strain", strain, ends))
     if frame.plastic_strain_rate is not None:
         rate = np.where(solid, frame.plastic_strain_rate, np.nan)
         decades = _decades(rate)
         panels.append(
             ImagePanel(
                 "plastic strain rate",
-                RATE.label,
+                "strain rate / (1/s)",
                 np.maximum(rate, decades[0]),
                 decades,
                 scales.RATE,
@@ -156,15 +155,6 @@ def _draw_quality(
     title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
     ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
     drawing.veil(axes, filled, raster, VERMILLION, 1.0)
-
-
-def _leave_out(axes: Axes, above: Axes | None) -> None:
-    """Remove a panel and label the one above it, now the lowest of its column."""
-    axes.remove()
-    if above is None:
-        return
-    above.set_xlabel("x / µm")
-    above.tick_params(labelbottom=True)
 
 
 def _draw_histogram(axes: Axes, panel: ImagePanel, values: NDArray[Any]) -> None:

@@ -1,69 +1,42 @@
 """The contents of a scene in numbers, from a few of its frames."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.drawing.frames import shown_frame
-from chipglow.scene import FILLED, Frame, Material, Raster, Scene
+from chipglow.drawing.scales import KELVIN
+from chipglow.scene import FILLED, Frame, Material, Scene
 
 _SAMPLED: Final = 5
 """Frames whose smallest and largest values a summary includes, besides the one shown."""
 
 
-@dataclass(frozen=True)
-class ShownField:
-    """A field of a `chipglow.scene.Frame` as shown: `scale` times the SI value, plus `offset`."""
+class _Field(NamedTuple):
+    """How a field of a frame is shown: `scale` times the SI value, plus `offset`."""
 
-    name: str
     title: str
     unit: str = ""
     scale: float = 1.0
     offset: float = 0.0
 
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return values in the shown unit."""
-        return values.astype(np.float64) * self.scale + self.offset
 
-    @property
-    def label(self) -> str:
-        """Title and unit, for an axis."""
-        unit = f"({self.unit})" if "/" in self.unit else self.unit
-        return f"{self.title} / {unit}" if unit else self.title
-
-
-TEMPERATURE: Final = ShownField("temperature", "temperature", "°C", offset=-273.15)
-STRAIN: Final = ShownField("plastic_strain", "plastic strain")
-RATE: Final = ShownField("plastic_strain_rate", "strain rate", "1/s")
-_FIELDS: Final = (
-    TEMPERATURE,
-    STRAIN,
-    RATE,
-    ShownField("velocity_x", "velocity along x", "m/s"),
-    ShownField("velocity_y", "velocity along y", "m/s"),
-    ShownField("material_x", "x before the cut", "µm", scale=1e6),
-    ShownField("material_y", "y before the cut", "µm", scale=1e6),
-)
+_FIELDS: Final = {
+    "temperature": _Field("temperature", "°C", offset=-KELVIN),
+    "plastic_strain": _Field("plastic strain"),
+    "plastic_strain_rate": _Field("strain rate", "1/s"),
+    "velocity_x": _Field("velocity along x", "m/s"),
+    "velocity_y": _Field("velocity along y", "m/s"),
+    "material_x": _Field("x before the cut", "µm", scale=1e6),
+    "material_y": _Field("y before the cut", "µm", scale=1e6),
+}
 
 
-@dataclass(frozen=True)
-class FieldSummary:
-    """Values of a field over the workpiece in the shown unit; None if no workpiece is visible.
-
-    `now` is minimum, median and maximum at the time of the summary, `overall` minimum and maximum
-    over all frames that were read.
-    """
-
-    field: ShownField
-    now: tuple[float, float, float] | None
-    overall: tuple[float, float] | None
-
-
-@dataclass(frozen=True)
-class QualitySummary:
+class QualitySummary(NamedTuple):
     """Reliability of the samples that show material, at the time of the summary.
 
     `filled` is the fraction whose value is taken from neighbours; `median` and `percentile_95` are
@@ -79,14 +52,15 @@ class QualitySummary:
 class SceneSummary:
     """The contents of a scene in the frame `index`; `sampled` are all frames that were read.
 
+    `fields` has a row for each field of the frame: its title ``field``, its ``unit``, and in this
+    unit ``least``, ``median`` and ``greatest`` over the workpiece at the time of the summary, and
+    the range ``overall`` of all frames that were read; NaN and () if no workpiece is visible.
     `fractions` are those of the samples that show each material.
     """
 
-    raster: Raster
-    times: NDArray[np.float64]
     index: int
     sampled: tuple[int, ...]
-    fields: tuple[FieldSummary, ...]
+    fields: pd.DataFrame
     fractions: Mapping[Material, float]
     quality: QualitySummary | None
 
@@ -101,49 +75,44 @@ def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
     last = len(scene.times) - 1
     sampled = tuple(sorted({index, *np.linspace(0, last, _SAMPLED).astype(int).tolist()}))
     frame = scene.frame(index)
-    limits = [_limits(frame if i == index else scene.frame(i)) for i in sampled]
+    names = [name for name in _FIELDS if getattr(frame, name) is not None]
+    ends: dict[str, list[float]] = {name: [] for name in names}
+    for i in sampled:
+        one = frame if i == index else scene.frame(i)
+        for name in names:
+            values = _over_workpiece(name, one)
+            ends[name] += [float(values.min()), float(values.max())] if values.size else []
+    fields = {name: _values(name, frame, ends[name]) for name in names}
     return SceneSummary(
-        raster=scene.raster,
-        times=scene.times,
         index=index,
         sampled=sampled,
-        fields=tuple(_fields(frame, limits)),
+        fields=pd.DataFrame.from_dict(fields, orient="index"),
         fractions={kind: float(np.mean(frame.material == kind)) for kind in Material},
-        quality=quality_of(frame),
+        quality=_quality(frame),
     )
 
 
-_Limits: TypeAlias = dict[str, tuple[float, float]]
+def _values(name: str, frame: Frame, ends: list[float]) -> dict[str, object]:
+    """Return a row of `SceneSummary.fields`."""
+    now, field = _over_workpiece(name, frame), _FIELDS[name]
+    least, median, greatest = np.percentile(now, (0, 50, 100)) if now.size else (np.nan,) * 3
+    return {
+        "field": field.title,
+        "unit": field.unit,
+        "least": least,
+        "median": median,
+        "greatest": greatest,
+        "overall": (min(ends), max(ends)) if ends else (),
+    }
 
 
-def _limits(frame: Frame) -> _Limits:
-    """Return minimum and maximum over the workpiece, by field; empty without workpiece."""
-    values = {field.name: over_workpiece(field, frame) for field in _shown_fields(frame)}
-    return {name: (float(v.min()), float(v.max())) for name, v in values.items() if v.size}
+def _over_workpiece(name: str, frame: Frame) -> NDArray[np.float64]:
+    """Return the values of a field over the workpiece as shown, shape (n,)."""
+    values: NDArray[np.float32] = getattr(frame, name)[frame.material == Material.WORKPIECE]
+    return values.astype(np.float64) * _FIELDS[name].scale + _FIELDS[name].offset
 
 
-def _fields(frame: Frame, limits: list[_Limits]) -> Iterator[FieldSummary]:
-    for field in _shown_fields(frame):
-        now = over_workpiece(field, frame)
-        pairs = [frame_limits[field.name] for frame_limits in limits if frame_limits]
-        yield FieldSummary(
-            field,
-            (float(now.min()), float(np.median(now)), float(now.max())) if now.size else None,
-            (min(low for low, _ in pairs), max(high for _, high in pairs)) if pairs else None,
-        )
-
-
-def _shown_fields(frame: Frame) -> list[ShownField]:
-    """Return the numeric fields of a frame."""
-    return [field for field in _FIELDS if getattr(frame, field.name) is not None]
-
-
-def over_workpiece(field: ShownField, frame: Frame) -> NDArray[np.float64]:
-    """Return the values of the workpiece, shape (n,)."""
-    return field(getattr(frame, field.name)[frame.material == Material.WORKPIECE])
-
-
-def quality_of(frame: Frame) -> QualitySummary | None:
+def _quality(frame: Frame) -> QualitySummary | None:
     """Return the reliability of a frame; None if it has no quality flags."""
     if frame.quality is None:
         return None

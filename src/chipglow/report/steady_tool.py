@@ -9,9 +9,8 @@ import numpy as np
 from chipglow.analysis import Analysis, headline
 from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip import contact_temperatures, rake_grid
-from chipglow.report.facts import Facts, texts
-from chipglow.report.page import Line, Table, Term
-from chipglow.report.paper import RAKE_MISSING, stands_beside
+from chipglow.report.facts import Facts
+from chipglow.report.page import texts
 from chipglow.report.rows import slug, spread_text
 
 Spread = tuple[float, float]
@@ -37,16 +36,19 @@ class ToolRow:
         return self.steady[0] - self.own[0], hypot(self.steady[1], self.own[1])
 
     @property
-    def line(self) -> Line:
-        """The row of the report's table."""
-        cells = [spread_text(*spread, self.unit, 0) for spread in (self.own, self.steady)]
-        cells.append(spread_text(*self.difference, self.unit, 0, "+"))
-        return Line((self.quantity, *cells), self.unit, self.term.key)
+    def cells(self) -> Mapping[str, str]:
+        """The row in a table: texts by column."""
+        return {
+            "quantity": self.quantity,
+            "own": spread_text(*self.own, self.unit, 0),
+            "steady": spread_text(*self.steady, self.unit, 0),
+            "difference": spread_text(*self.difference, self.unit, 0, "+"),
+        }
 
     @property
-    def term(self) -> Term:
-        """The explanation with its id on the page."""
-        return Term(f"tool-{self.key}", f"Steady tool: {self.quantity}", self.explanation)
+    def link(self) -> str:
+        """Id of the explanation on the page."""
+        return f"tool-{self.key}"
 
 
 def tool_rows(own: Analysis, steady: Analysis) -> list[ToolRow]:
@@ -55,31 +57,12 @@ def tool_rows(own: Analysis, steady: Analysis) -> list[ToolRow]:
     rows = []
     for key, spread in before.items():
         kind = "rake_peak_degC" if key.startswith("rake_peak") else key
-        template, surface = texts()["rows"][kind], key[len("rake_peak_") : -len("_degC")]
+        template, surface = texts()["rows"]["tool"][kind], key[len("rake_peak_") : -len("_degC")]
         name = next((one for one in own.measurements if slug(one) == surface), "")
         quantity = facts.text(template["quantity"], surface=name)
         row = ToolRow(key, quantity, template["unit"], spread, after[key], template["text"])
         rows.append(row)
     return rows
-
-
-def tool_table(own: Analysis, rows: list[ToolRow], study: object) -> Table:
-    """Return the report's table of `tool_rows`."""
-    heads = ("Quantity", "Tool of this study", "Steady tool", "Difference")
-    text = (
-        "The same cut with a tool that starts at the steady-state temperature of conduction from "
-        "the contact to the holder."
-    )
-    key = f"rake_peak_{slug(str(own.data.attrs['rake_surface']))}_degC"
-    peak = next((row for row in rows if row.key == key), None)
-    if peak is not None and isfinite(peak.difference[0]) and stands_beside(study, own):
-        text += (
-            f" The peak of the paper's simulated profile nearest the rake face is about "
-            f"{RAKE_MISSING.value:.0f} °C below the measured one ({RAKE_MISSING.where}). The "
-            f"steady tool raises ours by {spread_text(*peak.difference, '°C', 0)}. The "
-            "temperature of the paper's tool is not known."
-        )
-    return Table(text, [Term("", head) for head in heads], [row.line for row in rows])
 
 
 def _values(analysis: Analysis) -> Mapping[str, Spread]:

@@ -1,12 +1,12 @@
 """The numbers of a report for scripts: summary.json and its schema, from one declaration."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from chipglow.analysis import Distribution
-from chipglow.report.rows import CauseRow, PartRow, Row, known
+from chipglow.analysis import Analysis, Distribution
+from chipglow.report.rows import Row, known
 from chipglow.report.steady_tool import ToolRow
 
 _Known = FiniteFloat | None
@@ -120,37 +120,46 @@ class Summary(_Numbered):
 
 
 def summary(
-    rows: Sequence[Row],
-    causes: Sequence[CauseRow],
-    parts: Sequence[PartRow],
-    chip: Sequence[Row],
-    camera: Sequence[Row],
+    rows: Mapping[str, Sequence[Row]],
     steady: Sequence[ToolRow],
-    **more: object,
+    analysis: Analysis,
+    provenance: Mapping[str, str],
 ) -> Summary:
-    """Return the numbers of a report; `more` are further entries such as the provenance."""
+    """Return the numbers of a report."""
+    results, chip = [*rows["errors"], *rows["cut"]], rows["chip"]
+    drawn = {row.key: row.draws for row in results if row.draws is not None}
     return Summary(
-        camera={row.key: row.here for row in camera},
-        results={row.key: row.here for row in rows},
-        references={row.key: row.reference.mean for row in rows if row.reference is not None},
-        draws={row.key: Scatter.of(row.draws) for row in rows if row.draws is not None},
-        causes={row.key: _causes(row) for row in causes},
-        parts={row.key: {name: _mean(one) for name, one in row.parts.items()} for row in parts},
-        one_draw={row.key: row.one_draw for row in rows if row.one_draw is not None},
+        camera={row.key: row.here for row in rows["camera"]},
+        results={row.key: row.here for row in results},
+        references={row.key: row.reference.mean for row in results if row.reference},
+        draws={key: Scatter.of(draws) for key, draws in drawn.items()},
+        causes={key: _causes(draws) for key, draws in drawn.items() if draws.draws > 1},
+        parts={
+            row.key: {name: _mean(part) for name, part in row.parts.items()}
+            for row in results
+            if row.parts
+        },
+        one_draw={row.key: row.one_draw for row in results if row.one_draw is not None},
         chip={row.key: row.here for row in chip},
         chip_uncertainty={row.key: row.uncertainty for row in chip if row.uncertainty is not None},
-        paper={row.key: row.paper for row in rows if row.paper is not None},
-        differs={row.key: row.differs for row in rows if row.paper is not None},
-        explanation={row.key: row.explanation for row in (*rows, *chip, *camera)},
+        paper={row.key: row.paper for row in results if row.paper is not None},
+        differs={row.key: row.differs for row in results if row.paper is not None},
+        explanation={row.key: row.explanation for row in (*results, *chip, *rows["camera"])},
         steady_tool={row.key: _tools(row) for row in steady},
-        **more,  # type: ignore[arg-type]
+        provenance=dict(provenance),
+        missing=list(analysis.missing),
+        failed=dict(analysis.failed),
     )
 
 
-def _causes(row: CauseRow) -> dict[str, Cause]:
+def _causes(draws: Distribution) -> dict[str, Cause]:
     return {
-        name: Cause(count=count, standard_deviation=deviation, fraction_percent=fraction)
-        for name, count, deviation, fraction in row.causes
+        name: Cause(
+            count=part.draws,
+            standard_deviation=known(part.standard_deviation),
+            fraction_percent=100 * part.fraction,
+        )
+        for name, part in draws.parts.items()
     }
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import hypot, isfinite, sqrt
 from pathlib import Path
 from statistics import fmean
@@ -211,9 +212,8 @@ class MovieSource(Source, Part):
 
     def survey(self) -> Survey:
         """Look at what is there: sizes, times, legends, the background, what colours leave open."""
-        indices = self._indices()
+        indices, readers, assumed = self._opened
         index = indices[self._names[0]]
-        readers, assumed = self._readers(indices)
         times, clock = self._times(index)
         return Survey(
             kind=f"movie, {index.count} pictures of {index.columns} x {index.rows}, {index.codec}",
@@ -229,9 +229,8 @@ class MovieSource(Source, Part):
 
         A tool that is known by its colour has no values.
         """
-        indices = self._indices()
+        indices, readers, _ = self._opened
         index = indices[self._names[0]]
-        readers, _ = self._readers(indices)
         times, _ = self._times(index)
         if start >= len(times):
             return
@@ -252,8 +251,14 @@ class MovieSource(Source, Part):
 
         In a movie that cannot be searched, in three of the first 101.
         """
+        indices, readers, _ = self._opened
+        return self._uncertainty(indices, readers)
+
+    @cached_property
+    def _opened(self) -> tuple[dict[str, MovieIndex], dict[str, FieldReader], tuple[str, ...]]:
+        """Indices of the movies, readers of their pictures, and what these assume."""
         indices = self._indices()
-        return self._uncertainty(indices, self._readers(indices)[0])
+        return indices, *self._readers(indices)
 
     @property
     def _names(self) -> tuple[str, ...]:
