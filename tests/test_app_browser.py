@@ -1,4 +1,4 @@
-"""The app in Debian's Chromium: one server, and pages that are used as a user does.
+"""The app in Chromium: one server, one browser and mostly one page, used as a user does.
 
 Without Chromium or Playwright these tests are skipped. CHIPGLOW_CHROMIUM names another browser.
 """
@@ -15,8 +15,8 @@ from urllib.request import Request, urlopen
 import numpy as np
 import pytest
 
-from chipglow.app.model import SceneModel
 from chipglow.app.opening import open_any
+from chipglow.app.pictures import SceneModel
 from chipglow.io import open_scene
 from chipglow.study import fit, load_study
 
@@ -59,9 +59,9 @@ def chromium():
         browser.close()
 
 
-@pytest.fixture
-def visit(server, chromium):
-    """Open pages, each a user of their own; nothing may go wrong in them or leave the machine."""
+@pytest.fixture(scope="module")
+def opening(server, chromium):
+    """Open pages, each a user of their own; `wrong` is what went wrong in them."""
     contexts, wrong = [], []
 
     def opened(query="", status=EXACT):
@@ -76,11 +76,33 @@ def visit(server, chromium):
         ready(page, status)
         return page
 
-    yield opened
+    yield opened, wrong
     for context in contexts:
         context.close()
+
+
+@pytest.fixture
+def visit(opening):
+    """Open a page; nothing may go wrong in it or leave the machine."""
+    opened, wrong = opening
+    yield opened
     refused = "Failed to load resource: the server responded with a status of 400"
     assert [one for one in wrong if not one.startswith(refused)] == []
+
+
+@pytest.fixture(scope="module")
+def shared(opening):
+    return opening[0]()
+
+
+@pytest.fixture
+def page(shared, visit):
+    """A page in its initial state, which it goes back to."""
+    yield shared
+    shared.get_by_role("button", name="Whole view").click()
+    while "?" in (before := shared.url):
+        shared.locator("#undo").click()
+        shared.wait_for_url(lambda url, before=before: url != before)
 
 
 @pytest.fixture(scope="module")
@@ -150,8 +172,7 @@ def test_a_page_opens_only_with_the_token(server, visit, model):
     assert page.get_by_label("Pixel pitch", exact=True).first.input_value() == "6"
 
 
-def test_knobs_change_what_the_library_says(visit, model):
-    page = visit()
+def test_knobs_change_what_the_library_says(page, model):
     for label, text, texts in (
         ("Pixel pitch", "5", {"camera.pitch": "5"}),
         (
@@ -175,8 +196,7 @@ def test_knobs_change_what_the_library_says(visit, model):
     number(page, "measured").get_by_text(expected(model, texts)).wait_for()
 
 
-def test_what_is_being_typed_stays_while_the_page_changes(visit, model):
-    page = visit()
+def test_what_is_being_typed_stays_while_the_page_changes(page, model):
     turn(page, "Pixel pitch", "5")
     number(page, "measured").get_by_text(expected(model, {"camera.pitch": "5"})).wait_for()
     aperture = control(page, "camera.psf.numerical_aperture")
@@ -189,8 +209,7 @@ def test_what_is_being_typed_stays_while_the_page_changes(visit, model):
     number(page, "measured").get_by_text(expected(model, texts)).wait_for()
 
 
-def test_a_wrong_number_is_said_and_changes_nothing(visit, model):
-    page = visit()
+def test_a_wrong_number_is_said_and_changes_nothing(page, model):
     turn(page, "Pixel pitch", "-5")
     page.locator("#status.error", has_text="Pixel pitch: -5 um is not over 0").wait_for()
     field = control(page, "camera.pitch")
@@ -210,8 +229,7 @@ def test_of_a_link_that_is_wrong_in_part_the_rest_counts(visit, model):
     assert page.locator("#status.error").is_visible()
 
 
-def test_the_wheel_leads_no_further_than_three_times_the_image(visit):
-    page = visit()
+def test_the_wheel_leads_no_further_than_three_times_the_image(page):
     page.mouse.move(*place(page, "measured_figure", -300, 200))
     for _ in range(15):
         page.mouse.wheel(0, 2000)
@@ -225,9 +243,8 @@ def test_the_wheel_leads_no_further_than_three_times_the_image(visit):
     assert (right - left) / (top - bottom) == pytest.approx(660 / 540, rel=0.02)
 
 
-def test_a_line_and_the_cursor_are_dragged(visit, model):
-    page = visit()
-    (x, y), _ = model.controls.initial.line("band_line")
+def test_a_line_and_the_cursor_are_dragged(page, model):
+    (x, y), _ = model.controls.initial.line("band_line").corners
     start = place(page, "measured_figure", 1e6 * x, 1e6 * y)
     end = place(page, "measured_figure", -400, 150)
     page.mouse.move(*start)
@@ -243,7 +260,7 @@ def test_a_line_and_the_cursor_are_dragged(visit, model):
     assert np.hypot(found[0] + 400, found[1] - 150) < 3 * pixel
     moved = {"band_line": ends.input_value()}
     state = model.controls.changed(model.controls.initial, moved)
-    values = model.picture(state).lines["band_line"].measured - 273.15
+    values = model.picture(state).lines["band_line"]["measured"]
     assert np.isfinite(values).all()
     # The numbers follow the line's place when they are computed.
     page.wait_for_function("""values => {
@@ -260,9 +277,8 @@ def test_a_line_and_the_cursor_are_dragged(visit, model):
     number(page, "measured").get_by_text(text).wait_for()
 
 
-def test_a_whole_line_is_dragged(visit, model):
-    page = visit()
-    ends = np.array(model.controls.initial.line("band_line")) * 1e6
+def test_a_whole_line_is_dragged(page, model):
+    ends = np.array(model.controls.initial.line("band_line").corners) * 1e6
     middle = ends.mean(axis=0)
     start, end = (place(page, "measured_figure", *at) for at in (middle, middle - (60, 30)))
     page.mouse.move(*start)
@@ -315,8 +331,7 @@ def test_downloads_hold_what_is_shown(visit, tmp_path, model):
     assert page.get_by_label("Pixel pitch").count() == 0
 
 
-def test_a_wrong_file_is_one_clear_error(visit, tmp_path):
-    page = visit()
+def test_a_wrong_file_is_one_clear_error(page, tmp_path):
     file = tmp_path / "holiday.nc"
     file.write_bytes(b"no scene" * 100)
     page.locator("input[type=file]").set_input_files(file)
@@ -343,9 +358,10 @@ def test_reloading_brings_the_state_back_and_sessions_stay_apart(visit, model):
     assert control(second, "camera.pitch").input_value() == "8"
 
 
-def test_draws_show_progress_and_can_be_cancelled(visit):
+def test_draws_show_progress_and_can_be_cancelled(page):
     # 45 draws of so many pixels are not done before they are cancelled.
-    page = visit("&camera.pitch=1")
+    turn(page, "Pixel pitch", "1")
+    page.wait_for_url("**camera.pitch=1*")
     page.get_by_role("button", name="Draw phases").click()
     page.get_by_role("progressbar", name="Progress").wait_for()
     page.get_by_role("button", name="Cancel").click()
@@ -357,8 +373,7 @@ def test_draws_show_progress_and_can_be_cancelled(visit):
     page.locator("#status", has_text="over 9 draws").wait_for()
 
 
-def test_all_is_reached_by_the_keyboard_in_either_theme(visit):
-    page = visit()
+def test_all_is_reached_by_the_keyboard_in_either_theme(page):
     reached = set()
     page.locator("button", has_text="Open…").focus()
     for _ in range(70):

@@ -16,7 +16,6 @@ from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.chip import (
-    BandProfile,
     NoShearBandError,
     Stage,
     ThermalImage,
@@ -24,11 +23,11 @@ from chipglow.laboratory.chip import (
     find_band,
     read_curve,
 )
-from chipglow.laboratory.chip.band_figure import draw_band_profile
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
+from chipglow.laboratory.chip.figures import draw_band_profile
 from chipglow.laboratory.chip.ridge import local_parabolas
-from chipglow.scene import Line, PlacedTool
-from chipglow.uncertainty import Estimate, from_xarray
+from chipglow.scene import PlacedTool
+from chipglow.uncertainty import from_xarray
 
 PITCH = RASTER.spacing
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -320,17 +319,6 @@ def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
 def test_what_cannot_be_is_one_error(wrong, message):
     with pytest.raises(ValueError, match=message):
         band_profile(measured([BandImage().temperature()]), TOOL, **wrong)
-
-
-def test_a_profile_s_shapes_must_fit():
-    line = Line(np.arange(3.0), np.zeros((3, 2)))
-    three, ok = np.zeros((1, 3)), np.zeros(1)
-    parts = {"estimate": Estimate(three), "offset": ok}
-    common = {"reference": line, "distance": np.arange(3.0), "times": ok, "width": 0.0}
-    with pytest.raises(ValueError, match=r"points has shape \(1, 3\)"):
-        BandProfile(**common, **parts, points=three, stage=(Stage.NONE,))
-    with pytest.raises(ValueError, match="0 stages for 1 frames"):
-        BandProfile(**common, **parts, points=np.zeros((1, 3, 2)), stage=())
 
 
 # The command

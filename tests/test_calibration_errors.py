@@ -14,7 +14,7 @@ from chipglow.camera import CalibrationErrors, Measurement, fit_linear, fit_saku
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
-from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.laboratory.comparison import StatedUncertainties, compare
 from chipglow.scene import PlacedTool
 from chipglow.uncertainty import Estimate, draw

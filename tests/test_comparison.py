@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
-from chipglow.laboratory.chip.frame_scatter import FrameScatter
+from chipglow.laboratory.chip.frames import FrameScatter
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
 from chipglow.laboratory.comparison.comparison import SURE, _confidence
 from chipglow.scene import PlacedTool, ToolGeometry

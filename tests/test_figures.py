@@ -17,9 +17,9 @@ from documented import ROOT
 
 import chipglow
 from chipglow.camera import Camera
-from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.laboratory.emissivity.figure import draw_emissivity
-from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
+from chipglow.laboratory.measurement.figures import draw_calibrations
 from chipglow.laboratory.psf.figure import draw_knife_edge
 from chipglow.report.scene_figure import draw_scene
 

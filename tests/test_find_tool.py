@@ -209,7 +209,7 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["real.nc"], "--tool: the measurement states no tool"),
+        (["real.nc"], "tool: the measurement contains no tool"),
         (["told.nc", "--frame", "2"], "--frame: '2', expected 0 to 1, or all"),
         (["told.nc", "--frame", "0", "--at", "1 us"], "--frame and --at cannot be combined"),
         (["told.nc", "--at", "1 s"], "--at: 1 s, expected 0 us to 10 us"),

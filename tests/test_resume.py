@@ -152,15 +152,14 @@ def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, unb
     killed_run(study, rng)
     reached = [kept_progress(study)]
     assert not is_cut(study)
-    for _ in range(2):
-        killed_run(study, rng, "--resume")
-        reached.append(kept_progress(study))
-        assert len(unfinished_scenes(running.scene_path(running._inputs(study)))) <= 2
-    assert 0 < reached[0] < reached[1] < reached[2]
+    killed_run(study, rng, "--resume")
+    reached.append(kept_progress(study))
+    assert len(unfinished_scenes(running.scene_path(running._inputs(study)))) <= 2
+    assert 0 < reached[0] < reached[1]
     with start("--resume") as process:
         _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
-    assert f"Resuming the cut at {reached[2]:.0%}" in errors
+    assert f"Resuming the cut at {reached[1]:.0%}" in errors
     assert_same_scene("scene.nc", unbroken)
     assert [path.suffix for path in cache.iterdir()] == [".nc"]
 

@@ -13,7 +13,7 @@ import chipglow
 from chipglow.laboratory.chip import (
     band_profile,
 )
-from chipglow.laboratory.chip.band_figure import draw_band_profile
+from chipglow.laboratory.chip.figures import draw_band_profile
 from chipglow.laboratory.comparison import (
     Comparison,
     StatedUncertainties,

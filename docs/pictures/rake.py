@@ -11,7 +11,7 @@ from chipglow.laboratory.chip import (
     find_tool,
     rake_grid,
 )
-from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.study import Study, cut
 
 HERE = Path(__file__).parent

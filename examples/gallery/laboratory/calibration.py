@@ -37,7 +37,7 @@ from chipglow.camera import (
 from chipglow.drawing.drawing import new_figure, show_image, style
 from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.laboratory.measurement import calibrate_recording
-from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
+from chipglow.laboratory.measurement.figures import draw_calibrations
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)

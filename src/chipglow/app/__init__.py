@@ -1,5 +1,75 @@
-"""The app: a scene under a camera whose knobs can be turned, in a browser or in a notebook."""
+"""The app: a scene and a camera with controls, as a local server or as a part of a notebook."""
 
-from chipglow.app.exploring import explore, serve
+import gc
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from chipglow.scene import Scene
+    from chipglow.study import Study
 
 __all__ = ["explore", "serve"]
+
+
+def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = None) -> Any:
+    """Return the app's page for a notebook: a scene and a camera with controls.
+
+    Parameters
+    ----------
+    scene : Scene or path-like, optional
+        A scene, or a path that ``chipglow app`` opens; the bundled scene by default.
+    study : Study, optional
+        Initial surface and camera; the paper's by default.
+
+    Returns
+    -------
+    panel.viewable.Viewable
+        A notebook shows it as the last line of a cell.
+
+    Raises
+    ------
+    ValueError
+        If Panel is not installed, or the scene cannot be opened.
+    """
+    _check_installed()
+    import panel as pn
+
+    from chipglow.app.opening import OpenedScene, open_any
+    from chipglow.app.view import View
+    from chipglow.scene import Scene
+    from chipglow.study import Study
+
+    pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
+    if isinstance(scene, Scene):
+        opened: Any = OpenedScene.of(scene, study or Study(), "scene")
+    else:
+        opened = open_any(scene, study)
+    view = View(opened, embedded=True)
+    view.start(None)
+    return view.page
+
+
+def serve(path: Path | None, address: str, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the app until Ctrl-C; `ready` takes the URL as soon as a browser can open it.
+
+    Raises
+    ------
+    ValueError
+        If Panel is not installed, the path cannot be opened, or the address is not available.
+    """
+    _check_installed()
+    from chipglow.app.opening import open_any
+    from chipglow.app.server import App
+
+    app = App(open_any(path), address, port)
+    ready(app.url)
+    # Imported objects are exempt from garbage collection, which would take longer than a picture.
+    gc.freeze()
+    app.run()
+
+
+def _check_installed() -> None:
+    if find_spec("panel") is None:
+        raise ValueError("app: needs Panel, expected pip install 'chipglow[app]'")

@@ -1,34 +1,28 @@
 """The controls of the app: rows that name a setting of the study, and the study at their values."""
 
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from types import NoneType
-from typing import Any, Final, Literal, TypeAlias, get_args
+from typing import Any, Final, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from chipglow.analysis import LinePlace
+from chipglow.camera.exposure import frame_weights
 from chipglow.quantities import changed, setting_at, value_at
-from chipglow.quantities.units import INSTANT, POSITION, Quantity
+from chipglow.quantities.units import INSTANT, Quantity, is_bare_number
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.study.surface_section import FeaturesSection, surface_names
 from chipglow.surface import UniformEmissivity
 from chipglow.text.description import problem
 
-Point: TypeAlias = tuple[float, float]
-Corners: TypeAlias = tuple[Point, Point]
 Texts: TypeAlias = Mapping[str, str]
-"""Values of controls by their paths, as a link writes them; those not given are the first ones."""
-
-Stage: TypeAlias = Literal["surface", "exposure", "pixels", "optics", "reading", "view"]
-"""First part of the computation of a picture that a control changes."""
-
-STAGES: Final = get_args(Stage)
+"""Values of controls by their paths, as a link writes them; without one the initial value."""
 
 CURSOR: Final = "cursor"
 LINES: Final[Mapping[str, str]] = {
@@ -37,14 +31,16 @@ LINES: Final[Mapping[str, str]] = {
 }
 """The lines, and their names in a study."""
 
-SCENE_IMAGES: Final[Mapping[str, str]] = {
-    "temperature": "True temperature",
-    "radiance_temperature": "Radiance temperature",
-    "emissivity": "Emissivity",
-    "plastic_strain": "Plastic strain",
-    "plastic_strain_rate": "Plastic strain rate",
-    "speed": "Speed",
+SCENE_IMAGES: Final[Mapping[str, tuple[str, str]]] = {
+    "temperature": ("True temperature", "°C"),
+    "radiance_temperature": ("Radiance temperature", "°C"),
+    "emissivity": ("Emissivity", ""),
+    "plastic_strain": ("Plastic strain", ""),
+    "plastic_strain_rate": ("Plastic strain rate", "(1/s)"),
+    "speed": ("Speed", "(m/s)"),
 }
+"""Label and unit of each."""
+
 ERROR_IMAGES: Final[Mapping[str, str]] = {
     "total": "Error",
     "motion": "Error by motion",
@@ -63,9 +59,16 @@ _NOISE: Final = {
 }
 """A detector with this noise and steps too fine to matter."""
 
-_BARE: Final = re.compile(r"[-+−]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
-_PLACE_STEP: Final = 0.1
-"""Resolution of positions in µm."""
+_VIEW: Final = ("start", "scene_image", "error_image")
+"""Controls of the page itself, which are no settings of a study."""
+
+_FIELDS: Final = {
+    "radiance_temperature": "temperature", "emissivity": "temperature", "speed": "velocity_x"
+}  # fmt: skip
+"""Fields of a scene that its images need, where the names differ."""
+
+_SLACK: Final = 1e-7
+"""How far outside the image a position may be in m: links round to this."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,6 @@ class Control:
     path: str
     label: str
     group: str
-    stage: Stage
     low: float = 0.0
     high: float = 1.0
     step: float = 0.01
@@ -92,6 +94,11 @@ class Control:
     quantity: Quantity | None = None
     optional: bool = False
     whole: bool = False
+
+    @property
+    def setting(self) -> str:
+        """Path of the setting in the study."""
+        return self.path
 
     @property
     def unit(self) -> str:
@@ -107,71 +114,106 @@ class Control:
             return _quantity_text(self.quantity, value)
         return str(value) if self.options or self.whole else f"{value:.10g}"
 
-    def number(self, value: Any) -> str:
-        """Return a value without its unit; empty for none."""
+    def shown(self, value: Any) -> str:
+        """Return a value as its field shows it: without its unit, empty for none."""
         if self.options or value is None:
             return value or ""
         return self.text(value).split(" ")[0]
 
     def value(self, text: str) -> Any:
         """Return the value in SI of a text, with or without its unit."""
-        written = text.strip()
-        if self.optional and written in ("", "none"):
+        text = text.strip()
+        if self.optional and text in ("", "none"):
             return None
         if self.options:
-            if written not in self.options:
-                raise ValueError(f"{self.label}: {written!r}, expected {', '.join(self.options)}")
-            return written
-        number = written.replace(",", ".")
+            if text not in self.options:
+                raise ValueError(f"{text!r}, expected {', '.join(self.options)}")
+            return text
+        text = text.replace(",", ".")
+        if self.quantity is not None:
+            unit = f" {self.quantity.unit}" if is_bare_number(text) else ""
+            return self.quantity.parse(text + unit)
         try:
-            if self.whole:
-                return int(number)
-            if self.quantity is None:
-                return float(number)
-            bare = f"{number} {self.quantity.unit}" if _BARE.fullmatch(number) else written
-            return self.quantity.parse(bare)
-        except ValueError as error:
+            return int(text) if self.whole else float(text)
+        except ValueError:
             kind = "a whole number" if self.whole else "a number"
-            expected = str(error) if self.quantity else f"{written!r}, expected {kind}"
-            raise ValueError(f"{self.label}: {expected}") from None
+            raise ValueError(f"{text!r}, expected {kind}") from None
+
+
+@dataclass(frozen=True)
+class PlaceControl(Control):
+    """The cursor or the ends of a line, in µm."""
+
+    extent: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def setting(self) -> str:
+        """Path of the place in the study."""
+        is_line = self.path in LINES
+        return f"analysis.lines.{LINES[self.path]}" if is_line else f"analysis.points.{CURSOR}"
+
+    def text(self, value: Any) -> str:
+        """Return positions as links write them."""
+        points = value if self.path in LINES else (value,)
+        return ";".join(f"{1e6 * x:.1f},{1e6 * y:.1f}" for x, y in points)
+
+    def shown(self, value: Any) -> str:
+        """Return positions as their field shows them."""
+        return self.text(value).replace(",", ", ").replace(";", "; ")
+
+    def value(self, text: str) -> Any:
+        """Return positions in m, which are within the image."""
+        try:
+            pairs = (one.split(",") for one in text.split(";"))
+            points = tuple((float(f"{x.strip()}e-6"), float(f"{y.strip()}e-6")) for x, y in pairs)
+        except ValueError:
+            raise ValueError(f"{text!r}, expected positions such as -35,120 in µm") from None
+        count = 2 if self.path in LINES else 1
+        if not len(set(points)) == len(points) == count:
+            raise ValueError(f"{text!r}, expected {count} different points")
+        left, right, bottom, top = self.extent
+        for x, y in points:
+            if max(left - x, x - right, bottom - y, y - top) > _SLACK:
+                raise ValueError(
+                    f"{text}, expected x from {1e6 * left:.1f} to {1e6 * right:.1f} µm and y from "
+                    f"{1e6 * bottom:.1f} to {1e6 * top:.1f} µm"
+                )
+        return points if self.path in LINES else points[0]
 
 
 TABLE: Final = (
-    Control("start", "Exposure begins", "Scene", "exposure", quantity=INSTANT),
-    Control("scene_image", "Scene image", "Scene", "view"),
-    Control("error_image", "Error image", "Scene", "view"),
-    Control("camera.band.0", "Band from", "Camera", "exposure", 0.8, 8.0, 0.1),
-    Control("camera.band.1", "Band to", "Camera", "exposure", 1.0, 14.0, 0.1),
-    Control("camera.pitch", "Pixel pitch", "Camera", "pixels", 1.0, 30.0, 0.5),
-    Control("camera.integration_time", "Exposure", "Camera", "exposure", 1.0, 50.0, 0.5),
-    Control("camera.offset_right", "Pixels right", "Camera", "pixels", 0.0, 12.0, 0.5),
-    Control("camera.offset_down", "Pixels down", "Camera", "pixels", 0.0, 12.0, 0.5),
-    Control("camera.psf", "PSF", "Optics", "optics"),
-    Control("camera.psf.numerical_aperture", "Numerical aperture", "Optics", "optics", 0.1, 0.7),
-    Control("camera.psf.fwhm", "PSF width (FWHM)", "Optics", "optics", 1.0, 30.0, 0.5),
-    Control("camera.psf_order", "Order", "Optics", "optics"),
-    Control("camera.detector", "Detector", "Detector", "reading"),
-    Control("camera.detector.terms.0.netd", "Noise (NETD)", "Detector", "reading", 0.05, 5.0, 0.05),
-    Control("camera.lower_limit", "Lower range limit", "Detector", "reading", 0.0, 800.0, 10.0),
-    Control("surface", "Emissivity", "Surface", "surface"),
-    Control(f"surface.chips.{OWN}.body.mean", "Chip, mean", "Surface", "surface", 0.05),
+    Control("start", "Exposure begins", "Scene", quantity=INSTANT),
+    Control("scene_image", "Scene image", "Scene"),
+    Control("error_image", "Error image", "Scene"),
+    Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
+    Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
+    Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
+    Control("camera.integration_time", "Exposure", "Camera", 1.0, 50.0, 0.5),
+    Control("camera.offset_right", "Pixels right", "Camera", 0.0, 12.0, 0.5),
+    Control("camera.offset_down", "Pixels down", "Camera", 0.0, 12.0, 0.5),
+    Control("camera.psf", "PSF", "Optics"),
+    Control("camera.psf.numerical_aperture", "Numerical aperture", "Optics", 0.1, 0.7),
+    Control("camera.psf.fwhm", "PSF width (FWHM)", "Optics", 1.0, 30.0, 0.5),
+    Control("camera.psf_order", "Order", "Optics"),
+    Control("camera.detector", "Detector", "Detector"),
+    Control("camera.detector.terms.0.netd", "Noise (NETD)", "Detector", 0.05, 5.0, 0.05),
+    Control("camera.lower_limit", "Lower range limit", "Detector", 0.0, 800.0, 10.0),
+    Control("surface", "Emissivity", "Surface"),
+    Control(f"surface.chips.{OWN}.body.mean", "Chip, mean", "Surface", 0.05),
     Control(
         f"surface.chips.{OWN}.body.standard_deviation",
-        "Chip, std. deviation", "Surface", "surface", 0.0, 0.2, 0.005,
+        "Chip, std. deviation", "Surface", 0.0, 0.2, 0.005,
     ),
-    Control(f"surface.chips.{OWN}.shear_band.mean", "Shear band, mean", "Surface", "surface", 0.05),
+    Control(f"surface.chips.{OWN}.shear_band.mean", "Shear band, mean", "Surface", 0.05),
     Control(
         f"surface.chips.{OWN}.shear_band.standard_deviation",
-        "Shear band, std. dev.", "Surface", "surface", 0.0, 0.2, 0.005,
+        "Shear band, std. dev.", "Surface", 0.0, 0.2, 0.005,
     ),
-    Control("surface.emissivity", "Uniform emissivity", "Surface", "surface", 0.05),
-    Control("seed", "Seed", "Surface", "surface", 0, 4000, 1),
-    Control("camera.reflected", "Reflected temperature", "Surface", "exposure", 0.0, 300.0, 5.0),
+    Control("surface.emissivity", "Uniform emissivity", "Surface", 0.05),
+    Control("seed", "Seed", "Surface", 0, 4000, 1),
+    Control("camera.reflected", "Reflected temperature", "Surface", 0.0, 300.0, 5.0),
 )  # fmt: skip
 """All controls in the order of the page. A control is shown while the study has its setting."""
-
-_VIEW: Final = ("start", "scene_image", "error_image")
-"""Controls of the page itself, which are no settings of a study."""
 
 
 @dataclass(frozen=True)
@@ -185,35 +227,34 @@ class State:
     error_image: str
 
     @property
-    def cursor(self) -> Point:
+    def cursor(self) -> tuple[float, float]:
         """Position at which numbers are read in m."""
         return self.study.analysis.points[CURSOR]
 
-    def line(self, name: str) -> Corners:
-        """Ends of one of `LINES` in m."""
-        return self.study.analysis.lines[LINES[name]]  # type: ignore[return-value]
+    def line(self, name: str) -> LinePlace:
+        """Return one of `LINES`."""
+        return LinePlace(LINES[name], self.study.analysis.lines[LINES[name]])
 
-    def place(self, name: str) -> tuple[Point, ...]:
-        """The cursor or the ends of a line in m."""
-        return (self.cursor,) if name == CURSOR else self.line(name)
+    def key(self, *prefixes: str) -> tuple[tuple[str, str], ...]:
+        """Return the values of the controls whose paths begin so."""
+        return tuple(sorted(one for one in self.texts.items() if one[0].startswith(prefixes)))
 
 
 @dataclass(frozen=True, eq=False)
 class Controls:
-    """The controls of a study on a scene or of a measurement, and the state at their values."""
+    """The controls of a study on a scene or of a measurement, and the states at their values."""
 
     study: Study
     start: float
-    extent: tuple[float, float, float, float]
     rows: tuple[Control, ...]
+    scene: Scene | None = None
 
     @classmethod
     def of_scene(cls, study: Study, scene: Scene, start: float, duration: float) -> "Controls":
         """Return the controls of a scene; one exposure lasts `duration`."""
         options = _options(study, scene)
-        studies = [
-            _with(study, one.changes) for words in options.values() for one in words.values()
-        ]
+        words = (word for row in options.values() for word in row.values())
+        studies = [_with(study, word.changes) for word in words]
         side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
         longest = 5e6 * study.camera.integration_time
         ranges: dict[str, dict[str, Any]] = {
@@ -223,14 +264,14 @@ class Controls:
                 "low": longest / 50, "high": longest, "step": longest / 100
             },
         }  # fmt: skip
-        rows = []
+        rows: list[Control] = []
         for row in TABLE:
             made = replace(row, options=options.get(row.path, {}), **ranges.get(row.path, {}))
-            if row.path not in options and row.path not in _VIEW:
-                having = [one for one in studies if _has(one, row.path)]
-                if not having:
+            if not made.options and row.path not in _VIEW:
+                having = next((one for one in studies if _has(one, row.path)), None)
+                if having is None:
                     continue
-                setting = setting_at(having[0], row.path)
+                setting = setting_at(having, row.path)
                 made = replace(
                     made,
                     quantity=setting.parameter.quantity,
@@ -238,17 +279,17 @@ class Controls:
                     whole=setting.kind is int,
                 )
             rows.append(made)
-        return cls(study, start, scene.raster.extent, tuple(rows))
+        return cls(study, start, (*rows, *_places(scene.raster)), scene)
 
     @classmethod
     def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
-        """Return the only control of a measurement: which of its frames is shown."""
+        """Return the controls of a measurement: which of its frames is shown, and the places."""
         row = replace(TABLE[0], label="Frame began", stops=tuple(map(rounded, times)))
-        return cls(study, row.stops[0], raster.extent, (row,))
+        return cls(study, row.stops[0], (row, *_places(raster)))
 
     @cached_property
     def initial(self) -> State:
-        """The state at the first values."""
+        """The state at the initial values."""
         return self.state({})
 
     @cached_property
@@ -259,30 +300,19 @@ class Controls:
         """Return the control of a path."""
         return self._by_path[path]
 
-    def key(self, state: State, last: Stage) -> tuple[str | None, ...]:
-        """Return the values that decide about the stages of a picture up to the last one."""
-        known = STAGES[: STAGES.index(last) + 1]
-        return tuple(state.texts.get(row.path) for row in self.rows if row.stage in known)
-
     def is_shown(self, row: Control, state: State) -> bool:
         """Whether the study has the setting of a control."""
-        return row.path in _VIEW or _has(state.study, row.path)
+        return row.path in _VIEW or _has(state.study, row.setting)
 
     def value(self, row: Control, state: State) -> Any:
-        """Return the value of a control: a word, or a number in SI."""
+        """Return the value of a control: a word, a number in SI or positions; None if hidden."""
         if row.options:
-            return state.texts.get(row.path, next(iter(row.options)))
+            return _word(row, state.texts)
         if row.path == "camera.lower_limit":
             return state.study.camera.build().lower_limit
         if row.path == "start":
             return state.start
-        return value_at(state.study, row.path) if _has(state.study, row.path) else None
-
-    def values(self, state: State) -> dict[str, str]:
-        """Return the texts of all controls and places as the page shows them."""
-        places = (CURSOR, *LINES)
-        texts = {row.path: row.number(self.value(row, state)) for row in self.rows}
-        return texts | {name: places_text(state.place(name), ", ", "; ") for name in places}
+        return value_at(state.study, row.setting) if self.is_shown(row, state) else None
 
     def changed(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values.
@@ -290,95 +320,59 @@ class Controls:
         Raises
         ------
         ValueError
-            If a text is no such value, or the study does not allow it.
+            If a text is no such value, or there is no picture at it; the message names the control.
         """
+        if unknown := [path for path in texts if path not in self._by_path]:
+            known = ", ".join(self._by_path)
+            raise ValueError(f"{unknown[0]}: unknown control, expected one of {known}")
         new = dict(state.texts)
-        for path, text in texts.items():
-            if path in (CURSOR, *LINES):
-                new[path] = self._place(path, text)
-            elif path in self._by_path:
+        try:
+            for path, text in texts.items():
                 row = self._by_path[path]
                 new[path] = row.text(row.value(text))
-            else:
-                known = ", ".join(self._by_path)
-                raise ValueError(f"{path}: unknown control, expected one of {known}")
-            if new[path] == self._first_text(path):
-                del new[path]
-        try:
-            return self.state(new)
-        except ValidationError as error:
-            raise ValueError(f"{self.named(texts)}: {problem(error)}") from None
+                if new[path] == row.text(self.value(row, self.initial)):
+                    del new[path]
+            made = self.state(new)
+            if self.scene is not None:
+                _check_exposure(made, self.scene)
         except ValueError as error:
-            raise ValueError(f"{self.named(texts)}: {error}") from None
-
-    def named(self, texts: Texts) -> str:
-        """Return controls and their new values as a message names them."""
-        return ", ".join(f"{self._label(path)} {text}" for path, text in texts.items())
-
-    def _label(self, path: str) -> str:
-        if path == CURSOR:
-            return "Cursor"
-        return f"Line {LINES[path]}" if path in LINES else self._by_path[path].label
+            labels = ", ".join(self._by_path[path].label for path in texts)
+            text = problem(error) if isinstance(error, ValidationError) else str(error)
+            raise ValueError(f"{labels}: {text}") from None
+        return made
 
     def state(self, texts: Texts) -> State:
-        """Return the state at given values; the first ones where none is given."""
-        words = {row.path: texts.get(row.path, next(iter(row.options), "")) for row in self.rows}
+        """Return the state at given values; the initial ones where none is given."""
         study = self.study
-        for row in self.rows:
-            if row.options and row.options[words[row.path]].changes:
-                study = _with(study, row.options[words[row.path]].changes)
+        words = {row.path: _word(row, texts) for row in self.rows if row.options}
+        for path, word in words.items():
+            study = _with(study, self.row(path).options[word].changes)
         numbers = {
-            path: row.value(texts[path])
-            for path, row in self._by_path.items()
-            if path in texts and not row.options and path not in _VIEW
-            and _has(study, path)
+            row.setting: row.value(texts[row.path])
+            for row in self.rows
+            if row.path in texts and row.path not in _VIEW and not row.options
+            and _has(study, row.setting)
         }  # fmt: skip
-        if numbers:
-            study = _with(study, numbers)
-        start = self.row("start").value(texts["start"]) if "start" in texts else self.start
         return State(
             texts,
-            study.model_copy(update={"analysis": self._analysis(study, texts)}),
-            start,
+            _with(study, numbers),
+            self.row("start").value(texts["start"]) if "start" in texts else self.start,
             words.get("scene_image", ""),
             words.get("error_image", ""),
         )
 
-    def _analysis(self, study: Study, texts: Texts) -> Any:
-        """Return the section of the analysis, with cursor and lines as its places."""
-        given = study.analysis
-        cursor = _places(texts[CURSOR])[0] if CURSOR in texts else given.points[CURSOR]
-        lines = {
-            title: _places(texts[name]) if name in texts else given.lines[title]
-            for name, title in LINES.items()
-        }
-        return given.model_copy(update={"points": {CURSOR: cursor}, "lines": lines})
 
-    def _first_text(self, path: str) -> str:
-        if path in (CURSOR, *LINES):
-            return places_text(self.initial.place(path))
-        row = self._by_path[path]
-        return row.text(self.value(row, self.initial)) if self.is_shown(row, self.initial) else ""
+def _word(row: Control, texts: Texts) -> str:
+    """Return the word of a control with options, of which the first is the initial one."""
+    return texts.get(row.path, next(iter(row.options)))
 
-    def _place(self, name: str, text: str) -> str:
-        """Return the text of points within the image."""
-        label, count = self._label(name), 1 if name == CURSOR else 2
-        try:
-            places = tuple(dict.fromkeys(_places(text)))
-        except ValueError:
-            expected = "expected positions such as -35,120 in µm"
-            raise ValueError(f"{label}: {text!r}, {expected}") from None
-        if len(places) != count:
-            raise ValueError(f"{label}: {text!r}, expected {count} different points")
-        left, right, bottom, top = (1e6 * edge for edge in self.extent)
-        for x, y in places:
-            outside = max(left - 1e6 * x, 1e6 * x - right, bottom - 1e6 * y, 1e6 * y - top)
-            if outside > _PLACE_STEP:
-                raise ValueError(
-                    f"{label}: {text}, expected x from {left:.1f} to {right:.1f} µm and y from "
-                    f"{bottom:.1f} to {top:.1f} µm"
-                )
-        return places_text(places)
+
+def _check_exposure(state: State, scene: Scene) -> None:
+    """Raise a ValueError if the scene holds no exposure of the state's camera."""
+    camera = state.study.camera.on(scene.raster, state.study.seed)
+    camera.pixels(scene.raster)
+    duration = camera.frame_duration(scene.raster)
+    frame_weights(scene.times, scene.frame_spacing, state.start, duration)
 
 
 @lru_cache(1000)
@@ -387,14 +381,10 @@ def _quantity_text(quantity: Quantity, value: float) -> str:
     return quantity.text(value)
 
 
-def places_text(places: tuple[Point, ...], comma: str = ",", between: str = ";") -> str:
-    """Return the text of positions in µm."""
-    return between.join(f"{1e6 * x:.1f}{comma}{1e6 * y:.1f}" for x, y in places)
-
-
-def _places(text: str) -> Any:
-    pairs = (one.split(",") for one in text.split(";"))
-    return tuple(tuple(POSITION.parse(f"{one.strip()} um") for one in (x, y)) for x, y in pairs)
+def _places(raster: Raster) -> Iterator[PlaceControl]:
+    labels = {CURSOR: "Cursor", **{name: f"Line {title}" for name, title in LINES.items()}}
+    for path, label in labels.items():
+        yield PlaceControl(path, label, "", extent=raster.extent)
 
 
 def _has(study: Study, path: str) -> bool:
@@ -420,6 +410,7 @@ def _with(study: Study, changes: Mapping[str, object]) -> Study:
 def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
     """Return the words of the controls that have some, the study's own one first."""
     camera, psf = study.camera, study.camera.psf
+    limit = {"camera.lower_limit": camera.build().lower_limit}
     psfs = {
         "annular-aperture": Option(
             "Annular aperture", {"camera.psf": {"kind": "annular-aperture"}}
@@ -427,24 +418,23 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
         "gaussian": Option("Gaussian", {"camera.psf": {"kind": "gaussian", "fwhm": "8 um"}}),
         "none": Option("None (ideal)", {"camera.psf": "none", "camera.blur": []}),
     }
-    detectors = {
-        "none": Option("None", {"camera.detector": "none"}),
-        "noise": Option("Noise", {"camera.detector": _NOISE}),
+    orders = {
+        "detector": Option("Blur on the pixels", {"camera.psf_order": "detector"}),
+        "optics": Option("Blur on the scene", {"camera.psf_order": "optics"}),
     }
-    limit = camera.build().lower_limit
     detectors = {
-        word: Option(one.label, {**one.changes, "camera.lower_limit": limit})
-        for word, one in detectors.items()
+        "none": Option("None", {"camera.detector": "none", **limit}),
+        "noise": Option("Noise", {"camera.detector": _NOISE, **limit}),
     }
-    orders = {"detector": "Blur on the pixels", "optics": "Blur on the scene"}
     return {
-        "scene_image": {k: Option(v) for k, v in SCENE_IMAGES.items() if _is_known(k, scene)},
+        "scene_image": {
+            name: Option(label)
+            for name, (label, _) in SCENE_IMAGES.items()
+            if _FIELDS.get(name, name) in scene.fields
+        },
         "error_image": {name: Option(label) for name, label in ERROR_IMAGES.items()},
         "camera.psf": _first("none" if psf is None else psf.kind, psfs),
-        "camera.psf_order": _first(
-            camera.psf_order,
-            {word: Option(label, {"camera.psf_order": word}) for word, label in orders.items()},
-        ),
+        "camera.psf_order": _first(camera.psf_order, orders),
         "camera.detector": _first(AS_STUDY if camera.detector else "none", detectors),
         "surface": _surfaces(study),
     }
@@ -462,22 +452,24 @@ def _surfaces(study: Study) -> dict[str, Option]:
     uniform = {"uniform": Option("Uniform", {"surface": UniformEmissivity(0.5)})}
     if not isinstance(section, FeaturesSection):
         return _first(section.kind, uniform | {section.kind: Option(section.kind.capitalize())})
-    own = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
     kinds = {kind: getattr(section, kind) for kind in ("chips", "maps", "measured")}
-    found = {}
-    for name in (*surface_names(section), OWN):
-        one = {
-            kind: {key: held[key] for key in held if key == name} for kind, held in kinds.items()
-        }
-        surface = own if name == OWN else section.model_copy(update=one)
-        analysis = changed(study.analysis, {"rake_chip": name, "band_chip": name})
-        found[name] = Option(name.capitalize(), {"surface": surface, "analysis": analysis})
-    return found | uniform
-
-
-def _is_known(image: str, scene: Scene) -> bool:
-    fields = {"radiance_temperature": "temperature", "emissivity": "temperature"}
-    return fields.get(image, "velocity_x" if image == "speed" else image) in scene.fields
+    surfaces = {
+        name: section.model_copy(
+            update={
+                kind: {key: one for key, one in of_kind.items() if key == name}
+                for kind, of_kind in kinds.items()
+            }
+        )
+        for name in surface_names(section)
+    }
+    surfaces[OWN] = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
+    return {
+        name: Option(
+            name.capitalize(),
+            {"surface": surface, "analysis.rake_chip": name, "analysis.band_chip": name},
+        )
+        for name, surface in surfaces.items()
+    } | uniform
 
 
 def _starts(scene: Scene, duration: float) -> Iterator[float]:

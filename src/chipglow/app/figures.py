@@ -20,9 +20,9 @@ from bokeh.palettes import Cividis256, Inferno256, RdBu11, interp_palette
 from bokeh.plotting import figure
 from numpy.typing import NDArray
 
-from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES
-from chipglow.app.model import Drawn, LineValues, Picture
-from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.app.controls import CURSOR, LINES
+from chipglow.app.pictures import Drawn, Panel, Picture
+from chipglow.drawing.scales import HEAT, PLAIN, SIGNED
 from chipglow.scene import Raster, Tool
 
 MICRONS: Final = 1e6
@@ -35,14 +35,13 @@ TITLES: Final = {
     "error": "Error / K",
 }
 
-_THEMES: Final = {
-    "light": {"ground": "#ffffff", "text": "#16191d", "grid": "#d7dbe0", "void": "#e5e7eb"},
-    "dark": {"ground": "#14171c", "text": "#e8eaed", "grid": "#39414b", "void": "#2b313a"},
-}
+_TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}
+_VOID, _GRID = (128, 128, 128, 0.2), (128, 128, 128, 0.35)
+"""Colours on light and dark ground, which shows through."""
+
 LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#E69F00"}
 _MEASURED: Final = "#2b7fd0"
 _REFERENCE: Final = "#7d858f"
-"""Colours of curves on light and dark ground."""
 
 _BORDER: Final = 46
 _SIDE: Final = 180
@@ -73,15 +72,19 @@ class Image:
         self.figure = one = _figure(name, TITLES[name], _SIDE, output_backend="canvas", **ranges)
         empty = {"image": [np.zeros((2, 2), np.float32)], "x": [0], "y": [0], "dw": [1], "dh": [1]}
         self.source = ColumnDataSource(empty, name=f"{name}_image")
-        self.mapper = LinearColorMapper(palette=PALETTES[HEAT], low=0.0, high=1.0)
-        self._colours, self._shown = HEAT, np.zeros(0)
+        one.background_fill_color = _VOID
+        self.mapper = LinearColorMapper(
+            palette=PALETTES[HEAT], low=0.0, high=1.0, nan_color=(0, 0, 0, 0.0)
+        )
+        self._shown = np.zeros(0)
         places = {key: key for key in empty}
         glyph = one.image(**places, source=self.source, color_mapper=self.mapper)
         title = one.title
         formatter = CustomJSTickFormatter(code=_WITH_UNIT, args={"title": title})
         self.bar = ColorBar(
-            color_mapper=self.mapper, height=10, padding=2, margin=0, formatter=formatter
-        )
+            color_mapper=self.mapper, height=10, padding=2, margin=0, formatter=formatter,
+            background_fill_color=None,
+        )  # fmt: skip
         one.add_layout(self.bar, "below")
         missing = "no material" if name == "scene" else "out of range"
         known = {"title": title, "source": self.source, "missing": missing}
@@ -103,21 +106,17 @@ class Image:
             one.yaxis.axis_label = "y / µm"
             one.min_border_left = _BORDER
 
-    def show(
-        self, values: NDArray[Any], raster: Raster, limits: tuple[float, float], colours: str
-    ) -> None:
+    def show(self, panel: Panel) -> None:
         """Show an image; Bokeh has its rows from the bottom."""
-        if (self.mapper.low, self.mapper.high) != limits:
-            self.mapper.update(low=limits[0], high=limits[1])
-        if self._colours != colours:
-            self._colours = colours
-            self.mapper.palette = PALETTES[colours]
-        if self._shown is values:
+        self.figure.title.text = f"{panel.name} / {panel.unit}" if panel.unit else panel.name
+        low, high = panel.limits
+        self.mapper.update(low=low, high=high, palette=PALETTES[panel.colours])
+        if self._shown is panel.values:
             return
-        self._shown = values
-        left, right, bottom, top = (MICRONS * edge for edge in raster.extent)
+        self._shown = panel.values
+        left, right, bottom, top = (MICRONS * edge for edge in panel.raster.extent)
         self.source.data = {
-            "image": [np.ascontiguousarray(values[::-1], np.float32)],
+            "image": [np.ascontiguousarray(panel.values[::-1], np.float32)],
             "x": [left],
             "y": [bottom],
             "dw": [right - left],
@@ -136,7 +135,9 @@ class Line:
         empty: dict[str, list[float]] = {"along": [], "measured": [], "reference": []}
         source = ColumnDataSource(empty, name=f"{name}_values")
         self.band = ColumnDataSource({"along": [], "low": [], "high": []})
-        self.under_range = BoxAnnotation(level="underlay", line_color=None, visible=False)
+        self.under_range = BoxAnnotation(
+            level="underlay", line_color=None, fill_color="#808080", fill_alpha=0.2, visible=False
+        )
         colour = LINE_COLOURS[name]
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
         one.add_layout(self.under_range)
@@ -154,7 +155,7 @@ class Line:
         )
         one.legend[0].update(
             orientation="horizontal", padding=0, margin=0, spacing=10, glyph_height=12,
-            label_text_font_size="11px", border_line_color=None, background_fill_alpha=0.8,
+            label_text_font_size="11px", border_line_color=None, background_fill_color=None,
         )  # fmt: skip
         one.add_layout(one.legend[0], "above")
         one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=[curve]))
@@ -164,15 +165,11 @@ class Line:
         one.min_border_left = _BORDER + 6
         one.title.text_font_size = "12px"
 
-    def show_band(self, values: LineValues | None, draws: NDArray[np.float64] | None) -> None:
-        """Shade the range of draws; nothing without them."""
-        along, rows = np.zeros(0), np.zeros((1, 0))
-        if values is not None and draws is not None:
-            known = np.isfinite(draws).all(axis=0)
-            along, rows = MICRONS * values.distance[known], draws[:, known] - KELVIN
-        elif not len(self.band.data["along"]):
-            return
-        self.band.data = {"along": along, "low": rows.min(axis=0), "high": rows.max(axis=0)}
+    def show_band(self, along: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
+        """Shade the range of draws."""
+        known = np.isfinite(draws).all(axis=0)
+        low, high = draws[:, known].min(axis=0), draws[:, known].max(axis=0)
+        self.band.data = {"along": along[known], "low": low, "high": high}
 
 
 class Figures:
@@ -206,90 +203,42 @@ class Figures:
         return x.start / MICRONS, x.end / MICRONS, y.start / MICRONS, y.end / MICRONS
 
     def show(self, picture: Picture) -> None:
-        """Show the images of a picture."""
-        limits, scene, error = temperature_limits(picture), picture.scene, picture.error
-        if scene is not None:
-            one = self.images["scene"]
-            one.figure.title.text = f"Scene: {scene.label}"
-            colours = (limits, HEAT) if scene.is_temperature else (ends(scene.shown), PLAIN)
-            one.show(scene.shown, scene.raster, *colours)
-        measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
-        self.images["measured"].show(measured, picture.raster, limits, HEAT)
-        if error is not None:
-            limit = error_limit(picture)
-            one = self.images["error"]
-            one.figure.title.text = f"{ERROR_IMAGES[picture.state.error_image]} / K"
-            shown = np.where(picture.flagged, np.nan, error)
-            one.show(shown, picture.raster, (-limit, limit), SIGNED)
-        lowest = picture.camera.lower_limit if picture.camera else None
+        """Show the images of a picture, and no draws."""
+        for name, panel in picture.panels.items():
+            self.images[name].show(panel)
+        limit = picture.lower_limit
         for line in self.lines.values():
-            top = None if lowest is None else lowest - KELVIN
-            line.under_range.update(top=top, visible=lowest is not None)
+            line.under_range.update(top=limit, visible=limit is not None)
+            if len(line.band.data["along"]):
+                line.band.data = {"along": [], "low": [], "high": []}
 
-    def show_drawn(self, picture: Picture, drawn: Drawn | None) -> None:
-        """Shade the range of draws along the lines; nothing for None."""
+    def show_drawn(self, picture: Picture, drawn: Drawn) -> None:
+        """Shade the range of draws along the lines."""
         for name, line in self.lines.items():
-            line.show_band(picture.lines[name], drawn.lines[name] if drawn else None)
+            line.show_band(picture.lines[name]["along"], drawn.lines[name])
 
     def set_theme(self, theme: str) -> None:
-        """Draw everything on light or dark ground."""
-        colours = _THEMES["dark" if theme == "dark" else "light"]
-        ground, text, void = colours["ground"], colours["text"], colours["void"]
-        for name, one in self.all.items():
-            one.background_fill_color = void if name in self.images else ground
-            one.border_fill_color = ground
-            one.outline_line_color = one.grid.grid_line_color = colours["grid"]
+        """Write everything on light or dark ground."""
+        text = _TEXT[theme]
+        for one in self.all.values():
             one.title.text_color = text
             one.axis.axis_label_text_color = one.axis.major_label_text_color = text
             one.axis.axis_line_color = one.axis.major_tick_line_color = text
-            one.axis.minor_tick_line_color = None
         for image in self.images.values():
-            image.mapper.nan_color = void
-            image.bar.update(background_fill_color=ground, major_label_text_color=text)
+            image.bar.major_label_text_color = text
         for line in self.lines.values():
-            line.under_range.update(fill_color=void, fill_alpha=1.0)
-            line.figure.legend[0].update(background_fill_color=ground, label_text_color=text)
-
-
-def line_data(picture: Picture) -> dict[str, dict[str, list[float]]]:
-    """Return the curves of a picture by the names of their sources.
-
-    The page draws them after the images: that halves the time to the images.
-    """
-    data = {}
-    for name, values in picture.lines.items():
-        reference = values.measured if values.reference is None else values.reference
-        curves = {
-            "along": MICRONS * values.distance,
-            "measured": values.measured - KELVIN,
-            "reference": reference - KELVIN,
-        }
-        data[f"{name}_values"] = {key: curve.tolist() for key, curve in curves.items()}
-    return data
-
-
-def temperature_limits(picture: Picture) -> tuple[float, float]:
-    """Return the limits of the colours of temperatures in °C, for both images if both show one."""
-    low, high = ends(np.where(picture.flagged, np.nan, picture.measured) - KELVIN, 0.0, 100.0, 10.0)
-    scene = picture.scene
-    if scene is None or not scene.is_temperature:
-        return low, high
-    limit = picture.camera.lower_limit if picture.camera else None
-    lowest = float(np.nanmin(scene.values) if limit is None else limit) - KELVIN
-    return min(low, lowest), max(high, float(np.nanmax(scene.shown)))
-
-
-def error_limit(picture: Picture) -> float:
-    """Return the limit of the colours of the error in K."""
-    assert picture.error is not None
-    return round_limit(np.where(picture.flagged, np.nan, picture.error), 99, 5.0)
+            line.figure.legend[0].label_text_color = text
 
 
 def _figure(name: str, title: str, height: int, **given: Any) -> Any:
-    return figure(
+    one = figure(
         name=f"{name}_figure", title=title, frame_width=_SIDE, frame_height=height, tools="",
-        toolbar_location=None, min_border=4, **given,
+        toolbar_location=None, min_border=4, background_fill_color=None, border_fill_color=None,
+        outline_line_color=_GRID, **given,
     )  # fmt: skip
+    one.grid.grid_line_color = _GRID
+    one.axis.minor_tick_line_color = None
+    return one
 
 
 def _draw_over(one: Any, outline: list[list[float]], places: dict[str, ColumnDataSource]) -> None:

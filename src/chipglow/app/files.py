@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.app.controls import ERROR_IMAGES, LINES, State
-from chipglow.app.figures import LINE_COLOURS, error_limit, temperature_limits
-from chipglow.app.model import Drawn, Picture, SceneModel
+from chipglow.app.controls import LINES, State
+from chipglow.app.figures import LINE_COLOURS
+from chipglow.app.pictures import Drawn, Picture, SceneModel
 from chipglow.drawing.drawing import (
     colour_bar,
     draw_line,
@@ -20,7 +20,7 @@ from chipglow.drawing.drawing import (
     show_image,
     style,
 )
-from chipglow.drawing.scales import BLUE, GREY, HEAT, KELVIN, PLAIN, SIGNED, VOID, ends
+from chipglow.drawing.scales import BLUE, GREY, VOID
 from chipglow.io import StoredScene, write_dataset
 from chipglow.study import study_text
 
@@ -47,15 +47,15 @@ def study_file(model: SceneModel, state: State) -> bytes:
 
 def measurement_file(picture: Picture, model: SceneModel) -> bytes:
     """Return the measurement as NetCDF, with reference and error of every pixel."""
-    assert picture.camera is not None and picture.errors is not None
-    measurement = picture.camera.form_measurement(picture.exposures[0])
+    assert picture.camera and picture.exposure
+    measurement = picture.camera.form_measurement(picture.exposure)
     if model.opened.scene.tool is not None:
         measurement = measurement.with_tool(model.opened.scene.tool)
     place, units = ("time", "y", "x"), {"units": "K"}
     data = measurement.data.assign(
-        reference_temperature=(place, picture.errors.reference.values[None], units),
-        error=(place, picture.errors.case_1.values[None], units),
-        error_without_psf=(place, picture.errors.case_2.values[None], units),
+        reference_temperature=(place, picture.data["reference"].values[None], units),
+        error=(place, picture.data["case_1"].values[None], units),
+        error_without_psf=(place, picture.data["case_2"].values[None], units),
     )
     with TemporaryDirectory() as folder:
         path = Path(folder, "measurement.nc")
@@ -93,29 +93,15 @@ def _draw_images(
     figure: Figure, axes: Any, picture: Picture, model: SceneModel, view: View
 ) -> None:
     """Draw scene, measurement and error in the colours of the page."""
-    scene, state, tool = picture.scene, picture.state, model.opened.scene.tool
-    assert scene is not None and picture.error is not None
-    measured, error = (
-        np.where(picture.flagged, np.nan, image)
-        for image in (picture.measured - KELVIN, picture.error)
-    )
-    heat, limit = temperature_limits(picture), error_limit(picture)
-    of_scene = (heat, HEAT) if scene.is_temperature else (ends(scene.shown), PLAIN)
-    quantity, _, unit = scene.label.partition(" / ")
-    panels = (
-        (quantity.capitalize(), unit, scene.shown, scene.raster, *of_scene),
-        ("Measured", "°C", measured, picture.raster, heat, HEAT),
-        (ERROR_IMAGES[state.error_image], "K", error, picture.raster, (-limit, limit), SIGNED),
-    )
+    state, tool = picture.state, model.opened.scene.tool
     factor, _ = length_unit(model.opened.scene.raster)
     left, right, bottom, top = (factor * edge for edge in view)
-    for one, (title, unit, image, raster, limits, colours) in zip(axes, panels, strict=True):
-        colour_bar(
-            figure, show_image(one, image, raster, tool, colours, limits), one, unit, "bottom"
-        )
-        one.set_title(title)
+    for one, panel in zip(axes, picture.panels.values(), strict=True):
+        image = show_image(one, panel.values, panel.raster, tool, panel.colours, panel.limits)
+        colour_bar(figure, image, one, panel.unit, "bottom")
+        one.set_title(panel.name, fontsize=8)
         for name in LINES:
-            draw_line(one, np.array(state.line(name)), LINE_COLOURS[name], factor=factor)
+            draw_line(one, state.line(name).outline(), LINE_COLOURS[name], factor=factor)
         for colour, width in (("black", 2.6), ("white", 1.2)):
             one.plot(*factor * np.array(state.cursor), "+", color=colour, mew=width, ms=7)
         one.set(xlim=(left, right), ylim=(bottom, top))
@@ -125,20 +111,18 @@ def _draw_images(
 
 def _draw_line(axes: Axes, name: str, picture: Picture, drawn: Drawn | None) -> None:
     values = picture.lines[name]
-    assert values.reference is not None
-    along = 1e6 * values.distance
     if drawn is not None:
-        rows = drawn.lines[name] - KELVIN
-        low, high = rows.min(axis=0), rows.max(axis=0)
-        axes.fill_between(along, low, high, color=BLUE, alpha=0.25, lw=0, label="range of draws")
-    axes.plot(along, values.reference - KELVIN, "--", color=GREY, label="reference")
-    axes.plot(along, values.measured - KELVIN, color=BLUE, label="measured")
+        low, high = drawn.lines[name].min(axis=0), drawn.lines[name].max(axis=0)
+        axes.fill_between(
+            values["along"], low, high, color=BLUE, alpha=0.25, lw=0, label="range of draws"
+        )
+    axes.plot(values["along"], values["reference"], "--", color=GREY, label="reference")
+    axes.plot(values["along"], values["measured"], color=BLUE, label="measured")
     axes.set_title(LINES[name].capitalize(), color="black")
     axes.set(xlabel="distance / µm", ylabel="radiance temp. / °C")
-    limit = picture.camera.lower_limit if picture.camera else None
-    low, high = axes.get_ylim()
-    if limit is not None and limit - KELVIN > low:
-        axes.axhspan(low, limit - KELVIN, color=VOID, zorder=0)
+    limit, (low, high) = picture.lower_limit, axes.get_ylim()
+    if limit is not None and limit > low:
+        axes.axhspan(low, limit, color=VOID, zorder=0)
         axes.set_ylim(low, high)
 
 
@@ -146,7 +130,7 @@ def _caption(state: State, model: SceneModel) -> str:
     """Return camera and surface: a line for each control."""
     lines, controls = [model.opened.name], model.controls
     for row in controls.rows:
-        if row.path not in ("scene_image", "error_image") and controls.is_shown(row, state):
+        if row.group and not row.path.endswith("_image") and controls.is_shown(row, state):
             value = controls.value(row, state)
             text = row.options[value].label if row.options else row.text(value)
             lines.append(f"{row.label}: {text}")

@@ -1,15 +1,16 @@
 """What the app opens: a scene, a folder of results, a measurement, or the bundled scene."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, sqrt
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
 from chipglow.analysis import spread_starts
-from chipglow.app.controls import CURSOR, LINES, Controls, Corners, Point, rounded
+from chipglow.app.controls import CURSOR, LINES, Controls, rounded
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
@@ -19,7 +20,6 @@ from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformEmissivity
 
-BUNDLED: Final = "bundled scene"
 QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarser one before."""
 
@@ -33,9 +33,8 @@ _PATIENCE: Final = 4.0
 """Factor on the time that reading an upload may take: the server has other work."""
 
 _TOUCHING: Final = 3e-6
-
-Places: TypeAlias = tuple[Point, Corners, Corners]
-"""Cursor, line across the rake face and line across the shear band."""
+_Points: TypeAlias = Iterable[Any]
+"""Pairs of x and y in m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,29 +65,30 @@ class OpenedScene:
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         starts = spread_starts(scene, duration, 3)
         start = rounded(starts[len(starts) // 2])
-        places = _scene_places(scene, start, study.camera.integration_time)
-        controls = Controls.of_scene(_with_places(study, places), scene, start, duration)
+        study = _with_places(study, *_scene_places(scene, start, study.camera.integration_time))
         coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
+        controls = Controls.of_scene(study, scene, start, duration)
         return cls(name, scene, None if coarse is scene else coarse, controls, from_file)
 
 
 @dataclass(frozen=True, eq=False)
 class OpenedMeasurement:
-    """A measurement; its only control is the frame."""
+    """A measurement and its controls."""
 
     name: str
     measurement: Measurement
+    controls: Controls
 
-    @property
-    def controls(self) -> Controls:
-        """Controls with cursor and lines through the hottest pixel of the first frame."""
-        measurement, raster = self.measurement, self.measurement.raster
+    @classmethod
+    def of(cls, measurement: Measurement, name: str) -> "OpenedMeasurement":
+        """Open a measurement with cursor and lines through the hottest pixel of its first frame."""
         first = np.asarray(measurement.data["radiance_temperature"][0].values, np.float64)
         usable = np.where(measurement.usable[0], first, -np.inf)
+        raster = measurement.raster
         row, column = np.unravel_index(int(np.argmax(usable)), usable.shape)
-        hottest = (float(raster.x[column]), float(raster.y[row]))
-        places = _through(raster, hottest if np.isfinite(usable).any() else None)
-        return Controls.of_measurement(_with_places(Study(), places), measurement.times, raster)
+        hottest = (raster.x[column], raster.y[row]) if np.isfinite(usable).any() else None
+        study = _with_places(Study(), *_through(raster, hottest))
+        return cls(name, measurement, Controls.of_measurement(study, measurement.times, raster))
 
 
 Opened: TypeAlias = OpenedScene | OpenedMeasurement
@@ -100,17 +100,17 @@ def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
     Raises
     ------
     FileNotFoundError
-        If it is not there.
+        If it does not exist.
     ValueError
         If it is none of these; the message names it.
     """
     if path is None:
-        return OpenedScene.of(example_scene(), study or Study(), BUNDLED, from_file=True)
+        return OpenedScene.of(example_scene(), study or Study(), "bundled scene", from_file=True)
     path = Path(path)
     if path.is_dir():
         return _results(path)
     if is_measurement(path):
-        return OpenedMeasurement(path.name, read_measurement(path))
+        return OpenedMeasurement.of(read_measurement(path), path.name)
     return OpenedScene.of(open_scene(path), study or Study(), path.name, from_file=True)
 
 
@@ -129,9 +129,9 @@ def open_uploaded(path: Path, name: str) -> Opened:
         opened = open_any(path)
     except (ValueError, OSError) as error:
         raise ValueError(str(error).replace(str(path), name)) from None
-    if isinstance(opened, OpenedMeasurement):
-        return OpenedMeasurement(name, opened.measurement)
-    return replace(opened, name=name, from_file=False)
+    if isinstance(opened, OpenedScene):
+        return replace(opened, name=name, from_file=False)
+    return replace(opened, name=name)
 
 
 def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
@@ -151,26 +151,25 @@ def _results(folder: Path) -> OpenedScene:
     if not file.is_file():
         raise FileNotFoundError(f"{folder}: holds no study.yaml, expected a folder of results")
     study = load_study(file)
-    if study.scene is not None:
-        return OpenedScene.of(open_scene(study.scene), study, folder.name)
-    if not is_cut(study):
+    if study.scene is None and not is_cut(study):
         raise ValueError(
             f"{folder}: the scene of its study is not in the cache, expected that "
             f"chipglow run {file} --out {folder} was done on this machine, or a scene's file"
         )
-    return OpenedScene.of(open_scene(cut(study)), study, folder.name)
+    return OpenedScene.of(open_scene(study.scene or cut(study)), study, folder.name)
 
 
-def _with_places(study: Study, places: Places) -> Study:
-    """Return a study whose places are the cursor and the lines."""
-    cursor, *lines = places
-    analysis = study.analysis.model_copy(
-        update={"points": {CURSOR: cursor}, "lines": dict(zip(LINES.values(), lines, strict=True))}
+def _with_places(study: Study, cursor: _Points, *lines: _Points) -> Study:
+    """Return a study with these places alone, rounded to a tenth of a micrometre as in links."""
+    (point,), *ends = (
+        tuple((round(float(x), 7), round(float(y), 7)) for x, y in points)
+        for points in (cursor, *lines)
     )
-    return study.model_copy(update={"analysis": analysis})
+    places = {"points": {CURSOR: point}, "lines": dict(zip(LINES.values(), ends, strict=True))}
+    return study.model_copy(update={"analysis": study.analysis.model_copy(update=places)})
 
 
-def _scene_places(scene: Scene, start: float, duration: float) -> Places:
+def _scene_places(scene: Scene, start: float, duration: float) -> list[_Points]:
     """Return a cursor on the rake face and lines across it and across the shear band.
 
     For a scene without them: its middle and lines through it.
@@ -178,31 +177,24 @@ def _scene_places(scene: Scene, start: float, duration: float) -> Places:
     cursor, rake, band = _through(scene.raster)
     tool = scene.tool
     if tool is None:
-        return cursor, rake, band
+        return [cursor, rake, band]
     index = int(np.searchsorted(scene.times, start + duration / 2)) - 1
     workpiece = scene.field("material", max(index, 0)) == Material.WORKPIECE
     contact = contact_length(scene.raster, workpiece, tool, _TOUCHING)
     if contact > 0:
-        middle, normal = tool.rake_point(contact / 2), np.asarray(tool.rake_normal)
-        cursor = _point(*middle)
-        rake = _point(*(middle - _REACH * normal)), _point(*(middle + _REACH * normal))
+        middle, across = tool.rake_point(contact / 2), _REACH * np.asarray(tool.rake_normal)
+        cursor, rake = [middle], [middle - across, middle + across]
     if "plastic_strain_rate" in scene.fields:
         ridge = Instant.at(scene, start, duration).band
         if ridge is not None:
-            first, _, last = ridge.across(_REACH, _REACH).points
-            band = _point(*first), _point(*last)
-    return cursor, rake, band
+            band = ridge.across(_REACH, _REACH).points[[0, -1]]
+    return [cursor, rake, band]
 
 
-def _through(raster: Raster, place: Point | None = None) -> Places:
+def _through(raster: Raster, place: tuple[float, float] | None = None) -> list[_Points]:
     """Return a cursor at a place, by default the image's middle, and lines through it."""
     left, right, bottom, top = raster.extent
     x, y = place or ((left + right) / 2, (bottom + top) / 2)
     across, up = 0.4 * (right - left), 0.4 * (top - bottom)
-    rake = _point(max(x - across, left), y), _point(min(x + across, right), y)
-    return _point(x, y), rake, (_point(x, max(y - up, bottom)), _point(x, min(y + up, top)))
-
-
-def _point(x: float, y: float) -> Point:
-    """Round a position to a tenth of a micrometre, as links write it."""
-    return round(float(x), 7), round(float(y), 7)
+    along_x = [(max(x - across, left), y), (min(x + across, right), y)]
+    return [[(x, y)], along_x, [(x, max(y - up, bottom)), (x, min(y + up, top))]]

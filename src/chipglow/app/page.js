@@ -41,14 +41,14 @@ export function render({ view, model, el }) {
     return sent;
   }
   function change(path, text, final) {
-    const entry = controls.get(path);
+    const entry = controls.get(path), texts = { [path]: text };
     const asked = waiting !== null;
-    waiting = final ? null : { [path]: text };
-    entry.sent = final ? send("change", { [path]: text }) : Infinity;
+    waiting = final ? null : texts;
+    entry.sent = final ? send("change", { texts, final }) : Infinity;
     if (final || asked) return;
     requestAnimationFrame(() => {
       if (waiting === null) return;
-      const n = send("move", waiting);
+      const n = send("change", { texts: waiting, final });
       for (const one of Object.keys(waiting)) controls.get(one).sent = n;
       waiting = null;
     });
@@ -93,12 +93,16 @@ export function render({ view, model, el }) {
     return column;
   }
 
+  function entryOf(row, box) {
+    controls.set(row.path, { row, box, sent: 0, text: "", typing: false });
+    return controls.get(row.path);
+  }
+
   function control(row) {
     const id = `control-${row.path}`;
     const label = element("label", { for: id }, row.label);
     const box = element("div", { class: "control" }, label);
-    const entry = { row, box, sent: 0, text: "", typing: false };
-    controls.set(row.path, entry);
+    const entry = entryOf(row, box);
     if (row.options) {
       const options = row.options.map(([value, text]) => element("option", { value }, text));
       entry.field = element("select", { id, onchange: () => change(row.path, entry.field.value, true) }, ...options);
@@ -144,8 +148,7 @@ export function render({ view, model, el }) {
   }
 
   function placeField(name, label) {
-    const entry = { row: { path: name }, sent: 0, text: "", typing: false };
-    controls.set(name, entry);
+    const entry = entryOf({ path: name });
     textField(entry, { id: `place-${name}` });
     return element("span", { class: "place" }, element("label", { for: `place-${name}` }, label), entry.field);
   }
@@ -299,20 +302,21 @@ export function render({ view, model, el }) {
     }
   }
 
+  // Without a number the progress bar says only that something is being done.
   function showStatus({ text, kind, progress, invalid }) {
     find("#status").textContent = text;
     find("#status").className = kind;
-    const bar = find("#progress");
-    bar.hidden = progress == null;
-    bar.value = progress ?? 0;
+    const bar = find("#progress"), draws = typeof progress === "number";
+    bar.hidden = progress === undefined;
+    draws ? (bar.value = progress) : bar.removeAttribute("value");
     if (spec.draws) {
-      find("#cancel").hidden = bar.hidden;
-      find("#draw").disabled = !bar.hidden;
+      find("#cancel").hidden = !draws;
+      find("#draw").disabled = draws;
     }
     for (const path of invalid ?? []) controls.get(path)?.field.setAttribute("aria-invalid", "true");
   }
 
-  function showNumbers({ rows, parts, note }) {
+  function showNumbers({ rows, parts }) {
     const head = (label) => element("th", { scope: "row" }, label);
     const table = element("table", {}, element("caption", {}, "At the cursor"),
       ...rows.map(([label, value, tip]) => element("tr", { title: tip }, head(label), element("td", {}, value))));
@@ -320,23 +324,20 @@ export function render({ view, model, el }) {
     box.classList.remove("old");
     box.replaceChildren(table);
     if (!parts.length) return;
-    const most = Math.max(1e-9, ...parts.map((part) => Math.abs(part.kelvin ?? 0)));
-    const bars = parts.map(({ label, kelvin, text, tip, kind }) => {
-      const style = `width:${50 * Math.abs(kelvin ?? 0) / most}%;${kelvin < 0 ? "right" : "left"}:50%`;
+    const most = Math.max(1e-9, ...parts.map((part) => Math.abs(part.kelvin)));
+    const bars = parts.map(({ name, label, kelvin, text, tip }) => {
+      const style = `width:${50 * Math.abs(kelvin) / most}%;${kelvin < 0 ? "right" : "left"}:50%`;
       return element("tr", { title: tip }, head(label),
         element("td", { class: "track", "aria-hidden": "true" }, element("span", { class: "axis" }),
-          element("span", { class: `bar ${kind}`, style })),
+          element("span", { class: `bar ${name}`, style })),
         element("td", {}, text));
     });
     box.append(element("table", { class: "parts" }, element("caption", {}, "Parts of the error"), ...bars),
-      element("p", { class: "note" }, note));
+      element("p", { class: "note" }, "They sum to the error; ± is the standard uncertainty (k = 1)."));
   }
 
-  function saveDownload({ name, type, data }) {
-    const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-    const href = URL.createObjectURL(new Blob([bytes], { type }));
-    element("a", { href, download: name }).click();
-    setTimeout(() => URL.revokeObjectURL(href), 10000);
+  function saveDownload({ name, data }) {
+    element("a", { href: `data:application/octet-stream;base64,${data}`, download: name }).click();
   }
 
   // A picture counts as painted when the browser had time for it: then come the curves along its
@@ -353,21 +354,13 @@ export function render({ view, model, el }) {
 
   // Files, links, theme and size.
 
-  function upload(file) {
-    const request = new XMLHttpRequest();
-    request.upload.onprogress = ({ loaded, total }) => {
-      const text = `${loaded === total ? "Checking" : "Uploading"} ${file.name}`;
-      showStatus({ text, kind: "busy", progress: loaded / total });
-    };
-    request.onload = () => {
-      if (request.status === 200) location.search = `?open=${request.responseText}`;
-      else showStatus({ text: request.responseText || `${file.name}: refused`, kind: "error" });
-    };
-    request.onerror = () => showStatus({
-      text: `${file.name}: the upload was interrupted; a file may have up to ${spec.uploads}`, kind: "error",
-    });
-    request.open("POST", `upload?name=${encodeURIComponent(file.name)}`);
-    request.send(file);
+  async function upload(file) {
+    showStatus({ text: `Checking ${file.name}`, kind: "busy", progress: null });
+    const url = `upload?name=${encodeURIComponent(file.name)}`;
+    const answer = await fetch(url, { method: "POST", body: file }).catch(() => null);
+    const text = await answer?.text();
+    if (answer?.ok) location.search = `?open=${text}`;
+    else showStatus({ text: text || `${file.name}: refused, a file may have up to ${spec.uploads}`, kind: "error" });
   }
 
   async function copyLink() {

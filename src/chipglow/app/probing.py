@@ -1,4 +1,4 @@
-"""What an uploaded file is asked in a subprocess, which imports little, before it is opened."""
+"""Reading of an uploaded file in a subprocess, which imports little, before it is opened."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,32 +9,13 @@ from chipglow.io.sources import SourceError
 
 
 def probed(path: Path, name: str) -> Iterator[Message]:
-    """Read what opening will read.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    name : str
-        What errors call it.
-
-    Yields
-    ------
-    Message
-        How many frames it has.
-
-    Raises
-    ------
-    SourceError
-        If it is neither a scene nor a measurement.
-    """
+    """Read what opening will read; errors call the file by its name."""
     try:
         if is_measurement(path):
-            frames = len(read_measurement(path))
+            read_measurement(path)
         else:
             scene = open_scene(path)
             scene.frame(len(scene) // 2)
-            frames = len(scene)
     except (ValueError, OSError) as error:
         raise SourceError(str(error).replace(str(path), name)) from None
-    yield Message({"frames": frames})
+    yield Message({})

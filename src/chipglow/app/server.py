@@ -4,11 +4,9 @@ import secrets
 import signal
 import socket
 from asyncio import get_running_loop
-from collections import OrderedDict
 from contextlib import suppress
 from pathlib import Path
-from shutil import rmtree
-from tempfile import mkdtemp
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -24,7 +22,7 @@ TOKEN: Final = "token"
 OPEN: Final = "open"
 
 _MOST_OPEN: Final = 8
-_MOST_UPLOADED_TEXT: Final = f"{MOST_UPLOADED // 1024**2} MiB"
+UPLOADS: Final = f"{MOST_UPLOADED // 1024**2} MiB"
 
 
 class _Closed(RequestHandler):  # type: ignore[misc]
@@ -40,57 +38,50 @@ class TokenAuth(AuthProvider):  # type: ignore[misc]
     login_handler = _Closed
     get_login_url = get_user_async = logout_url = logout_handler = None
 
-    def __init__(self, token: str) -> None:
-        self._token = token
-
-    def admits(self, handler: RequestHandler) -> bool:
-        """Whether a request has the token."""
-        given = handler.get_query_argument(TOKEN, ""), handler.get_cookie(_cookie(handler)) or ""
-        return any(secrets.compare_digest(one.encode(), self._token.encode()) for one in given)
+    def __init__(self) -> None:
+        self.token = secrets.token_urlsafe(24)
 
     def get_user(self, handler: RequestHandler) -> str | None:
         """Return a user for a request with the token, and set the cookie."""
-        if not self.admits(handler):
+        # One cookie for each port: browsers keep cookies by host alone.
+        cookie = f"chipglow-{handler.request.host.rpartition(':')[2]}"
+        given = handler.get_query_argument(TOKEN, ""), handler.get_cookie(cookie) or ""
+        if not any(secrets.compare_digest(one.encode(), self.token.encode()) for one in given):
             return None
-        if handler.get_query_argument(TOKEN, ""):
-            handler.set_cookie(_cookie(handler), self._token, httponly=True, samesite="Strict")
+        if given[0]:
+            handler.set_cookie(cookie, self.token, httponly=True, samesite="Strict")
         return "user"
 
 
-def _cookie(handler: RequestHandler) -> str:
-    """Return the name of the cookie, one for each port: browsers keep cookies by host alone."""
-    return f"chipglow-{handler.request.host.rpartition(':')[2]}"
-
-
 class OpenFiles:
-    """What the command opened, and what was uploaded since."""
+    """What the command opened, and what was uploaded since: the key of an upload is its name."""
 
     def __init__(self, first: Opened) -> None:
-        self.folder = Path(mkdtemp(prefix="chipglow-app-"))
-        self._first = first
-        self._uploaded: OrderedDict[str, Opened] = OrderedDict()
+        self._folder = TemporaryDirectory(prefix="chipglow-app-")
+        self.folder = Path(self._folder.name)
+        self._opened = {"": first}
 
     def find(self, key: str) -> Opened | None:
-        """Return an upload by its key, or the first without one; None if it is not open."""
-        return self._uploaded.get(key) if key else self._first
+        """Return an upload by its key, the first file without one; None if it is not open."""
+        return self._opened.get(key)
 
     def add(self, path: Path, name: str) -> str:
-        """Open an uploaded file and return its key.
+        """Open an uploaded file and return its key; the oldest of too many is removed.
 
         Raises
         ------
         ValueError
             If it cannot be opened.
         """
-        self._uploaded[path.stem] = open_uploaded(path, name)
-        while len(self._uploaded) > _MOST_OPEN:
-            old, _ = self._uploaded.popitem(last=False)
+        self._opened[path.stem] = open_uploaded(path, name)
+        for old in list(self._opened)[1:-_MOST_OPEN]:
+            del self._opened[old]
             (self.folder / f"{old}.nc").unlink(missing_ok=True)
         return path.stem
 
     def close(self) -> None:
         """Remove the uploaded files."""
-        rmtree(self.folder, ignore_errors=True)
+        self._folder.cleanup()
 
 
 @stream_request_body
@@ -103,15 +94,10 @@ class Upload(RequestHandler):  # type: ignore[misc]
         self._path: Path | None = None
 
     def prepare(self) -> None:
-        """Refuse requests without token, of other origins and of large files at once."""
+        """Refuse requests without token or of other origins, and end those of large files."""
         origin = urlsplit(self.request.headers.get("Origin", "")).netloc
-        if not self._auth.admits(self) or origin not in self._origins:
+        if self._auth.get_user(self) is None or origin not in self._origins:
             raise HTTPError(403)
-        length = int(self.request.headers.get("Content-Length", "0"))
-        if length > MOST_UPLOADED:
-            text = f"{self._name}: {length} bytes, expected up to {_MOST_UPLOADED_TEXT}"
-            self._refuse(413, text)
-            return
         self.request.connection.set_max_body_size(MOST_UPLOADED)
         self._path = self._files.folder / f"{secrets.token_urlsafe(12)}.nc"
         self._path.touch(mode=0o600)
@@ -124,16 +110,15 @@ class Upload(RequestHandler):  # type: ignore[misc]
 
     async def post(self) -> None:
         """Open the file; answer with its key or the reason why it cannot be opened."""
-        path = self._path
-        if path is None:
-            return
+        path, add = self._path, self._files.add
+        assert path is not None
         try:
-            key = await get_running_loop().run_in_executor(None, self._files.add, path, self._name)
+            self.finish(await get_running_loop().run_in_executor(None, add, path, self._name))
         except (ValueError, OSError) as error:
             path.unlink(missing_ok=True)
-            self._refuse(400, " ".join(str(error).split()))
-            return
-        self.finish(key)
+            self.set_status(400)
+            self.set_header("Content-Type", "text/plain; charset=utf-8")
+            self.finish(" ".join(str(error).split()))
 
     def on_connection_close(self) -> None:
         """Remove a file whose sender has closed the connection."""
@@ -144,11 +129,6 @@ class Upload(RequestHandler):  # type: ignore[misc]
     def _name(self) -> str:
         name = Path(self.get_query_argument("name", "file")).name
         return "".join(letter for letter in name if letter.isprintable())[:100]
-
-    def _refuse(self, status: int, text: str) -> None:
-        self.set_status(status)
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(text)
 
 
 class App:
@@ -163,13 +143,12 @@ class App:
     def __init__(self, first: Opened, address: str = LOCAL, port: int = 0) -> None:
         port = _free_port(address, port)
         self.files = OpenFiles(first)
-        token = secrets.token_urlsafe(24)
-        auth = TokenAuth(token)
+        auth = TokenAuth()
         everywhere = address == "0.0.0.0"
         names = _own_names() if everywhere else {address, LOCAL, "localhost"}
         origins = tuple(f"{name}:{port}" for name in sorted(names))
         upload = {"files": self.files, "auth": auth, "origins": origins}
-        self.url = f"http://{LOCAL if everywhere else address}:{port}/?{TOKEN}={token}"
+        self.url = f"http://{LOCAL if everywhere else address}:{port}/?{TOKEN}={auth.token}"
         self.server = pn.io.server.get_server(
             {"/": self._page},
             port=port,
@@ -212,7 +191,7 @@ class App:
         opened = self.files.find(key)
         if opened is None:
             return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
-        view = View(opened, given, {OPEN: key} if key else {}, _MOST_UPLOADED_TEXT)
+        view = View(opened, given, {OPEN: key} if key else {}, UPLOADS)
         view.start(pn.state.curdoc)
         pn.state.on_session_destroyed(lambda _: view.session.end())
         return view.page
@@ -220,8 +199,6 @@ class App:
 
 def _free_port(address: str, port: int) -> int:
     """Return the port, or a free one for 0."""
-    if not 0 <= port <= 65535:
-        raise ValueError(f"--port: {port}, expected 0 to 65535")
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

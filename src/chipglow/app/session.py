@@ -1,20 +1,24 @@
 """The state of one user, and the threads that compute its pictures.
 
-One thread makes pictures, always of the newest state: states between are never computed, and work
-for an older one ends at the next opportunity. Draws have a thread of their own.
+Pictures are always of the newest state: states between are never computed, and work for an older
+one ends at the next opportunity. Draws have a thread of their own.
 """
 
 import logging
-from collections.abc import Callable, Mapping
-from threading import Condition, Thread
+from collections.abc import Callable
+from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
-from chipglow.app.controls import State
-from chipglow.app.model import Picture, SceneModel, model_of
+from chipglow.app.controls import State, Texts
 from chipglow.app.opening import Opened
+from chipglow.app.pictures import Picture, SceneModel, model_of
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
+
+PHASES: Final = 3
+TEXTURES: Final = 5
+"""Draws of "Draw phases and textures": as many as in the paper's study."""
 
 _PAINT_TIMEOUT: Final = 0.5
 """Seconds to wait for the page to paint a picture before the next one is sent."""
@@ -30,86 +34,55 @@ class SupersededError(Exception):
 
 
 class Newest(Generic[_Job]):
-    """A thread that does only the newest job; `notify` takes the message of an error."""
+    """Does only the newest job, in a thread; `notify` takes the message of an error."""
 
     def __init__(self, work: Callable[[_Job], None], notify: Callable[[str, str], None]) -> None:
         self._work, self._notify = work, notify
-        self._news = Condition()
-        self._job: _Job | None = None
-        self._busy = self._ended = self._cancelled = False
+        self._turn = Lock()
+        self._superseded = Event()
+        self._running = Event()
         self._thread: Thread | None = None
 
     def ask(self, job: _Job) -> None:
         """Do this job next; waiting and running ones end."""
-        with self._news:
-            self._job, self._cancelled = job, False
-            if self._thread is None:
-                self._thread = Thread(target=self._run, name="chipglow app", daemon=True)
-                self._thread.start()
-            self._news.notify_all()
+        self.cancel()
+        self._superseded = Event()
+        self._thread = Thread(target=self._run, args=(job, self._superseded), daemon=True)
+        self._thread.start()
 
     def cancel(self) -> None:
-        """End the running job and forget the waiting one."""
-        with self._news:
-            self._job, self._cancelled = None, True
-            self._news.notify_all()
-
-    def end(self) -> None:
-        """Cancel, and end the thread."""
-        with self._news:
-            self._ended = True
-        self.cancel()
-
-    @property
-    def superseded(self) -> bool:
-        """Whether the running job is no longer needed."""
-        return self._ended or self._cancelled or self._job is not None
+        """End the running job and forget the waiting ones."""
+        self._superseded.set()
 
     def check(self) -> None:
         """Raise `SupersededError` if the running job is no longer needed."""
-        if self.superseded:
-            raise SupersededError
+        self.pause(0.0)
 
     def pause(self, seconds: float) -> None:
         """Let the running job wait, and end it if it is superseded meanwhile."""
-        with self._news:
-            self._news.wait_for(lambda: self.superseded, seconds)
-        self.check()
+        if self._running.wait(seconds):
+            raise SupersededError
 
-    def wait_for(self, condition: Callable[[], bool], seconds: float) -> None:
-        """Let the running job wait until `wake` finds a condition true."""
-        with self._news:
-            self._news.wait_for(lambda: self._ended or condition(), seconds)
-
-    def wake(self) -> None:
-        """Let a waiting job test its condition again."""
-        with self._news:
-            self._news.notify_all()
-
-    def settle(self, seconds: float) -> bool:
-        """Wait until no job is left; return whether that happened within the time."""
-        with self._news:
-            return self._news.wait_for(lambda: self._job is None and not self._busy, seconds)
-
-    def _run(self) -> None:
-        while True:
-            with self._news:
-                self._busy = False
-                self._news.notify_all()
-                self._news.wait_for(lambda: self._job is not None or self._ended)
-                if self._ended:
-                    return
-                job, self._job, self._busy, self._cancelled = self._job, None, True, False
-            assert job is not None
+    def _run(self, job: _Job, superseded: Event) -> None:
+        with self._turn:
+            if superseded.is_set():
+                return
+            self._running = superseded
             try:
                 self._work(job)
             except SupersededError:
-                continue
+                pass
             except (ValueError, OSError) as error:
                 self._notify("failed", str(error))
-            except Exception as error:  # a defect: it must not end the session's thread
+            except Exception as error:  # a defect: it must not leave the page waiting
                 _log.exception("chipglow app")
                 self._notify("failed", f"defect: {type(error).__name__}: {error}")
+
+    def settle(self, seconds: float) -> bool:
+        """Wait until no job is left; return whether that happened within the time."""
+        if self._thread is not None:
+            self._thread.join(seconds)
+        return self._thread is None or not self._thread.is_alive()
 
 
 Notify: TypeAlias = Callable[..., None]
@@ -121,20 +94,20 @@ class Session:
 
     def __init__(self, opened: Opened, notify: Notify) -> None:
         self.model = model_of(opened)
-        self.state = self.model.controls.initial
-        self._settled = [self.state]
-        self._at = 0
+        self.state = opened.controls.initial
+        self._settled, self._at = [self.state], 0
         self._notify = notify
-        self._sent = self._painted = 0
+        self._sent, self._painted = 0, Event()
+        self._painted.set()
         self._pictures = Newest(self._picture, notify)
-        self._draws: Newest[tuple[State, int, int]] = Newest(self._draw, notify)
+        self._draws = Newest(self._draw, notify)
 
     def show(self) -> None:
         """Compute the picture of the state."""
         self._draws.cancel()
         self._pictures.ask(self.state)
 
-    def change(self, texts: Mapping[str, str], final: bool = True) -> None:
+    def change(self, texts: Texts, final: bool = True) -> None:
         """Set controls; only a final state is one that `step` goes to.
 
         Raises
@@ -142,14 +115,13 @@ class Session:
         ValueError
             If that is not possible; the state then stays.
         """
-        self.set(self.model.changed(self.state, dict(texts)), final)
+        self._set(self.model.controls.changed(self.state, texts), final)
 
-    def restore(self, texts: Mapping[str, str]) -> None:
+    def restore(self, texts: Texts) -> None:
         """Set controls without a picture and without a step to undo, as `change` otherwise."""
-        self.state = self.model.changed(self.state, dict(texts))
+        self.state = self.model.controls.changed(self.state, texts)
 
-    def set(self, state: State, final: bool = True) -> None:
-        """Go to a state."""
+    def _set(self, state: State, final: bool) -> None:
         if final and state != self._settled[self._at]:
             self._settled = [*self._settled[: self._at + 1][-_UNDO_STEPS:], state]
             self._at = len(self._settled) - 1
@@ -173,11 +145,11 @@ class Session:
             self._at = min(self._at + 1, len(self._settled) - 1)
         elif self.state == self._settled[self._at]:
             self._at = max(self._at - 1, 0)
-        self.set(self._settled[self._at], final=False)
+        self._set(self._settled[self._at], final=False)
 
-    def draw(self, phases: int, textures: int) -> None:
+    def draw(self) -> None:
         """Draw the lines at several phases of the pixels and textures."""
-        self._draws.ask((self.state, phases, textures))
+        self._draws.ask(self.state)
 
     def cancel(self) -> None:
         """End the drawing."""
@@ -185,13 +157,13 @@ class Session:
 
     def painted(self, number: int) -> None:
         """Note that the page shows a picture, so that the next one may follow."""
-        self._painted = max(self._painted, number)
-        self._pictures.wake()
+        if number >= self._sent:
+            self._painted.set()
 
     def end(self) -> None:
-        """End the threads."""
-        self._pictures.end()
-        self._draws.end()
+        """End all work."""
+        self._pictures.cancel()
+        self._draws.cancel()
 
     def settle(self, seconds: float = 60.0) -> bool:
         """Wait until everything is computed; return whether that happened within the time."""
@@ -211,21 +183,19 @@ class Session:
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
             work.pause(PAUSE if model.has_quick_look else 0.0)
-        self._notify("readout", picture, self.model.readout(picture))
+        self._notify("readout", picture, model.readout(picture))
 
     def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""
-        last = self._sent
-        self._pictures.wait_for(lambda: self._painted >= last, _PAINT_TIMEOUT)
+        self._painted.wait(_PAINT_TIMEOUT)
+        self._painted.clear()
         self._sent += 1
         self._notify("picture", self._sent, picture)
 
-    def _draw(self, job: tuple[State, int, int]) -> None:
-        state, phases, textures = job
-
+    def _draw(self, state: State) -> None:
         def progress(done: float) -> None:
             self._draws.check()
             self._notify("progress", done)
 
         assert isinstance(self.model, SceneModel)
-        self._notify("drawn", self.model.drawn(state, phases, textures, progress))
+        self._notify("drawn", self.model.drawn(state, PHASES, TEXTURES, progress))

@@ -3,9 +3,9 @@
 import json
 from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-from math import floor, isfinite, log10
+from math import isfinite
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
@@ -17,32 +17,27 @@ from bokeh.document import Document
 from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
-from chipglow.app.controls import CURSOR, Control
-from chipglow.app.figures import TITLES, Figures, line_data
-from chipglow.app.model import Drawn, Picture, Readout, SceneModel
+from chipglow.app.controls import CURSOR, Control, Texts
+from chipglow.app.figures import TITLES, Figures
 from chipglow.app.opening import Opened, OpenedScene
-from chipglow.app.session import Session
+from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
+from chipglow.app.session import PHASES, TEXTURES, Session
 from chipglow.drawing.scales import KELVIN
-from chipglow.quantities.format import rounded_text
-from chipglow.scene.lines import nearest
-
-PHASES: Final = 3
-TEXTURES: Final = 5
-"""Draws of "Draw phases and textures": as many as in the paper's study."""
+from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 
 _FOLDER: Final = Path(__file__).parent
 
 _PARTS: Final = (
-    ("motion", "Motion", "Mean over the exposure minus its maximum", ""),
-    ("footprint", "Footprint", "Mean over the pixel minus its hottest sample", ""),
-    ("psf", "PSF", "Case 1 − case 2: with minus without the point spread function", ""),
-    ("detector", "Detector", "Noise, counts and calibration", ""),
-    ("texture", "of it: texture", "Error minus that without texture: part of the others", "within"),
+    ("motion", "Motion", "Mean over the exposure minus its maximum"),
+    ("footprint", "Footprint", "Mean over the pixel minus its hottest sample"),
+    ("psf", "PSF", "Case 1 − case 2: with minus without the point spread function"),
+    ("detector", "Detector", "Noise, counts and calibration"),
+    ("texture", "of it: texture", "Error minus that without texture: part of the others"),
 )
 _SAVES: Final = (
-    ("study", "study.yaml", "Save the settings as a study"),
-    ("figure", "Figure", "Save the images and lines as PNG"),
-    ("netcdf", "NetCDF", "Save the measurement and its error"),
+    ("study.yaml", "study.yaml", "Save the settings as a study"),
+    ("chipglow.png", "Figure", "Save the images and lines as PNG"),
+    ("measurement.nc", "NetCDF", "Save the measurement and its error"),
 )
 
 
@@ -81,17 +76,20 @@ class View:
     def __init__(
         self,
         opened: Opened,
-        texts: Mapping[str, str] | None = None,
-        link: Mapping[str, str] | None = None,
+        texts: Texts | None = None,
+        link: Texts | None = None,
         uploads: str = "",
         embedded: bool = False,
     ) -> None:
         self._link, self._embedded = link or {}, embedded
         self.session = Session(opened, self._notified)
         self._refused = self._restore(texts or {})
-        source = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
-        images = tuple(TITLES) if isinstance(opened, OpenedScene) else ("measured",)
-        self.figures = Figures(source.raster, source.tool, images)
+        if isinstance(opened, OpenedScene):
+            raster, tool, images = opened.scene.raster, opened.scene.tool, tuple(TITLES)
+        else:
+            measurement = opened.measurement
+            raster, tool, images = measurement.raster, measurement.tool, ("measured",)
+        self.figures = Figures(raster, tool, images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._handled = 0
@@ -112,17 +110,18 @@ class View:
             with suppress(RuntimeError):  # not in a notebook's kernel: nothing shows the page
                 self._loop = get_running_loop()
 
-    def _restore(self, texts: Mapping[str, str]) -> str:
+    def _restore(self, texts: Texts) -> str:
         """Set the controls of a link that are possible; return what is wrong with the others."""
-        refused = ""
         try:
             self.session.restore(texts)
+            return ""
         except ValueError:
-            for path, text in texts.items():
-                try:
-                    self.session.restore({path: text})
-                except ValueError as error:
-                    refused = refused or f"Link: {error}"
+            refused = ""
+        for path, text in texts.items():
+            try:
+                self.session.restore({path: text})
+            except ValueError as error:
+                refused = refused or f"Link: {error}"
         return refused
 
     def _receive(self, event: Any) -> None:
@@ -143,16 +142,14 @@ class View:
         self._say(text, "error" if self._refused else "busy")
         self.session.show()
 
-    def _on_change(self, texts: dict[str, str], final: bool = True) -> None:
+    def _on_change(self, change: dict[str, Any]) -> None:
+        texts = change["texts"]
         try:
-            self.session.change(texts, final)
+            self.session.change(texts, change["final"])
         except ValueError as error:
             self._say(str(error), "error", invalid=list(texts))
             return
         self._changed()
-
-    def _on_move(self, texts: dict[str, str]) -> None:
-        self._on_change(texts, final=False)
 
     def _on_step(self, forward: bool) -> None:
         self.session.step(forward)
@@ -171,105 +168,94 @@ class View:
 
     def _on_draw(self, _: None) -> None:
         self._show_progress(0.0)
-        self.session.draw(PHASES, TEXTURES)
+        self.session.draw()
 
     def _on_cancel(self, _: None) -> None:
         self.session.cancel()
-        self._say("The drawing was cancelled.", "")
+        self._say("The drawing was cancelled.")
 
-    def _on_save(self, kind: str) -> None:
+    def _on_save(self, name: str) -> None:
         # Matplotlib is imported only to save something.
         from chipglow.app.files import figure_file, measurement_file, study_file
 
         model, picture = self.session.model, self._picture
         assert isinstance(model, SceneModel)
-        if kind == "study":
-            data, name = study_file(model, self.session.state), "study.yaml"
+        if name == "study.yaml":
+            data = study_file(model, self.session.state)
         elif picture is None or picture.quick or picture.state != self.session.state:
             self._say("The exact picture is not finished: save it when it is.", "error")
             return
-        elif kind == "figure":
+        elif name == "chipglow.png":
             data = figure_file(picture, model, self.figures.view, self._drawn)
-            name = "chipglow.png"
         else:
-            data, name = measurement_file(picture, model), "measurement.nc"
-        types = {"study": "text/yaml", "figure": "image/png", "netcdf": "application/x-netcdf"}
-        content = {"name": name, "type": types[kind], "data": b64encode(data).decode()}
-        self._send("download", content)
-        self._say(f"{name} is saved.", "")
+            data = measurement_file(picture, model)
+        self._send("download", {"name": name, "data": b64encode(data).decode()})
+        self._say(f"{name} is saved.")
 
     def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture, self._drawn = picture, None
         self.figures.show(picture)
-        self.figures.show_drawn(picture, None)
         if picture.quick:
-            spacing = picture.exposures[0].raster.spacing
+            assert picture.exposure
+            spacing = picture.exposure.raster.spacing
             finer = picture.state.study.camera.pitch < picture.raster.spacing
             what = "samples and pixels" if finer else "samples"
-            text = f"Quick look on {what} of {1e6 * spacing:.3g} µm; the exact picture follows."
-        else:
-            took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
-            text = f"Exact picture{took if self._began else ''}."
-        if self._refused and not picture.quick:
+            follows = f"Quick look on {what} of {1e6 * spacing:.3g} µm; the exact picture follows."
+            self._say(follows, "busy")
+        elif self._refused:
             self._say(self._refused, "error")
         else:
-            self._say(text, "busy" if picture.quick else "")
-        self._send("picture", {"number": number, "lines": line_data(picture)})
+            took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
+            self._say(f"Exact picture{took if self._began else ''}.")
+        # The page draws the curves after the images: that halves the time to the images.
+        lines = {
+            f"{name}_values": {key: curve.tolist() for key, curve in curves.items()}
+            for name, curves in picture.lines.items()
+        }
+        self._send("picture", {"number": number, "lines": lines})
 
-    def _show_readout(self, picture: Picture, found: Readout) -> None:
+    def _show_readout(self, picture: Picture, readout: Readout) -> None:
         x, y = picture.state.cursor
-        rows = [("x, y", _minus(f"{1e6 * x:.1f}, {1e6 * y:.1f} µm"), "")]
-        measured = ("measured", _measured(found), found.source)
-        if found.parts is None:
-            self._send("numbers", {"rows": [*rows, measured], "parts": [], "note": ""})
-            return
-        error = found.measured - found.reference
-        rows += [
-            ("true temperature", _celsius(found.true), "Of the scene's sample in mid-exposure"),
-            ("emissivity", rounded_text(found.emissivity), "Of the same sample"),
-            ("reference", _celsius(found.reference), "Maximum radiance temperature in the pixel"),
-            measured,
-            ("error", _kelvins(error), "Measured minus reference"),
-        ]
-        parts = []
-        for name, label, tip, kind in _PARTS:
-            image = found.parts.get(name)
-            without = name == "detector" and picture.camera and not picture.camera.detector
-            if image is None or without:
-                continue
-            value = float(nearest(image.values, picture.raster, picture.state.cursor))
-            kelvin = value if isfinite(value) else None
-            parts.append(
+        position = f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−")
+        rows = [("x, y", position, ""), ("measured", _measured(readout), readout.source)]
+        parts, known = [], readout.parts
+        if known is not None:
+            rows[1:1] = [
+                ("true temperature", _celsius(readout.true), "Of the sample in mid-exposure"),
+                ("emissivity", rounded_text(readout.emissivity), "Of the same sample"),
+                ("reference", _celsius(readout.reference), "Maximum in the pixel"),
+            ]
+            rows.append(("error", _kelvins(known["case_1"]), "Measured minus reference"))
+            parts = [
                 {
+                    "name": name,
                     "label": label,
-                    "kelvin": kelvin,
-                    "text": _kelvins(value),
                     "tip": tip,
-                    "kind": kind,
+                    "kelvin": known[name] if isfinite(known[name]) else 0.0,
+                    "text": _kelvins(known[name]),
                 }
-            )
-        note = "They sum to the error; ± is the standard uncertainty (k = 1)."
-        self._send("numbers", {"rows": rows, "parts": parts, "note": note})
+                for name, label, tip in _PARTS
+                if name in known
+            ]
+        self._send("numbers", {"rows": rows, "parts": parts})
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
             return
         self._drawn = drawn
         self.figures.show_drawn(self._picture, drawn)
-        if drawn.error is None:
-            self._say("Drawn: the range of the draws is shaded.", "")
+        if (error := drawn.error) is None:
+            self._say("Drawn: the range of the draws is shaded.")
             return
-        error = drawn.error
         low, high = map(_kelvins, error.range)
         self._say(
             f"Error at the cursor over {error.draws} draws: {_kelvins(error.mean)}, sample "
             f"standard deviation {error.standard_deviation:.1f} K, {low} to {high}. Shaded: the "
-            "range along the lines.",
-            "",
+            "range along the lines."
         )
 
     def _show_progress(self, done: float) -> None:
-        self._say("Drawing phases and textures.", "busy", done)
+        self._say("Drawing phases and textures.", "busy", progress=done)
 
     def _show_failed(self, text: str) -> None:
         self._say(text, "error")
@@ -277,17 +263,16 @@ class View:
     def _send(self, kind: str, content: Any) -> None:
         self.page._send_msg({"kind": kind, "content": content})
 
-    def _say(
-        self, text: str, kind: str, progress: float | None = None, invalid: list[str] | None = None
-    ) -> None:
-        content = {"text": text, "kind": kind, "progress": progress, "invalid": invalid or []}
-        self._send("status", content)
+    def _say(self, text: str, kind: str = "", **more: Any) -> None:
+        self._send("status", {"text": text, "kind": kind, **more})
 
     def _put_values(self) -> None:
         session, controls = self.session, self.session.model.controls
         content = {
             "n": self._handled,
-            "values": controls.values(session.state),
+            "values": {
+                row.path: row.shown(controls.value(row, session.state)) for row in controls.rows
+            },
             "shown": [row.path for row in controls.rows if controls.is_shown(row, session.state)],
             "can_undo": session.can_undo,
             "can_redo": session.can_redo,
@@ -306,7 +291,7 @@ class View:
             "name": opened.name,
             "embedded": self._embedded,
             "uploads": uploads,
-            "rows": [_described(row) for row in self.session.model.controls.rows],
+            "rows": [_described(row) for row in opened.controls.rows if row.group],
             "saves": _SAVES if is_scene else (),
             "views": list(views.items()),
             "images": list(self.figures.images),
@@ -337,39 +322,24 @@ class View:
 
 def _described(row: Control) -> dict[str, Any]:
     """Return a control as page.js needs it."""
-    options = [(word, option.label) for word, option in row.options.items()]
-    return {
-        "path": row.path,
-        "label": row.label,
-        "group": row.group,
-        "unit": row.unit,
-        "low": row.low,
-        "high": row.high,
-        "step": row.step,
-        "stops": [float(row.number(stop)) for stop in row.stops],
-        "options": options or None,
-        "optional": row.optional,
+    names = "path", "label", "group", "unit", "low", "high", "step", "optional"
+    return {name: getattr(row, name) for name in names} | {
+        "stops": [float(row.shown(stop)) for stop in row.stops],
+        "options": [(word, option.label) for word, option in row.options.items()] or None,
     }
 
 
-def _measured(found: Readout) -> str:
-    """Return the measured temperature to two digits of its uncertainty, at least to 0.1 °C."""
-    text = _celsius(found.measured)
-    if isfinite(found.measured) and isfinite(found.uncertainty):
-        size = floor(log10(found.uncertainty)) if found.uncertainty > 0 else 0
-        digits = min(max(1 - size, 1), 4)
-        celsius = found.measured - KELVIN
-        text = _minus(f"{celsius:.{digits}f} ± {found.uncertainty:.{digits}f} °C")
-    return f"{text} (under range)" if found.flagged and isfinite(found.measured) else text
+def _measured(readout: Readout) -> str:
+    """Return the measured temperature, to two digits of its uncertainty if that is known."""
+    text = _celsius(readout.measured)
+    if isfinite(readout.measured) and readout.uncertainty > 0:
+        text = f"{uncertain_text(readout.measured - KELVIN, readout.uncertainty)} °C"
+    return f"{text} (under range)" if readout.flagged and isfinite(readout.measured) else text
 
 
 def _celsius(kelvins: float) -> str:
-    return _minus(f"{kelvins - KELVIN:.1f} °C") if isfinite(kelvins) else "–"
+    return quantity_text(kelvins - KELVIN if isfinite(kelvins) else None, "°C", 1)
 
 
 def _kelvins(kelvins: float) -> str:
-    return _minus(f"{round(kelvins, 1) + 0.0:+.1f} K") if isfinite(kelvins) else "–"
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "−")
+    return quantity_text(kelvins if isfinite(kelvins) else None, "K", 1, "+")

@@ -73,8 +73,8 @@ def calibrate(
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
-    from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
     from chipglow.laboratory.measurement.description import band_of
+    from chipglow.laboratory.measurement.figures import draw_calibrations
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
 

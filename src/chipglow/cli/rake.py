@@ -46,7 +46,7 @@ def rake(
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.chip import ToolUncertainty, chosen_tool, rake_grid
-    from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+    from chipglow.laboratory.chip.figures import draw_rake_grid
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
     from chipglow.quantities.option import parse

@@ -100,7 +100,7 @@ def register(
     """Map each point of an infrared image to a visible image."""
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
-    from chipglow.laboratory.chip import tool_of
+    from chipglow.laboratory.chip import load_tool
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration import (
         align_recordings,
@@ -111,7 +111,7 @@ def register(
         write_registration,
     )
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
-    from chipglow.laboratory.registration.picture_file import write_blink
+    from chipglow.laboratory.registration.input_files import write_blink
     from chipglow.laboratory.result_file import write_frame
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TIME
@@ -127,7 +127,7 @@ def register(
     _check_frame("--frame", frame, measured.times.size)
     _check_frame("--visible-frame", visible_frame, seen.times.size)
     picture = seen.signal[visible_frame]
-    outline = measured.tool if tool is None else tool_of(measured, tool)
+    outline = measured.tool if tool is None else load_tool(tool)
     screen = current()
     fit: PointFit | DotFit | ImageFit | None = None
     if known is not None:
@@ -196,7 +196,7 @@ def _check_frame(option: str, number: int, count: int) -> None:
 
 
 def _check_times(path: Path, interval: float | None) -> None:
-    from chipglow.laboratory.registration.picture_file import PICTURE_SUFFIXES
+    from chipglow.laboratory.registration.input_files import PICTURE_SUFFIXES
 
     if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
         raise ValueError(f"--align requires --visible-interval: {path} contains no times")

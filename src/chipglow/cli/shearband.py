@@ -57,7 +57,7 @@ def shearband(
     from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
-    from chipglow.laboratory.chip.band_figure import draw_band_profile
+    from chipglow.laboratory.chip.figures import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
     from chipglow.quantities.option import parse

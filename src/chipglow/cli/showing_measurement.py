@@ -17,7 +17,7 @@ from chipglow.laboratory.measurement import (
     MeasurementSummary,
     measurement_summary,
 )
-from chipglow.laboratory.measurement.figure import draw_measurement
+from chipglow.laboratory.measurement.figures import draw_measurement
 from chipglow.radiometry import Band
 
 _FLAG_NAMES: Final = {

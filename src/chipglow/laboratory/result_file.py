@@ -21,14 +21,14 @@ class Result(Protocol):
 
 
 def write_result(result: Result, path: str | os.PathLike[str]) -> None:
-    """Write a result as what the file's name says."""
+    """Write a result in the format that the file suffix names."""
     write_table_or_dataset(Path(path), *columns_and_rows(result.to_frame()), result.to_dataset)
 
 
 def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
     """Write a result's frame as CSV: the names of its columns, then a line a row.
 
-    Numbers have nine digits; a cell is empty where there is none.
+    Numbers have nine digits; NaN is an empty cell.
     """
     write_table(Path(path), *columns_and_rows(frame))
 

@@ -1,10 +1,11 @@
 """Temperature along the shear band of a measurement, and how far the band has developed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import cache, partial
 from math import isfinite, nan, sqrt
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -16,14 +17,13 @@ from scipy.ndimage import map_coordinates
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
-from chipglow.laboratory.chip.budget_columns import budget_columns, celsius
-from chipglow.laboratory.chip.frames import frame_numbers
+from chipglow.laboratory.chip.frames import budget_columns, celsius, frame_numbers
 from chipglow.laboratory.chip.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
     contribution,
-    tool_in,
+    tool_of,
 )
 from chipglow.quantities import Array
 from chipglow.scene import Line, Tool, sample
@@ -56,6 +56,8 @@ _DEEP_FRACTION: Final = 1.0 / 3.0
 
 _STEP: Final = 0.5
 _FINE: Final = 4
+
+_Images: TypeAlias = Callable[[int], ThermalImage]
 
 
 class Stage(StrEnum):
@@ -104,19 +106,6 @@ class BandProfile:
     """Width of the mean across the curve in m."""
     notes: Notes = field(default_factory=Notes)
 
-    def __post_init__(self) -> None:
-        shape = (self.times.size, self.distance.size)
-        expected = {"points": (*shape, 2), "estimate": shape, "offset": shape[:1]}
-        for name, size in expected.items():
-            found = getattr(self, name).shape
-            if found != size:
-                raise ValueError(f"band profile: {name} has shape {found}, expected {size}")
-        if len(self.stage) != self.times.size:
-            raise ValueError(
-                f"band profile: {len(self.stage)} stages for {self.times.size} frames, "
-                "expected as many"
-            )
-
     @property
     def temperature(self) -> Array:
         """Values of `estimate` in K, shape (frames, n)."""
@@ -129,7 +118,7 @@ class BandProfile:
         return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each frame's band, a row each."""
+        """Every point of each frame's band; one row each."""
         there = np.isfinite(self.points[..., 0]).ravel()
         frame, point = (index.ravel() for index in np.indices(self.temperature.shape))
         stages = np.array([stage.value for stage in self.stage], dtype=object)
@@ -169,7 +158,7 @@ class BandProfile:
         )
 
     def stage_frame(self) -> pd.DataFrame:
-        """Each frame's band, a row each."""
+        """Each frame's band; one row each."""
         return pd.DataFrame([self._stage_row(frame) for frame in range(self.times.size)])
 
     def _stage_row(self, frame: int) -> dict[str, float | str]:
@@ -214,7 +203,7 @@ def band_profile(
         y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
     reference : int, optional
         Number of the frame whose band is fully developed. By default the given curve is its place;
-        without a curve, the frame in which the band that begins near the edge has the greatest
+        without a curve, the frame in which the band that begins near the edge has the largest
         integral of its temperature over the camera's lower range limit.
     width : float, optional
         Width across the curve in m over which to average; a pixel by default.
@@ -246,14 +235,14 @@ def band_profile(
     the curve's first point, contributes half the difference of the temperatures so far up and down
     the curve.
     """
-    tool, pitch = tool_in(measurement, tool), measurement.raster.spacing
+    tool, pitch = tool_of(measurement, tool), measurement.raster.spacing
     width = pitch if width is None else width
     position = pitch / sqrt(12.0) if position is None else position
     for name, value in (("width", width), ("position", position)):
         if not (isfinite(value) and value >= 0):
             raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
     numbers = frame_numbers(frames, measurement.times.size)
-    images = _Images(measurement)
+    images = cache(partial(ThermalImage.of, measurement))
     given = None if curve is None else _given(curve, tool, pitch)
     found, reason = _found(images, tool, numbers)
     notes = Notes()
@@ -267,9 +256,7 @@ def band_profile(
     points = np.stack([_laid(line, distance) for line in lines])
     reader = _Reader(measurement, images, width, position)
     read = [reader(int(k), p) for k, p in zip(numbers, points, strict=True)]
-    temperature, off = (
-        np.stack([getattr(one, name) for one in read]) for name in ("temperature", "position")
-    )
+    temperature, off = (np.stack([one[part] for one in read]) for part in (0, 2))
     if not np.isfinite(temperature).any():
         raise ValueError(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
@@ -277,7 +264,7 @@ def band_profile(
         )
     if given is None:
         notes.warnings.extend(_joined(temperature, measurement.times[numbers]))
-    estimate = measurement.estimate(temperature, [one.calibration for one in read])
+    estimate = measurement.estimate(temperature, [calibration for _, calibration, _ in read])
     known = np.isfinite(temperature)
     off = np.where(known, off, nan)
     estimate = estimate.with_component(POSITION, off, independent="per element")
@@ -302,19 +289,6 @@ def band_profile(
         width=width,
         notes=notes,
     )
-
-
-class _Images:
-    """Frames of a measurement with a temperature everywhere, made when they are asked for."""
-
-    def __init__(self, measurement: Measurement) -> None:
-        self._measurement = measurement
-        self._made: dict[int, ThermalImage] = {}
-
-    def __getitem__(self, frame: int) -> ThermalImage:
-        if frame not in self._made:
-            self._made[frame] = ThermalImage.of(self._measurement, frame)
-        return self._made[frame]
 
 
 def _given(curve: Array, tool: Tool, pitch: float) -> Line:
@@ -346,7 +320,7 @@ def _found(
     reason = ""
     for number in numbers.tolist():
         try:
-            lines.append(find_band(images[number], tool))
+            lines.append(find_band(images(number), tool))
         except NoShearBandError as error:
             lines.append(None)
             reason = str(error)
@@ -370,7 +344,7 @@ def _reference(
     """The curve of the fully developed band."""
     if reference is not None:
         frame_numbers([reference], measurement.times.size)
-        return find_band(images[reference], tool)
+        return find_band(images(reference), tool)
     if given is not None:
         notes.assumed.append("The given curve is the place of the fully developed band.")
         return given
@@ -456,18 +430,6 @@ def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
     return np.asarray(moves @ way / np.hypot(*way))
 
 
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """Temperature along a curve in K, and what makes it uncertain, of a frame."""
-
-    temperature: Array
-    """Mean across the curve, shape (n,); NaN where there is none."""
-    calibration: Array
-    """Its change with each error of the calibration, shape (errors, n)."""
-    position: Array
-    """Its standard uncertainty from the place of the curve, shape (n,)."""
-
-
 class _Reader:
     """Reads means across a curve, and what makes them uncertain, in one frame after another."""
 
@@ -480,29 +442,31 @@ class _Reader:
         count = max(round(width / self.pitch * _FINE), 1)
         self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
 
-    def __call__(self, number: int, points: Array) -> _Read:
-        """What is read at points of a frame, NaN beyond the ends of its curve."""
+    def __call__(self, number: int, points: Array) -> tuple[Array, Array, Array]:
+        """Temperature at points of a frame, NaN beyond the ends of its curve, and its changes.
+
+        By each error of the calibration, shape (errors, n), and by the place of the curve, (n,).
+        """
         effects = self.measurement.calibration_effects(number)
-        found = _Read(
-            np.full(len(points), nan), np.zeros((len(effects), len(points))), np.zeros(len(points))
-        )
+        temperature, position = np.full(len(points), nan), np.zeros(len(points))
+        calibration = np.zeros((len(effects), len(points)))
         there = np.isfinite(points[:, 0])
         if there.sum() < 2:
-            return found
+            return temperature, calibration, position
         curve = points[there]
         places = curve[:, None] + self.offsets[:, None] * normals_of(curve)[:, None]
         frame = self.measurement.data["radiance_temperature"][number].values
-        found.temperature[there] = self._mean(frame, places)
+        temperature[there] = self._mean(frame, places)
         for error, image in enumerate(effects):
-            found.calibration[error, there] = self._mean(image, places)
-        found.position[there] = self._position(number, curve)
-        return found
+            calibration[error, there] = self._mean(image, places)
+        position[there] = self._position(number, curve)
+        return temperature, calibration, position
 
     def _mean(self, image: NDArray[np.floating], places: Array) -> Array:
         return np.asarray(sample(image, self.measurement.raster, places).mean(axis=-1))
 
     def _position(self, number: int, curve: Array) -> Array:
-        image = self.images[number]
+        image = self.images(number)
         slopes = (
             map_coordinates(slope, image.index(curve), order=1, mode="nearest")
             for slope in np.gradient(image.temperature, self.pitch)
@@ -527,7 +491,7 @@ class _Reader:
             curve = points[there]
             normal = normals_of(curve)
             tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-            image = self.images[number]
+            image = self.images(number)
             for step, changes in zip(nearer, found, strict=True):
                 changes[there] = contribution(image, curve, step * tangent)
         return found

@@ -95,7 +95,7 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     A ridge is where the second derivative across it is negative (Lindeberg 1998: eigenvalues of
     the Hessian after Gaussians of several widths, times the square of the width). What runs along
     the rake face is left out, for there friction heats the chip. In polar coordinates about the
-    edge a band has one angle at every radius: dynamic programming finds the path of the greatest
+    edge a band has one angle at every radius: dynamic programming finds the path of the largest
     sum of log(1 + response / 5 K). A band that begins at the edge comes first; without one, the
     best anywhere, such as a band that has left the edge with the chip. The path is moved to the
     maximum across it, on a cubic spline, and smoothed by local parabolas. Where that leads to no

@@ -80,7 +80,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     The uncertainties are those of the jackknife over blocks of rows (JCGM 100 type A) and, as no
     row says how far the courses are from those of the model, of limits of a rectangular
     distribution (type B): half a pixel for the position as a whole, a pixel for either end of the
-    face. The tip is where the radiance along the face has fallen to half of its greatest value; its
+    face. The tip is where the radiance along the face has fallen to half of its largest value; its
     uncertainty is set to 2 pixels and half the edge radius.
     """
     shape = shape or ToolGeometry()
@@ -171,12 +171,7 @@ def _up(image: Array, rows: NDArray[Any]) -> Array:
     return np.asarray((image.shape[0] - 1) / 2 - rows, dtype=np.float64)
 
 
-def _gain(
-    windows: Array,
-    place: Array,
-    blur: float,
-    image: Array,
-) -> Array:
+def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
     """Root mean square that a break explains beyond a smooth course, as a fraction of the level."""
     steps = np.arange(-_REACH, _REACH + 1.0)
     basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)

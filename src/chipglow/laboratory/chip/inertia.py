@@ -1,4 +1,4 @@
-"""How much the scaled mass of a cutting simulation can matter."""
+"""Limits of a cutting simulation: the scaled mass, and lengths that its grid does not resolve."""
 
 from dataclasses import dataclass
 from math import nan
@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from chipglow.cutting import unresolved
 from chipglow.laboratory.chip.segmentation import end_of_build_up
 from chipglow.quantities import Array
 from chipglow.scene import Scene
@@ -70,3 +71,10 @@ def _ratio(part: Array, whole: Array) -> Array:
 
 def _values(scene: Scene, name: str) -> Array:
     return np.asarray(scene.data[name].values, dtype=np.float64)
+
+
+def resolution_warnings(scene: Scene, band_width: float = nan) -> tuple[str, ...]:
+    """Sentences about lengths of a cut that its grid does not resolve."""
+    known = str(scene.data.attrs.get("resolution_warnings", ""))
+    cell = float(scene.data.attrs.get("cell", 0.0))
+    return (*known.splitlines(), *unresolved({"shear band": band_width}, cell))

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.laboratory.chip.contact import contact_length
 from chipglow.laboratory.chip.ridge import NoShearBandError
+from chipglow.laboratory.chip.segment import contact_length
 from chipglow.laboratory.chip.segmentation import Segmentation, segmentation
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
 from chipglow.quantities import Array
@@ -21,7 +21,7 @@ _TOUCHING: Final = 3e-6
 _CHIP_OVER_FEED: Final = 1.2
 _UNDEFORMED: Final = 0.01
 _WHOLE: Final = 0.9
-"""Fraction of a period from which on it counts as whole."""
+"""Fraction of a period at or above which a period counts as whole."""
 
 _DEVELOPED: Final = 0.5
 
@@ -76,7 +76,7 @@ class ChipMetrics:
     peak_standard_deviation: float
     valley: float
     valley_standard_deviation: float
-    """Mean of the greatest and the least thickness of each segment, and their standard
+    """Mean of the largest and the least thickness of each segment, and their standard
     deviation over the segments.
     """
     degree: float
@@ -97,14 +97,14 @@ class ChipMetrics:
     shear_angle_standard_deviation: float
     """Angle in rad from the direction of cutting to the straight line through the middle half of
     the shear band, over the frames in which the band is developed: where it reaches the free
-    surface and its rate is at least half the greatest. NaN without such a frame, as the next.
+    surface and its rate is at least half the largest. NaN without such a frame, as the next.
     """
     band_width: float
     band_width_standard_deviation: float
     """Full width at half maximum of the strain rate across the band, over the same frames."""
     band_rate: float
     """Greatest plastic strain rate of the band in 1/s: median over its middle half, in the frame
-    where that is greatest.
+    where that is largest.
     """
     band_strain: float
     """Greatest plastic strain that passes `scan`, as the median over the middle half of `valley`
@@ -349,7 +349,7 @@ def _segmentation(scene: Scene) -> Segmentation | None:
 
 
 def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
-    """Bands that reach the free surface with half the greatest rate or more."""
+    """Bands that reach the free surface with half the largest rate or more."""
     found = [band for number in frames if (band := _band(scene, number)) is not None]
     greatest = max((band.middle_rate for band in found), default=0.0)
     return [band for band in found if band.middle_rate >= _DEVELOPED * greatest]

@@ -15,18 +15,19 @@ from scipy import sparse
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
-from chipglow.laboratory.chip.budget_columns import (
+from chipglow.laboratory.chip.frames import (
+    FRAMES,
+    FrameScatter,
     budget_columns,
     celsius,
+    frame_numbers,
     known_uncertainty,
 )
-from chipglow.laboratory.chip.frame_scatter import FRAMES, FrameScatter
-from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
     contribution,
-    tool_in,
+    tool_of,
 )
 from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
@@ -75,15 +76,6 @@ class RakeGrid:
     times: Array
     """When each frame's integration began in s, shape (frames,)."""
 
-    def __post_init__(self) -> None:
-        shape = (self.times.size, self.depth.size, self.along.size)
-        for name in ("estimate", "standard_deviation", "count"):
-            found = getattr(self, name).shape
-            if found != shape:
-                raise ValueError(f"rake grid: {name} has shape {found}, expected {shape}")
-        if not self.size > 0:
-            raise ValueError(f"rake grid: size is {self.size!r}, expected over 0 m")
-
     @property
     def mean(self) -> Array:
         """Values of `estimate` in K, shape (frames, m, n)."""
@@ -129,7 +121,7 @@ class RakeGrid:
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
 
     def to_frame(self) -> pd.DataFrame:
-        """Every square of every frame, a row each."""
+        """Every square of every frame; one row each."""
         places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
         time, depth, along = (1e6 * place.ravel() for place in places)
         return pd.DataFrame(
@@ -164,7 +156,7 @@ class RakeGrid:
         )
 
     def mean_frame(self) -> pd.DataFrame:
-        """Every square in the mean over the frames, a row each."""
+        """Every square in the mean over the frames; one row each."""
         depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
         several = self.times.size > 1
         standard_deviation = (
@@ -272,7 +264,7 @@ def rake_grid(
     standard uncertainty; half the difference of the temperatures there is what it contributes
     (JCGM 100, 5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
     """
-    tool, raster = tool_in(measurement, tool), measurement.raster
+    tool, raster = tool_of(measurement, tool), measurement.raster
     size = _checked_size(pixels, depth, raster)
     numbers = frame_numbers(frames, measurement.times.size)
     rows = int(depth / size + _ROUNDING)

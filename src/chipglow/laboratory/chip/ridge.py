@@ -172,7 +172,7 @@ def strongest_part(points: Array, strength: Array, longest: float) -> slice:
 
 
 def even_steps(points: Array, step: float) -> Array:
-    """Curve smoothed by local parabolas and laid out anew at even steps of arc length in m."""
+    """Curve resampled at even steps of arc length in m and smoothed by local parabolas."""
     along = arc_length(points)
     even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
     resampled = np.stack([np.interp(even, along, points[:, axis]) for axis in (0, 1)], axis=1)
@@ -208,7 +208,7 @@ def normals_of(points: Array) -> Array:
 
 
 def highest(values: Array, offsets: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Place of each row's greatest value by a parabola through it and its neighbours."""
+    """Place of each row's largest value by a parabola through it and its neighbours."""
     peak = values.argmax(axis=1)
     inside = (peak > 0) & (peak < offsets.size - 1)
     peak = np.clip(peak, 1, offsets.size - 2)

@@ -2,15 +2,60 @@
 
 from dataclasses import dataclass
 from math import nan
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipglow.camera import frame_weights
-from chipglow.laboratory.chip.contact import contact_length
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
 from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
+from chipglow.scene.lines import nearest
+
+_LONGEST_GAP: Final = 12e-6
+
+BESIDE: Final = 15e-6
+"""Distance from the rake face in m within which `contact_temperatures` takes means."""
+
+
+class NoContactError(ValueError):
+    """The chip does not touch the rake face."""
+
+
+def contact_length(
+    raster: Raster, workpiece: NDArray[np.bool_], tool: Tool, touching: float
+) -> float:
+    """Length over which the chip touches the rake face."""
+    step = raster.spacing / 2
+    along = np.arange(0.0, np.hypot(raster.rows, raster.columns) * raster.spacing, step)
+    foot = tool.rake_point(along)
+    touches = np.zeros(along.size, dtype=np.bool_)
+    for height in np.arange(raster.spacing / 4, touching + step, step):
+        places = foot + height * np.array(tool.rake_normal)
+        touches |= nearest(workpiece, raster, places) == 1
+    contacts = along[touches]
+    if contacts.size == 0 or contacts[0] > _LONGEST_GAP:
+        return 0.0
+    gaps = np.diff(contacts) > _LONGEST_GAP
+    last = int(gaps.argmax()) if gaps.any() else contacts.size - 1
+    return float(contacts[last])
+
+
+def contact_temperatures(
+    frame: Frame, raster: Raster, tool: Tool, length: float
+) -> tuple[float, float]:
+    """Mean temperatures within `BESIDE` of the rake face, along the contact."""
+    x, y = np.meshgrid(raster.x, raster.y)
+    distance = tool.signed_distance(x, y)
+    along, _ = tool.face_coordinates(np.stack([x, y], axis=-1))
+    beside = (np.abs(distance) < BESIDE) & (along > 0) & (along < length)
+    chip, inside = (
+        frame.temperature[beside & where]
+        for where in (frame.material == Material.WORKPIECE, distance < 0)
+    )
+    return float(chip.mean()) if chip.size else nan, float(inside.mean()) if inside.size else nan
 
 
 @dataclass(frozen=True)
@@ -20,7 +65,7 @@ class Instant:
     start: float
     """When the exposure begins in s."""
     band: ShearBand | None
-    """Ridge of the strain rate's mean over the exposure; None if there is none."""
+    """Ridge of the strain rate's mean over the exposure; None if undefined."""
     temperatures: Array
     """Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
     scene, empty without a band.
@@ -61,7 +106,7 @@ class Segment:
     contact_length: float
     """Length over which the chip touches the rake face in m."""
     momentary_band: ShearBand | None
-    """The band in `frame` alone, which motion does not blur; None if there is none."""
+    """The band in `frame` alone, which motion does not blur; None if undefined."""
     sweep: float
     """How far the band's middle moves across itself during the exposure, in m; NaN where it is
     not found in both the first and the last frame.
@@ -111,7 +156,7 @@ def _momentary_band(raster: Raster, frame: Frame, tool: Tool) -> ShearBand | Non
 
 
 def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
-    """Travel of the greatest strain rate on the line across the band's middle."""
+    """Travel of the largest strain rate on the line across the band's middle."""
     line = band.across(40e-6, scene.raster.spacing / 2)
     places = []
     for index in (indices[0], indices[-1]):

@@ -133,7 +133,7 @@ def _correlation(swing: Array) -> Array:
 
 
 def _correlation_period(correlation: Array, step: float) -> float:
-    """Lag of the first clear peak of the unbiased autocorrelation; NaN if there is none."""
+    """Lag of the first clear peak of the unbiased autocorrelation; NaN if undefined."""
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan

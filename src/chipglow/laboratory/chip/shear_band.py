@@ -37,7 +37,7 @@ class ShearBand:
     """A shear band as a curve, away from the cutting edge."""
 
     ridge: Line
-    """Points of greatest strain rate, at even steps. The distance in m counts from the cutting
+    """Points of largest strain rate, at even steps. The distance in m counts from the cutting
     edge: straight to the first point, where the band begins, then along the curve. A band
     that has left the edge with the chip begins where it comes out of the layer along the rake
     face.
@@ -70,7 +70,7 @@ class ShearBand:
 
     @property
     def width(self) -> float:
-        """Median of the widths over the middle half of the curve in m; NaN where there is none."""
+        """Median of the widths over the middle half of the curve in m; NaN if undefined."""
         widths = self.widths[self.middle_half]
         return float(np.nanmedian(widths)) if np.isfinite(widths).any() else float("nan")
 
@@ -101,7 +101,7 @@ def find_shear_band(
     """Find the shear band as the ridge of the strain rate that leads to the free surface.
 
     In polar coordinates about the edge the band has one angle at every radius. Dynamic
-    programming finds the path of the greatest sum of log(1 + rate / 6000 s⁻¹): the logarithm
+    programming finds the path of the largest sum of log(1 + rate / 6000 s⁻¹): the logarithm
     keeps a single hot spot from outweighing a stretch of band. A layer along the rake face is left
     out, since friction shears it too, and its slope, which falls from there, counts nothing. The
     path begins where the band does, at the edge or away from it; what leads over a stretch of
@@ -193,12 +193,7 @@ def _beyond_layer(points: Array, tool: Tool) -> Array:
     return beyond
 
 
-def _widths(
-    points: Array,
-    normals: Array,
-    raster: Raster,
-    rate: Array,
-) -> Array:
+def _widths(points: Array, normals: Array, raster: Raster, rate: Array) -> Array:
     """Full width at half maximum across each point of the curve."""
     step = raster.spacing / 2
     offsets = step * np.arange(ceil(_WIDEST / step) + 1, dtype=np.float64)

@@ -23,13 +23,13 @@ TOOL_BUDGET: Final = ("tool along", "tool across", "tool angle")
 """Its lines in a budget."""
 
 
-def tool_in(measurement: Measurement, given: Tool | None) -> Tool:
+def tool_of(measurement: Measurement, given: Tool | None = None) -> Tool:
     """The given tool, or else the measurement's own."""
     tool = measurement.tool if given is None else given
     if tool is None:
         raise ValueError(
-            "tool: none is given and the measurement has none, expected one; find_tool looks for "
-            "it in the image"
+            "tool: the measurement contains no tool; pass a tool, or 'found' to detect the rake "
+            "face in the image"
         )
     return tool
 

@@ -1,11 +1,10 @@
-"""Measured beside simulated: whether they agree within their uncertainty."""
+"""Comparison of measurement and simulation within their uncertainties."""
 
 from chipglow.laboratory.comparison.comparison import (
-    BandComparison,
     Comparison,
     Fit,
-    GridComparison,
     PlaceResult,
+    Readings,
     StatedUncertainties,
     compare,
     normalised_error,
@@ -13,11 +12,10 @@ from chipglow.laboratory.comparison.comparison import (
 from chipglow.laboratory.comparison.file import labelled_simulations, write_comparison
 
 __all__ = [
-    "BandComparison",
     "Comparison",
     "Fit",
-    "GridComparison",
     "PlaceResult",
+    "Readings",
     "StatedUncertainties",
     "compare",
     "labelled_simulations",

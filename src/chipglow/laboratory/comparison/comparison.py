@@ -1,9 +1,9 @@
-"""Measured beside simulated: at the rake face and in the shear band, for several emissivities."""
+"""Comparison of measurement and simulation at the rake face and in the shear band."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, radians, sqrt
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frame_scatter import FrameScatter
+from chipglow.laboratory.chip.frames import FrameScatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -124,54 +124,61 @@ def _agreement(fit: Fit) -> str:
 
 
 @dataclass(frozen=True)
-class GridComparison:
-    """The analysis grid on the rake face, measured and simulated."""
+class Readings:
+    """Temperatures of the measurement and of each simulation, at the same positions."""
 
-    along: Array
-    depth: Array
-    """Middles of the squares up the face and into the chip in m, shapes (n,) and (m,)."""
-    measured: Estimate
-    """Shape (m, n)."""
-    simulated: tuple[Estimate, ...]
-
-
-@dataclass(frozen=True)
-class BandComparison:
-    """The temperature along the shear band, measured and simulated."""
-
+    place: str
     distance: Array
-    """Distance from the cutting edge in m, at steps of a measured pixel, shape (n,)."""
+    """Up the rake face, or from the cutting edge along the band, in m, shape (n,)."""
     measured: Estimate
     simulated: tuple[Estimate, ...]
+    """Of the shape of the measured ones: (n,), or (m, n) with a depth."""
+    depth: Array | None = None
+    """Depth in the chip in m, shape (m,); None along the band."""
+
+    def to_frame(self, labels: Sequence[str]) -> pd.DataFrame:
+        """Every value of each simulation; one row each."""
+        measured, unknown = self.measured, np.full(self.measured.shape, np.nan)
+        place = {"along_um": unknown, "depth_um": unknown, "distance_um": unknown + self.distance}
+        if self.depth is not None:
+            depth, along = np.meshgrid(self.depth, self.distance, indexing="ij")
+            place = {"along_um": along, "depth_um": depth, "distance_um": unknown}
+        frames = []
+        for label, simulated in zip(labels, self.simulated, strict=True):
+            columns = {
+                **{name: 1e6 * values for name, values in place.items()},
+                "measured_degC": measured.values - ZERO_CELSIUS,
+                "measured_expanded_K": COVERAGE * measured.standard_uncertainty,
+                "simulation": np.full(measured.shape, label, object),
+                "simulated_degC": simulated.values - ZERO_CELSIUS,
+                "simulated_expanded_K": COVERAGE * simulated.standard_uncertainty,
+                "difference_K": simulated.values - measured.values,
+                "E_n": normalised_error(measured, simulated),
+            }
+            flat = {name: np.ravel(values) for name, values in columns.items()}
+            frames.append(pd.DataFrame({"place": self.place, **flat}))
+        return pd.concat(frames, ignore_index=True)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A measurement beside simulations."""
+    """A measurement compared with simulations."""
 
     labels: tuple[str, ...]
-    grid: GridComparison | None
+    grid: Readings | None
     """At the rake face; None if there is nothing to compare."""
-    band: BandComparison | None
+    band: Readings | None
     """Along the shear band; None if there is nothing to compare."""
     places: tuple[PlaceResult, ...]
     notes: Notes
 
     def to_frame(self) -> pd.DataFrame:
-        """Every value of each simulation, a row each."""
-        parts: list[pd.DataFrame] = []
-        if self.grid is not None:
-            depth, along = np.meshgrid(1e6 * self.grid.depth, 1e6 * self.grid.along, indexing="ij")
-            place = {"along_um": along.ravel(), "depth_um": depth.ravel(), "distance_um": np.nan}
-            parts += _value_frames({"place": "rake face", **place}, self.labels, self.grid)
-        if self.band is not None:
-            distance = 1e6 * self.band.distance
-            place = {"along_um": np.nan, "depth_um": np.nan, "distance_um": distance}
-            parts += _value_frames({"place": "shear band", **place}, self.labels, self.band)
-        return pd.concat(parts, ignore_index=True)
+        """Every value of each simulation; one row each."""
+        readings = [one for one in (self.grid, self.band) if one is not None]
+        return pd.concat([one.to_frame(self.labels) for one in readings], ignore_index=True)
 
     def fit_frame(self) -> pd.DataFrame:
-        """How each simulation fits at each place, a row each."""
+        """How each simulation fits at each place; one row each."""
         return pd.DataFrame(
             {
                 "place": result.place.rstrip(","),
@@ -202,28 +209,6 @@ class Comparison:
         if unsure:
             parts.append(f"The sets cannot be distinguished {'; '.join(unsure)}.")
         return " ".join(parts)
-
-
-def _value_frames(
-    place: Mapping[str, Any], labels: Sequence[str], pair: GridComparison | BandComparison
-) -> Iterator[pd.DataFrame]:
-    """Values of each simulation at one place."""
-    measured = pair.measured
-    for label, simulated in zip(labels, pair.simulated, strict=True):
-        columns = {
-            "measured_degC": measured.values - ZERO_CELSIUS,
-            "measured_expanded_K": COVERAGE * measured.standard_uncertainty,
-            "simulation": label,
-            "simulated_degC": simulated.values - ZERO_CELSIUS,
-            "simulated_expanded_K": COVERAGE * simulated.standard_uncertainty,
-            "difference_K": simulated.values - measured.values,
-            "E_n": normalised_error(measured, simulated),
-        }
-        yield pd.DataFrame({**place, **{name: _flat(values) for name, values in columns.items()}})
-
-
-def _flat(values: Any) -> Any:
-    return values if isinstance(values, str) else np.ravel(values)
 
 
 @dataclass(frozen=True)
@@ -260,7 +245,7 @@ def compare(
     stated: StatedUncertainties | None = None,
     reference: int | None = None,
 ) -> Comparison:
-    """Lay a measurement and simulations over each other.
+    """Compare a measurement with simulations.
 
     Parameters
     ----------
@@ -297,7 +282,7 @@ def compare(
     and of the mean over the frames. A tool that is elsewhere moves the squares, the cutting edge
     from which the distance along a found ridge counts, and a given curve's place in the
     simulations. Which set fits best is the one with the least root mean square of the differences;
-    how sure that is, is found by drawing all values anew from their uncertainties: what is
+    its confidence is found by drawing all values from their uncertainties: what is
     systematic, and each part of the tool's place, with one deviate a file, what is random with one
     a value.
     """
@@ -348,7 +333,7 @@ def _compare_grid(
     tools: Mapping[str, Tool],
     stated: StatedUncertainties,
     notes: Notes,
-) -> GridComparison | None:
+) -> Readings | None:
     size = PIXELS * measured.raster.spacing
     try:
         base = rake_grid(measured, tool, PIXELS, max(DEPTH, size), uncertainty=stated.tool)
@@ -367,9 +352,8 @@ def _compare_grid(
         _assumed(item, grids[label].up_to(columns).frame_estimate, stated)
         for label, item in simulated.items()
     ]
-    return GridComparison(
-        base.along, base.depth, _measured_squares(measured, base, stated), tuple(readings)
-    )
+    own = _measured_squares(measured, base, stated)
+    return Readings("rake face", base.along, own, tuple(readings), base.depth)
 
 
 def _measured_squares(
@@ -428,7 +412,7 @@ def _compare_band(
     curve: Array | None,
     stated: StatedUncertainties,
     notes: Notes,
-) -> BandComparison | None:
+) -> Readings | None:
     """The band of the measurement, which comes first, and of the simulations."""
     _, measured, tool, _ = files[0]
     position = _position(measured, stated)
@@ -463,7 +447,7 @@ def _compare_band(
         _assumed(item, found.without(POSITION), stated)
         for (_, item, *_), found in zip(files[1:], others, strict=True)
     ]
-    return BandComparison(distance, _stated(own, stated), tuple(readings))
+    return Readings("shear band", distance, _stated(own, stated), tuple(readings))
 
 
 def _laid_by_the_edge(
@@ -532,7 +516,7 @@ def _scatter(frames: Array, known: NDArray[np.bool_]) -> FrameScatter:
 
 
 def _at(distance: Array, own: Array, values: Array) -> Array:
-    """Values at other distances; NaN beside a NaN and beyond the ends."""
+    """Values at other distances; NaN next to a NaN and beyond the ends."""
     return np.interp(distance, own, values, left=np.nan, right=np.nan)
 
 
@@ -544,11 +528,11 @@ def _mean(values: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def _places(
-    labels: Sequence[str], grid: GridComparison | None, band: BandComparison | None
+    labels: Sequence[str], grid: Readings | None, band: Readings | None
 ) -> tuple[PlaceResult, ...]:
     """Which simulation fits where both have values."""
     results: list[PlaceResult | None] = []
-    if grid is not None:
+    if grid is not None and grid.depth is not None:
         face = np.zeros(grid.measured.values.shape, dtype=np.bool_)
         face[0] = True
         reach = grid.depth[0] * 2e6
@@ -570,7 +554,7 @@ def _places(
 def _judged(
     place: str,
     labels: Sequence[str],
-    pair: GridComparison | BandComparison,
+    pair: Readings,
     where: NDArray[np.bool_],
 ) -> PlaceResult | None:
     """The fits at one place; None where not all files have a value together."""

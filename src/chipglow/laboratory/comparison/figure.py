@@ -1,4 +1,4 @@
-"""Measured beside simulated, and their difference (the paper's Figures 7 and 9)."""
+"""Measured and simulated temperatures and their difference (the paper's Figures 7 and 9)."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
-from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, GridComparison
-from chipglow.quantities import Array
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, Readings
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Estimate
 
 _HEIGHT: Final = 5.2
@@ -21,11 +21,11 @@ _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 def draw_comparison(comparison: Comparison) -> Figure:
     """Draw what was measured and simulated, and the differences with expanded uncertainties."""
     columns = []
-    if comparison.grid is not None:
-        grid = comparison.grid
+    grid = comparison.grid
+    if grid is not None and grid.depth is not None:
         title = f"at the rake face, {1e6 * grid.depth[0]:.3g} µm deep"
         readings = [item[0] for item in (grid.measured, *grid.simulated)]
-        columns.append((title, "along the rake face / µm", grid.along, readings))
+        columns.append((title, "along the rake face / µm", grid.distance, readings))
     if comparison.band is not None:
         band = comparison.band
         label = "distance from the cutting edge / µm"
@@ -42,8 +42,8 @@ def draw_comparison(comparison: Comparison) -> Figure:
             below.set_xlabel(label)
             _draw_values(above, place, readings, comparison.labels)
             _draw_differences(below, place, readings)
-            if comparison.grid is not None and place is comparison.grid.along:
-                _draw_deeper(below, comparison.grid)
+            if grid is not None and place is grid.distance:
+                _draw_deeper(below, grid)
         panels[0, 0].set_ylabel("radiance temperature / °C")
         panels[1, 0].set_ylabel("simulated − measured / K")
         handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -59,24 +59,25 @@ def _draw_values(
     axes: Axes, place: Array, readings: Sequence[Estimate], labels: Sequence[str]
 ) -> None:
     measured, *simulated = readings
-    x, values = 1e6 * place, measured.values - KELVIN
+    x, values = 1e6 * place, measured.values - ZERO_CELSIUS
     axes.plot(x, values, "k.", markersize=4, label="measured")
     expanded = COVERAGE * measured.standard_uncertainty
     drawing.shade(axes, x, values, expanded, GREY, 0.3, "expanded uncertainty, k = 2")
     for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
-        values = reading.values - KELVIN
+        values = reading.values - ZERO_CELSIUS
         axes.plot(x, values, color=_colour(i), label=label)
         drawing.shade(axes, x, values, COVERAGE * reading.standard_uncertainty, _colour(i))
 
 
-def _draw_deeper(axes: Axes, grid: GridComparison) -> None:
+def _draw_deeper(axes: Axes, grid: Readings) -> None:
     """Differences of the rows behind the first, without bars."""
+    assert grid.depth is not None
     rows = grid.depth.size
     for row in range(1, rows):
         for i, reading in enumerate(grid.simulated):
             away = reading.values[row] - grid.measured.values[row]
             style: dict[str, Any] = {"color": _colour(i), "alpha": 0.6 * (1 - row / rows) + 0.1}
-            axes.plot(1e6 * grid.along, away, linewidth=0.8, linestyle="--", **style)
+            axes.plot(1e6 * grid.distance, away, linewidth=0.8, linestyle="--", **style)
     if rows > 1:
         deepest = 1e6 * float(grid.depth[-1])
         axes.set_title(f"dashed: deeper rows, to {deepest:.3g} µm", fontsize="small")

@@ -26,7 +26,7 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> None:
-    """Write a comparison into a folder that is there."""
+    """Write a comparison into an existing folder."""
     write_frame(comparison.to_frame(), folder / "comparison.csv")
     summary = {
         "statement": comparison.statement,

@@ -11,9 +11,9 @@ from matplotlib.patheffects import withStroke
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Region
 
 _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
@@ -26,9 +26,9 @@ _SLENDER: Final = 3.0
 def draw_emissivity(
     found: EmissivityMap, regions: Sequence[Region], lines: Sequence[EmissivityLine] = ()
 ) -> Figure:
-    """Draw the radiance temperature with the regions, and the emissivity beside it."""
+    """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
-    temperature = found.radiance_temperature - KELVIN
+    temperature = found.radiance_temperature - ZERO_CELSIUS
     panels = (
         ImagePanel(
             "radiance temperature",
@@ -38,7 +38,7 @@ def draw_emissivity(
             scales.HEAT,
         ),
         ImagePanel(
-            f"emissivity, object at {found.heating.reference - KELVIN:.4g} °C",
+            f"emissivity, object at {found.heating.reference - ZERO_CELSIUS:.4g} °C",
             "emissivity",
             found.emissivity,
             scales.ends(found.emissivity, 0.5, 99.5),
@@ -93,7 +93,7 @@ def _colours(regions: Sequence[Region]) -> dict[str, str]:
 def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[str, str]) -> None:
     for line in lines:
         colour = colours[line.feature]
-        celsius = np.array(line.temperatures) - KELVIN
+        celsius = np.array(line.temperatures) - ZERO_CELSIUS
         axes.errorbar(
             celsius,
             line.means,
@@ -105,7 +105,7 @@ def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[st
             label=line.name,
         )
         along = np.linspace(celsius.min(), celsius.max(), 50)
-        found = line.at(along + KELVIN)
+        found = line.at(along + ZERO_CELSIUS)
         axes.plot(along, found.values, color=colour)
         drawing.shade(axes, along, found.values, 2 * found.standard_uncertainty, colour)
     axes.set_xlabel("true temperature / °C")

@@ -17,7 +17,7 @@ RANDOM: Final = "random"
 """Name of the component of what observations show of chance."""
 
 _MANY_LEFT_OUT: Final = 0.05
-"""Fraction of an area's pixels from which on it is a warning that they are left out."""
+"""Fraction of an area's pixels above which their omission is a warning."""
 
 
 def area_estimate(mean: float, values: Array, identity: str) -> Estimate:
@@ -43,7 +43,7 @@ def _random(mean: float, parts: dict[str, float], freedom: float, identity: str)
 
 
 def uncertainty_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, float]:
-    """What a table says of the uncertainty of one value: the whole, and its parts."""
+    """Columns for the uncertainty of one value: the total and its parts."""
     whole = {
         "standard_uncertainty": estimate.standard_uncertainty,
         "degrees_of_freedom": estimate.degrees_of_freedom,

@@ -33,7 +33,7 @@ class RegionEmissivities:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region at every temperature, a row each."""
+        """Every region at every temperature; one row each."""
         return pd.DataFrame(_row(row) for of in self.rows for row in of)
 
     def line_frame(self) -> pd.DataFrame:

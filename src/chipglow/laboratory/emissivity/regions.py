@@ -1,4 +1,4 @@
-"""What a file of regions says: named polygons, rectangles and circles of an image."""
+"""Description of regions in a file: named polygons, rectangles and circles of an image."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -41,7 +41,7 @@ TEMPERATURE_BUDGET: Final = (
 """Lines of the budget of a true temperature."""
 
 FAR: Final = 50.0
-"""Difference of temperature in K from which on an emissivity may well be another."""
+"""Difference of temperature in K beyond which an emissivity may well differ."""
 
 _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
@@ -198,7 +198,7 @@ class RegionTemperatures:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region, a row each."""
+        """Every region; one row each."""
         return pd.DataFrame(
             {
                 "region": row.name,

@@ -11,7 +11,6 @@ from chipglow.laboratory.measurement.calibration_file import (
     write_calibration,
 )
 from chipglow.laboratory.measurement.camera_file import (
-    FlatFieldSources,
     load_measurement,
     load_recording,
     measurement_of,
@@ -34,7 +33,6 @@ from chipglow.laboratory.measurement.summary import MeasurementSummary, measurem
 __all__ = [
     "BlackbodyCalibration",
     "CalibrationDescription",
-    "FlatFieldSources",
     "ImagePosition",
     "MeasurementDescription",
     "MeasurementSummary",

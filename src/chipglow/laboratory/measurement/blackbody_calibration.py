@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pandas as pd
 
 from chipglow.camera import Blackbody, CalibrationFit, FittedCalibration, fit_models, preferred
 from chipglow.io.column_file import read_calibration_points
-from chipglow.laboratory.measurement.camera_file import FlatFieldSources, uniform_counts
+from chipglow.laboratory.measurement.camera_file import read_flat_fields, uniform_counts
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.text import Notes
@@ -30,11 +31,11 @@ class BlackbodyCalibration:
         return preferred(self.fits)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each fit, a row each."""
+        """Every point of each fit; one row each."""
         return pd.concat([_points(name, fit) for name, fit in self.fits.items()], ignore_index=True)
 
     def parameter_frame(self) -> pd.DataFrame:
-        """Every parameter of each fit, a row each."""
+        """Every parameter of each fit; one row each."""
         return pd.concat(
             [
                 pd.DataFrame(
@@ -67,11 +68,11 @@ def calibrate_blackbodies(
 ) -> BlackbodyCalibration:
     """Fit calibrations of a camera's counts to blackbodies."""
     points, settings = Path(points), list(settings)
-    recordings, uniform = [], FlatFieldSources()
+    recordings, read = [], lru_cache(maxsize=1)(read_flat_fields)
 
     def counts_of(file: str) -> float:
         recordings.append(file)
-        return uniform_counts(points.parent / file, settings, uniform)
+        return uniform_counts(points.parent / file, settings, read)
 
     table = read_calibration_points(points, counts_of)
     if settings and not recordings:

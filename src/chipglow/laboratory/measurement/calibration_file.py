@@ -81,7 +81,7 @@ class CalibrationDescription(Settings[FittedCalibration]):
 
     @classmethod
     def of(cls, fit: CalibrationFit[FittedCalibration]) -> "CalibrationDescription":
-        """What a file shall hold of a fit."""
+        """Return the description of a fit."""
         calibration = fit.calibration
         band, response = calibration.band, calibration.band.response
         values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)

@@ -1,10 +1,10 @@
 """Measurements as the laboratory's commands take them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,7 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
 
 
 def load_recording(description: MeasurementDescription) -> Recording:
-    """Read what a camera wrote, with what a description says of it."""
+    """Read a camera file and apply its description."""
     if description.file is None:
         raise DescriptionError("file: is missing, expected a camera's file")
     try:
@@ -98,9 +98,9 @@ def _read(description: MeasurementDescription, file: str, every: bool = False) -
 def measurement_of(
     description: MeasurementDescription, recording: Recording, name: str
 ) -> Measurement:
-    """Make a measurement of a recording as its description says."""
+    """Convert a recording to a measurement according to its description."""
     try:
-        correction, bad_pixels = pixel_correction(description, recording, FlatFieldSources())
+        correction, bad_pixels = pixel_correction(description, recording)
         calibration = description.calibration
         return calibrate_recording(
             recording,
@@ -115,7 +115,9 @@ def measurement_of(
 
 
 def uniform_counts(
-    source: str | Path, settings: Iterable[str] = (), objects: "FlatFieldSources | None" = None
+    source: str | Path,
+    settings: Iterable[str] = (),
+    read: "FlatFieldReader | None" = None,
 ) -> float:
     """Mean counts of a recording of a flat-field source, such as a blackbody.
 
@@ -127,8 +129,7 @@ def uniform_counts(
     try:
         if recording.quantity != "counts":
             raise ValueError(f"holds {recording.quantity}, expected counts")
-        sources = objects or FlatFieldSources()
-        correction, bad = pixel_correction(description, recording, sources)
+        correction, bad = pixel_correction(description, recording, read)
         signal = recording.signal.astype(np.float64)
         if correction is not None:
             signal = correction.apply(signal)
@@ -145,10 +146,12 @@ def uniform_counts(
 
 
 def pixel_correction(
-    description: MeasurementDescription, recording: Recording, sources: "FlatFieldSources"
+    description: MeasurementDescription,
+    recording: Recording,
+    read: "FlatFieldReader | None" = None,
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
-    """What corrects a recording's pixels, and which of them are bad, as its description says."""
-    fields = sources.of(description, recording)
+    """Return the pixel correction and the bad pixels that a description defines."""
+    fields = _flat_fields(description, recording, read or read_flat_fields)
     correction = fields.correction if fields and description.flat_field.correct else None
     if fields is not None and description.bad_pixels == "find":
         return correction, fields.bad_pixels.mask
@@ -156,35 +159,26 @@ def pixel_correction(
     return correction, description.listed_bad_pixels((rows, columns))
 
 
-class FlatFieldSources:
-    """Frames of flat-field sources, read and judged once for recordings that have them in common.
-
-    Those of the last description are kept.
-    """
-
-    def __init__(self) -> None:
-        self._read = lru_cache(maxsize=1)(_read_uniform)
-
-    def of(self, description: MeasurementDescription, recording: Recording) -> "_FlatFields | None":
-        """Those that a recording's description names, if it does."""
-        section = description.flat_field
-        if section.low is None:
-            if section.high is not None or description.bad_pixels == "find":
-                raise ValueError(
-                    "flat_field.low: is missing, expected frames of a flat-field source"
-                )
-            return None
-        # Which frames of which file are corrected makes no difference to what corrects them.
-        uniform = self._read(description.model_copy(update={"file": None, "frames": None}))
-        for name, found in (("high", uniform.high), ("low", uniform.low)):
-            problem = None if found is None else _unsuitable(found, recording)
-            if problem is not None:
-                raise ValueError(f"flat_field.{name}: {problem}")
-        return uniform
+def _flat_fields(
+    description: MeasurementDescription, recording: Recording, read: "FlatFieldReader"
+) -> "FlatFields | None":
+    """Frames of the flat-field sources that a description names, if any."""
+    section = description.flat_field
+    if section.low is None:
+        if section.high is not None or description.bad_pixels == "find":
+            raise ValueError("flat_field.low: is missing, expected frames of a flat-field source")
+        return None
+    # The correction does not depend on the file and frames that are corrected.
+    fields = read(description.model_copy(update={"file": None, "frames": None}))
+    for name, frames in (("high", fields.high), ("low", fields.low)):
+        problem = None if frames is None else _unsuitable(frames, recording)
+        if problem is not None:
+            raise ValueError(f"flat_field.{name}: {problem}")
+    return fields
 
 
 @dataclass(frozen=True, eq=False)
-class _FlatFields:
+class FlatFields:
     """Frames of one or two flat-field sources."""
 
     low: Recording
@@ -207,10 +201,14 @@ class _FlatFields:
         return find_bad_pixels(frames, None if self.high is None else self.high.signal)
 
 
-def _read_uniform(description: MeasurementDescription) -> _FlatFields:
+FlatFieldReader: TypeAlias = Callable[[MeasurementDescription], FlatFields]
+
+
+def read_flat_fields(description: MeasurementDescription) -> FlatFields:
+    """Read the frames of the flat-field sources that a description names."""
     section = description.flat_field
     high = None if section.high is None else _uniform(description, section.high)
-    return _FlatFields(_uniform(description, str(section.low)), high)
+    return FlatFields(_uniform(description, str(section.low)), high)
 
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:

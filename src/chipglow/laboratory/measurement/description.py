@@ -1,4 +1,4 @@
-"""What the description of a camera's file says: what it holds, and what has to be done with it."""
+"""Description of a camera file: its contents and how to process them."""
 
 import re
 from collections.abc import Iterable
@@ -64,7 +64,7 @@ def band_of(text: str) -> Band:
 
 
 class ObjectSection(Section):
-    """The camera's settings of the object, where the file does not say them or says them wrong."""
+    """The camera's object parameters, if they are missing or wrong in the file."""
 
     emissivity: Annotated[
         float | None, Parameter("Emissivity of the object.", over=0.0, most=1.0)
@@ -81,7 +81,7 @@ class ObjectSection(Section):
     ] = None
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
-        """What the camera was set to: as recorded, but for what is said here."""
+        """Object parameters: as recorded, overridden by this section."""
         said: dict[str, float] = {name: value for name, value in self if value is not None}
         return replace(recorded or ObjectParameters(), **said) if said else recorded
 
@@ -244,11 +244,11 @@ class MeasurementDescription(Section):
         return ImagePosition(self.quarter_turns, self.mirror, self.tip)
 
     def known_band(self) -> Band | None:
-        """The band, if it is said."""
+        """The band, if it is given."""
         return None if self.band is None else band_of(self.band)
 
     def applied_to(self, recording: Recording) -> Recording:
-        """What the file says, but for what is said here."""
+        """The recording, overridden by this description."""
         said: dict[str, Any] = {
             "camera": self.camera,
             "band": self.known_band(),

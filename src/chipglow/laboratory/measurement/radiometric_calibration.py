@@ -83,8 +83,8 @@ def calibrate_recording(
     position = position or ImagePosition()
     _check_known(recording, calibration)
     calibration = _calibration(recording, calibration)
-    band = _band(recording, calibration)
-    assert recording.pitch is not None
+    band = recording.band if calibration is None else calibration.band
+    assert recording.pitch is not None and band is not None
     if non_uniformity is not None and recording.quantity == "temperature":
         raise ValueError(
             "uniform frames: the recording holds temperatures, which are not linear in light, "
@@ -94,31 +94,19 @@ def calibrate_recording(
         _develop_frames(part, calibration, band, non_uniformity, bad_pixels)
         for part in _parts(recording)
     ]
-    radiance = position.place(np.concatenate([part.radiance for part in parts]))
-    errors = None
+    radiance, flags = (position.place(np.concatenate(some)) for some in zip(*parts, strict=True))
     if calibration is not None:
-        lower_limit, errors = (
-            max(lower_limit or 0.0, calibration.lowest) or None,
-            calibration.errors,
-        )
+        lower_limit = max(lower_limit or 0.0, calibration.lowest) or None
     return Measurement.from_radiance(
         radiance,
         band,
         recording.times,
         position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch),
         lower_limit,
-        position.place(np.concatenate([part.flags for part in parts])),
-        errors,
-        _attributes(recording, calibration, position, errors is not None),
+        flags,
+        None if calibration is None else calibration.errors,
+        _attributes(recording, calibration, position),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Developed:
-    """Radiance and flags of some frames, of shape (time, y, x)."""
-
-    radiance: NDArray[np.float32]
-    flags: NDArray[np.uint8]
 
 
 def _check_known(recording: Recording, calibration: Calibration | None) -> None:
@@ -154,9 +142,9 @@ def _calibration(recording: Recording, given: Calibration | None) -> Calibration
     if given is not None:
         _check_same(recording, given)
         return given
-    assert recording.conversion is not None
+    assert recording.conversion is not None and recording.band is not None
     return FactoryCalibration(
-        band=_band(recording, None),
+        band=recording.band,
         conversion=recording.conversion,
         integration_time=recording.integration_time,
     )
@@ -186,13 +174,6 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
         )
 
 
-def _band(recording: Recording, calibration: Calibration | None) -> Band:
-    if calibration is not None:
-        return calibration.band
-    assert recording.band is not None
-    return recording.band
-
-
 def _band_text(band: Band) -> str:
     return f"{1e6 * band.lower:g}-{1e6 * band.upper:g} um"
 
@@ -211,13 +192,13 @@ def _develop_frames(
     band: Band,
     non_uniformity: NonUniformity | None,
     bad_pixels: NDArray[np.bool_] | None,
-) -> _Developed:
-    """Radiance in 32 bits, which hold more than counts do, with flags."""
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Radiance in 32 bits, which hold more than counts do, and flags, of shape (time, y, x)."""
     signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
     radiance = _radiance(recording, calibration, band, signal)
     if calibration is not None and calibration.highest < np.inf:
         flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
-    return _Developed(radiance.astype(np.float32), flags)
+    return radiance.astype(np.float32), flags
 
 
 def repaired_signal(
@@ -276,7 +257,6 @@ def _attributes(
     recording: Recording,
     calibration: Calibration | None,
     position: ImagePosition,
-    errors_known: bool,
 ) -> dict[str, float | str]:
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
@@ -286,13 +266,13 @@ def _attributes(
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
-        **_notes(recording, calibration, position, errors_known).attrs(),
+        **_notes(recording, calibration, position).attrs(),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
 
 def _known(recording: Recording, calibration: Calibration | None, name: str) -> Any:
-    """What the file says, or else the calibration that holds for it."""
+    """Value of the file or, without one, of the calibration."""
     said = getattr(recording, name)
     return getattr(calibration, name, None) if said is None else said
 
@@ -319,14 +299,13 @@ def _notes(
     recording: Recording,
     calibration: Calibration | None,
     position: ImagePosition,
-    errors_known: bool,
 ) -> Notes:
     about_calibration = Notes(warnings=list(calibration.warnings if calibration else ()))
     return (
         recording.notes
         + Notes(list(_assumed(recording, calibration, position)))
         + about_calibration.about("Calibration")
-        + Notes(warnings=list(_warnings(recording, errors_known)))
+        + Notes(warnings=list(_warnings(recording, calibration)))
     )
 
 
@@ -356,8 +335,8 @@ def _assumed(
         yield "The origin of coordinates is the image's lower left corner: no tip was given."
 
 
-def _warnings(recording: Recording, errors_known: bool) -> Iterator[str]:
-    if not errors_known:
+def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator[str]:
+    if calibration is None or calibration.errors is None:
         yield "The uncertainty of the radiance from the calibration is not known."
     signal = recording.signal
     if recording.saturation is None and np.issubdtype(signal.dtype, np.integer):

@@ -1,4 +1,4 @@
-"""What is in a measurement, in numbers."""
+"""Statistics of a measurement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ class MeasurementSummary:
     """Fraction of the pixels of all frames that has each flag."""
     now: tuple[float, float, float] | None
     overall: tuple[float, float, float] | None
-    """Least, median and greatest radiance temperature in K of that frame and of all; None if no
+    """Least, median and largest radiance temperature in K of that frame and of all; None if no
     pixel has one.
     """
     uncertainty: tuple[float, float] | None
-    """Least and greatest standard uncertainty of the radiance temperature in K from the
+    """Least and largest standard uncertainty of the radiance temperature in K from the
     calibration, over all usable pixels; None if it is not known.
     """
 

@@ -7,7 +7,6 @@ from typing import Annotated
 
 from chipglow.io import is_measurement, is_scene
 from chipglow.laboratory.measurement import (
-    FlatFieldSources,
     load_calibration,
     load_description,
     load_measurement,
@@ -41,7 +40,7 @@ def load_edge(
         calibration = load_calibration(described.calibration)
         recording = replace(recording, band=recording.band or calibration.band)
     try:
-        corrected = pixel_correction(described, recording, FlatFieldSources())
+        corrected = pixel_correction(described, recording)
         signal, flags = repaired_signal(recording, *corrected)
         return counts_image(recording, signal, flags, name, region)
     except ValueError as error:

@@ -181,8 +181,6 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
 
     Where pixels are saturated or under range, all pixels from there on outward are left
     out: to leave out only those whose noise goes over the limit would shift the mean of the others.
-
-        Warnings of the image and of the choice of pixels, about the image.
     """
     image = replace(image, saturated=image.saturated | _piled_up(image))
     x, y = image.x - image.x.mean(), image.y - image.y.mean()
@@ -247,7 +245,7 @@ def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
 
 
 def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
-    """Pixels at a limit that no flag marks: many of just the greatest value, among noisy ones."""
+    """Pixels at a limit that no flag marks: many of just the largest value, among noisy ones."""
     values, counts = np.unique(image.radiance[image.usable], return_counts=True)
     if values.size < 3:
         return np.zeros_like(image.dead)
@@ -258,7 +256,7 @@ def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
 def _limits(
     image: EdgeImage, x: Array, y: Array, line: EdgeLine
 ) -> tuple[tuple[float, float], list[str]]:
-    """Distances between which nothing is clipped, and what is to be said of it."""
+    """Distances between which nothing is clipped, and warnings."""
     across, down = np.meshgrid(x, y)
     distance = line.distance(across, down)
     low, high, said = -np.inf, np.inf, []
@@ -274,7 +272,7 @@ def _limits(
 
 
 def _first_clipped(distance: Array, clipped: NDArray[np.bool_], pitch: float) -> float:
-    """Distance from which on more than single pixels are clipped, less a pitch."""
+    """Distance beyond which more than single pixels are clipped, minus a pitch."""
     first = float(distance.min())
     index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
     count = np.bincount(index)

@@ -108,7 +108,7 @@ class KnifeEdge:
 
     @property
     def weights(self) -> tuple[float, ...]:
-        """How probable each model is beside the others, by the Bayesian criterion; of sum 1."""
+        """Probability of each model by the Bayesian criterion."""
         likely = [exp(-min(fit.bic - self.best.bic, 700.0) / 2) for fit in self.fits]
         return tuple(value / sum(likely) for value in likely)
 
@@ -138,7 +138,7 @@ class KnifeEdge:
         return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
 
     def to_frame(self) -> pd.DataFrame:
-        """The models, a row each, the best first."""
+        """The models; one row each, the best first."""
         return pd.DataFrame(
             {
                 "model": fit.model.name,
@@ -153,7 +153,7 @@ class KnifeEdge:
         )
 
     def edge_frame(self) -> pd.DataFrame:
-        """The images, a row each."""
+        """The images; one row each."""
         return pd.DataFrame(map(_edge_row, self.edges, self.best.edges))
 
     def fit(self, name: str) -> ModelFit:
@@ -208,7 +208,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     NoEdgeError
         If an image shows no straight edge, or more than one.
     ValueError
-        If nothing is given, or the apertures are not what they are said to be.
+        If nothing is given, or the apertures do not match their diameters.
 
     Notes
     -----
@@ -359,7 +359,7 @@ def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
 
 
 def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
-    """Whether apertures say something else than the edges."""
+    """Warn if apertures contradict the edges."""
     fractions = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
     left = (signals.radiance - best.aperture_background) / best.source - fractions
     square = float(np.sum((left * best.source / signals.sigma) ** 2))

@@ -23,7 +23,6 @@ _APART: Final = pi / 18
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
 _DIFFERENCE: Final = 1e-5
 _EDGE_PARAMETERS: Final = 4
-_SOURCE_PARAMETERS: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,14 +84,11 @@ class FittedEdge:
 
     line: EdgeLine
     normal_uncertainty: float
-    position_uncertainty: float
-    """Standard uncertainties in rad and m."""
+    """Standard uncertainty of its direction in rad."""
     background: float
     step: float
     """Radiance of the dark side, and how much brighter the other is, in W/(m² sr)."""
-    background_uncertainty: float
     step_uncertainty: float
-    """Standard uncertainties in W/(m² sr)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,19 +167,27 @@ def fit_model(
 
 
 class _Problem:
-    """Residuals of all pixels and apertures, and their derivatives."""
+    """Residuals of all pixels and apertures, and their derivatives.
+
+    Its vector holds the model's parameters; background, step, position and normal of each edge;
+    and, with apertures, their background and source.
+    """
 
     def __init__(
         self, model: PSFModel, edges: tuple[EdgePixels, ...], apertures: ApertureSignals | None
     ) -> None:
         self.model, self.edges, self.apertures = model, edges, apertures
         self.shapes = len(model.parameters)
-        self.count = sum(edge.x.size for edge in edges)
+        self.rows = [
+            slice(last - edge.x.size, last)
+            for last, edge in zip(np.cumsum([edge.x.size for edge in edges]), edges, strict=True)
+        ]
+        self.low, self.high = self._bounds()
         self.scales = self._scales()
 
     def least(self, vector: Array, tolerance: float) -> Array:
         """Parameters with the least squares near some others."""
-        low, high = (limit / self.scales for limit in self.bounds())
+        low, high = self.low / self.scales, self.high / self.scales
         result = least_squares(
             lambda v: self.residual(v * self.scales),
             np.clip(vector / self.scales, low + 1e-9, high - 1e-9),
@@ -203,7 +207,7 @@ class _Problem:
     def starts(self) -> list[Array]:
         """Some parameters to begin with, those first that fit best as they are."""
         pitch = max(edge.pitch for edge in self.edges)
-        low, high = (limit[: self.shapes] for limit in self.bounds())
+        low, high = self.low[: self.shapes], self.high[: self.shapes]
         candidates = [
             self._beginning(np.clip(values, low, high))
             for width in _START_WIDTHS
@@ -213,76 +217,52 @@ class _Problem:
 
     def vector_of(self, fit: ModelFit) -> Array:
         """All parameters of an earlier fit."""
-        parts = [fit.values]
-        for edge in fit.edges:
-            parts.append(
-                np.array([edge.background, edge.step, edge.line.position, edge.line.normal])
-            )
-        if self.apertures is not None:
-            parts.append(np.array([fit.aperture_background, fit.source]))
-        return np.concatenate(parts)
-
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest parameters."""
-        low, high = self.model.bounds(
-            min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
-        )
-        free = _EDGE_PARAMETERS * len(self.edges)
-        low, high = low + [-inf] * free, high + [inf] * free
-        if self.apertures is not None:
-            outside = self.apertures.outside
-            contrast = float(self.apertures.radiance.max()) - outside
-            # Else a small change between large apertures could be that of a huge source.
-            low += [outside - 0.5 * contrast, 0.5 * contrast]
-            high += [outside + 0.1 * contrast, 2.0 * contrast]
-        return np.array(low), np.array(high)
+        places = [
+            (edge.background, edge.step, edge.line.position, edge.line.normal) for edge in fit.edges
+        ]
+        source = () if self.apertures is None else (fit.aperture_background, fit.source)
+        return np.concatenate([fit.values, *places, source])
 
     def residual(self, vector: Array) -> Array:
         """Measured less model, over the noise."""
-        values = vector[: self.shapes]
+        values, places, source = self._split(vector)
         parts = []
-        for edge, (background, step, line) in zip(self.edges, self._places(vector), strict=True):
-            response = _response(self.model, values, line, edge)
-            modelled = background + step * response(line.distance(edge.x, edge.y))
-            parts.append((edge.radiance - modelled) / edge.sigma)
+        for edge, place in zip(self.edges, places, strict=True):
+            line = _line(place)
+            fractions = _response(self.model, values, line, edge)(line.distance(edge.x, edge.y))
+            parts.append((edge.radiance - (place[0] + place[1] * fractions)) / edge.sigma)
         if self.apertures is not None:
-            background, source = vector[-_SOURCE_PARAMETERS:]
-            fractions = self._fractions(values)
-            parts.append(
-                (self.apertures.radiance - background - source * fractions) / self.apertures.sigma
-            )
+            modelled = source[0] + source[1] * self._fractions(values)
+            parts.append((self.apertures.radiance - modelled) / self.apertures.sigma)
         return np.concatenate(parts)
 
     def jacobian(self, vector: Array) -> Array:
         """Derivative of the residuals by the parameters."""
-        result = np.zeros((self.count + self._apertures, vector.size))
-        row, column = 0, self.shapes
-        for edge, (_, step, line) in zip(self.edges, self._places(vector), strict=True):
-            part = np.s_[row : row + edge.x.size]
+        values, places, _ = self._split(vector)
+        here = self.residual(vector)
+        result = np.zeros((here.size, vector.size))
+        columns = iter(range(self.shapes, vector.size))
+        for edge, place, rows in zip(self.edges, places, self.rows, strict=True):
+            line = _line(place)
             distance = line.distance(edge.x, edge.y)
-            response = _response(self.model, vector[: self.shapes], line, edge)
-            slope = step * response.slope(distance)
+            response = _response(self.model, values, line, edge)
+            slope = place[1] * response.slope(distance)
             turned = edge.y * cos(line.normal) - edge.x * sin(line.normal)
-            for k, value in enumerate(
-                (np.ones_like(slope), response(distance), -slope, slope * turned)
-            ):
-                result[part, column + k] = -value / edge.sigma
-            row, column = row + edge.x.size, column + _EDGE_PARAMETERS
+            for value in (np.ones_like(slope), response(distance), -slope, slope * turned):
+                result[rows, next(columns)] = -value / edge.sigma
         if self.apertures is not None:
-            result[row:, column] = -1 / self.apertures.sigma
-            result[row:, column + 1] = (
-                -self._fractions(vector[: self.shapes]) / self.apertures.sigma
-            )
-        here, high = self.residual(vector), self.bounds()[1]
+            rows = slice(self.rows[-1].stop, None)
+            result[rows, next(columns)] = -1 / self.apertures.sigma
+            result[rows, next(columns)] = -self._fractions(values) / self.apertures.sigma
         for k in range(self.shapes):
-            shift = _DIFFERENCE * self.scales[k] * (1 if vector[k] < high[k] / 2 else -1)
+            shift = _DIFFERENCE * self.scales[k] * (1 if vector[k] < self.high[k] / 2 else -1)
             moved = vector.copy()
             moved[k] += shift
             result[:, k] = (self.residual(moved) - here) / shift
         return result
 
     def fitted(self, vector: Array) -> ModelFit:
-        """The result, with what the residuals say of it."""
+        """The result, with uncertainties from the residuals."""
         residual, jacobian = self.residual(vector), self.jacobian(vector)
         reduced = self._reduced_chi_squared(vector, residual)
         scaled = jacobian * self.scales
@@ -291,63 +271,54 @@ class _Problem:
         # What is left beyond the noise acts as more of it (Birge).
         noise = float(residual @ residual) / max(residual.size - vector.size, 1)
         covariance = inverse * max(reduced, 1.0) * noise
-        values = vector[: self.shapes]
+        values, places, source = self._split(vector)
         inner = covariance[: self.shapes, : self.shapes]
-        fwhm, gradient = self._fwhm(values)
-        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        source = vector[-_SOURCE_PARAMETERS:] if self.apertures is not None else (np.nan, np.nan)
+        gradient = self._fwhm_gradient(values)
+        _, spreads, _ = self._split(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
         return ModelFit(
             self.model,
             values,
             inner,
-            fwhm,
+            self.model.fwhm(values),
             sqrt(max(float(gradient @ inner @ gradient), 0.0)),
-            tuple(self._fitted_edge(vector, deviations, k) for k in range(len(self.edges))),
-            float(source[1]),
-            float(source[0]),
+            tuple(
+                FittedEdge(
+                    _line(place), float(spread[3]), float(place[0]), float(place[1]),
+                    float(spread[1]),
+                )
+                for place, spread in zip(places, spreads, strict=True)
+            ),
+            float(source[1]) if source.size else np.nan,
+            float(source[0]) if source.size else np.nan,
             float(residual @ residual),
             residual.size,
             vector.size,
             reduced,
-        )
+        )  # fmt: skip
 
-    @property
-    def _apertures(self) -> int:
-        return 0 if self.apertures is None else self.apertures.diameters.size
+    def _split(self, vector: Array) -> tuple[Array, Array, Array]:
+        """The model's parameters, those of the edges (edge, 4), and those of the apertures."""
+        last = self.shapes + _EDGE_PARAMETERS * len(self.edges)
+        edges = vector[self.shapes : last].reshape(-1, _EDGE_PARAMETERS)
+        return vector[: self.shapes], edges, vector[last:]
 
-    def _fitted_edge(self, vector: Array, deviations: Array, k: int) -> FittedEdge:
-        begin = self.shapes + _EDGE_PARAMETERS * k
-        background, step, position, normal = vector[begin : begin + _EDGE_PARAMETERS]
-        spread = deviations[begin : begin + _EDGE_PARAMETERS]
-        return FittedEdge(
-            EdgeLine(float(normal), float(position)),
-            float(spread[3]),
-            float(spread[2]),
-            float(background),
-            float(step),
-            float(spread[0]),
-            float(spread[1]),
-        )
-
-    def _fwhm(self, values: Array) -> tuple[float, Array]:
+    def _fwhm_gradient(self, values: Array) -> Array:
+        """Derivative of the full width at half maximum by the model's parameters."""
         gradient = np.empty(self.shapes)
-        low, high = self.bounds()
         for k in range(self.shapes):
             shift = 1e-3 * self.scales[k]
             above, below = values.copy(), values.copy()
-            above[k] = min(values[k] + shift, high[k])
-            below[k] = max(values[k] - shift, low[k])
+            above[k] = min(values[k] + shift, self.high[k])
+            below[k] = max(values[k] - shift, self.low[k])
             change = self.model.fwhm(above) - self.model.fwhm(below)
             gradient[k] = change / (above[k] - below[k])
-        return self.model.fwhm(values), gradient
+        return gradient
 
     def _reduced_chi_squared(self, vector: Array, residual: Array) -> float:
         """Means of the residuals at a distance, squared and over their noise, per freedom."""
-        total, bins, row = 0.0, 0, 0
-        for edge, (_, _, line) in zip(self.edges, self._places(vector), strict=True):
-            part = residual[row : row + edge.x.size]
-            row += edge.x.size
-            distance = line.distance(edge.x, edge.y)
+        total, bins = 0.0, 0
+        for edge, place, rows in zip(self.edges, self._split(vector)[1], self.rows, strict=True):
+            part, distance = residual[rows], _line(place).distance(edge.x, edge.y)
             index = np.floor((distance - distance.min()) / (edge.pitch / 4)).astype(np.int64)
             count = np.bincount(index)
             sums = np.bincount(index, part)
@@ -360,16 +331,7 @@ class _Problem:
     def _fractions(self, values: Array) -> Array:
         """Signals of the apertures as fractions of an endless source's."""
         assert self.apertures is not None
-        transfer = self.model.mean_transfer(values, self.apertures.frequency)
-        return self.apertures.weights @ transfer
-
-    def _places(self, vector: Array) -> list[tuple[float, float, EdgeLine]]:
-        places = []
-        for k in range(len(self.edges)):
-            begin = self.shapes + _EDGE_PARAMETERS * k
-            background, step, position, normal = vector[begin : begin + _EDGE_PARAMETERS]
-            places.append((background, step, EdgeLine(float(normal), float(position))))
-        return places
+        return self.apertures.weights @ self.model.mean_transfer(values, self.apertures.frequency)
 
     def _beginning(self, values: Array) -> Array:
         """All parameters with these of the model: backgrounds and steps by linear least squares."""
@@ -377,24 +339,41 @@ class _Problem:
         for edge in self.edges:
             response = _response(self.model, values, edge.line, edge)
             fractions = response(edge.line.distance(edge.x, edge.y))
-            background, step = _straight_line(fractions, edge.radiance, edge.sigma)
-            parts.append(np.array([background, step, edge.line.position, edge.line.normal]))
+            linear = _straight_line(fractions, edge.radiance, edge.sigma)
+            parts.append(np.array([*linear, edge.line.position, edge.line.normal]))
         if self.apertures is not None:
             signals = self.apertures
             line = _straight_line(self._fractions(values), signals.radiance, signals.sigma)
-            low, high = (limit[-_SOURCE_PARAMETERS:] for limit in self.bounds())
-            parts.append(np.clip(line, low, high))
+            parts.append(np.clip(line, self.low[-2:], self.high[-2:]))
         return np.concatenate(parts)
 
+    def _bounds(self) -> tuple[Array, Array]:
+        """Smallest and largest parameters."""
+        low, high = self.model.bounds(
+            min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
+        )
+        free = [inf] * (_EDGE_PARAMETERS * len(self.edges))
+        low, high = low + [-end for end in free], high + free
+        if self.apertures is not None:
+            outside = self.apertures.outside
+            contrast = float(self.apertures.radiance.max()) - outside
+            # Else a small change between large apertures could be that of a huge source.
+            low += [outside - 0.5 * contrast, 0.5 * contrast]
+            high += [outside + 0.1 * contrast, 2.0 * contrast]
+        return np.array(low), np.array(high)
+
     def _scales(self) -> Array:
-        pitch = min(edge.pitch for edge in self.edges)
-        parts = [self.model.scales(pitch)]
+        parts = [self.model.scales(min(edge.pitch for edge in self.edges))]
         for edge in self.edges:
             contrast = max(float(np.ptp(edge.radiance)), 1e-300)
             parts.append(np.array([contrast, contrast, edge.pitch, edge.pitch / edge.reach]))
         if self.apertures is not None:
-            parts.append(np.full(_SOURCE_PARAMETERS, max(np.ptp(self.apertures.radiance), 1e-30)))
+            parts.append(np.full(2, max(np.ptp(self.apertures.radiance), 1e-30)))
         return np.concatenate(parts)
+
+
+def _line(place: Array) -> EdgeLine:
+    return EdgeLine(float(place[3]), float(place[2]))
 
 
 def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:

@@ -386,12 +386,7 @@ def footprint_transfer(frequency: Array, angle: float, footprint: float) -> Arra
     return np.sinc(frequency * across) * np.sinc(frequency * down)
 
 
-def disc_response(
-    frequency: Array,
-    diameter: float,
-    radii: Array,
-    footprint: float,
-) -> Array:
+def disc_response(frequency: Array, diameter: float, radii: Array, footprint: float) -> Array:
     """Weights that make of a transfer function the signal in the middle of a bright disc."""
     radius = diameter / 2
     angles = ((np.arange(12) + 0.5) * pi / 24).tolist()

@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 import xarray as xr
@@ -27,8 +27,6 @@ from chipglow.laboratory.psf.psf_models import (
 )
 from chipglow.quantities import Array
 from chipglow.uncertainty import Cause, Component, Estimate
-
-Values: TypeAlias = Array
 
 FIT: Final = "psf fit"
 """Name of the component of uncertainty that the noise of the images makes."""
@@ -64,7 +62,7 @@ class RadialPSF:
 
     @property
     def fractions(self) -> Array:
-        """Values of `estimate`."""
+        """Array of `estimate`."""
         return self.estimate.values
 
     @property
@@ -156,8 +154,8 @@ def radial_psf(
     return RadialPSF(radii, Estimate(all_fractions[0], (component,)), model, weight)
 
 
-def _ring_width(edges: Values, fractions: Values) -> float:
-    """Twice the greatest radius in m with half of the greatest density, by straight lines."""
+def _ring_width(edges: Array, fractions: Array) -> float:
+    """Twice the largest radius in m with half of the largest density, by straight lines."""
     radius, density = (edges[1:] + edges[:-1]) / 2, fractions / np.diff(edges**2)
     half = density.max() / 2
     last = int(np.flatnonzero(density >= half)[-1])
@@ -247,7 +245,7 @@ def _penalty(radii: Array, width: float) -> Array:
     return np.diff(padded, n=2, axis=0) * 1e3
 
 
-def _shares_by(fit: ModelFit, radii: Array) -> Callable[[Values], Values]:
+def _shares_by(fit: ModelFit, radii: Array) -> Callable[[Array], Array]:
     """What gives the fraction of a model's light in each ring by the model's parameters."""
     frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
     middle = np.zeros(1)
@@ -258,12 +256,7 @@ def _shares_by(fit: ModelFit, radii: Array) -> Callable[[Values], Values]:
     return lambda values: np.maximum(rings @ fit.model.mean_transfer(values, frequency), 0.0)
 
 
-def _solved(
-    design: Array,
-    data: Array,
-    penalty: Array,
-    model: Array,
-) -> Array:
+def _solved(design: Array, data: Array, penalty: Array, model: Array) -> Array:
     matrix = np.concatenate([design, penalty])
     wanted = np.concatenate([data, penalty @ model])
     # The normal equations are small, whatever the number of bins.
@@ -273,12 +266,7 @@ def _solved(
     return np.asarray(solution)
 
 
-def _criterion(
-    design: Array,
-    data: Array,
-    penalty: Array,
-    fractions: Array,
-) -> float:
+def _criterion(design: Array, data: Array, penalty: Array, fractions: Array) -> float:
     """Squared residuals, and twice the trace of what makes fitted data of data."""
     left = data - design @ fractions
     free = fractions > 0

@@ -66,7 +66,7 @@ def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> Apert
 
 @dataclass(frozen=True, eq=False)
 class _Middle:
-    """What the middle pixels read, its uncertainty, their distances, and what is beside."""
+    """Signal of the centre pixels, its uncertainty, their distances, and the surroundings."""
 
     signal: float
     sigma: float

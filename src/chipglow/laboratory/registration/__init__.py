@@ -2,18 +2,15 @@
 
 from chipglow.laboratory.registration.dots import DotFit, Dots, find_dots, fit_dots
 from chipglow.laboratory.registration.file import load_registration, write_registration
+from chipglow.laboratory.registration.input_files import read_pictures, read_points
 from chipglow.laboratory.registration.mutual_information import ImageFit, fit_images
-from chipglow.laboratory.registration.picture_file import read_pictures
-from chipglow.laboratory.registration.points_file import read_points
-from chipglow.laboratory.registration.recordings import (
-    RecordingAlignment,
-    align_recordings,
-    infrared_radiance,
-)
 from chipglow.laboratory.registration.registration import PointFit, Registration, fit_points
 from chipglow.laboratory.registration.time_alignment import (
+    RecordingAlignment,
     TimeAlignment,
+    align_recordings,
     align_times,
+    infrared_radiance,
     simultaneous_frames,
 )
 

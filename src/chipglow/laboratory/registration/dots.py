@@ -203,7 +203,7 @@ def _weight(blobs: Array) -> float:
 
 
 def _alike(blobs: Array) -> Array:
-    """The group of like size and strength with the greatest weight."""
+    """The group of like size and strength with the largest weight."""
     best = blobs[:0]
     for size, strength in blobs[:, 2:].tolist():
         alike = np.abs(np.log(blobs[:, 2] / size)) < np.log(_ALIKE_SIZE)
@@ -215,7 +215,7 @@ def _alike(blobs: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Disc:
-    """A disc with a soft edge, and what of the image is not as it says."""
+    """A disc with a soft edge, and its residuals."""
 
     column: float
     row: float
@@ -232,12 +232,7 @@ class _Disc:
         return np.asarray(self.contrast * erfc((distance - self.radius) / self.softness) / 2)
 
 
-def _discs(
-    image: Array,
-    known: NDArray[np.bool_],
-    blobs: Array,
-    bright: bool,
-) -> list[_Disc]:
+def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
     """Discs of like radius at blobs, fitted again without the skirts of their neighbours."""
     first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
     discs = _like(first, bright)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import WIDTH
-from chipglow.drawing.scales import HEAT, KELVIN, VERMILLION
+from chipglow.drawing.scales import HEAT, VERMILLION
 from chipglow.laboratory.registration.registration import Registration
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Tool
 
 _FACE: Final = 3e-3
@@ -30,7 +30,7 @@ def draw_registration(
     points: tuple[Array, Array] | None = None,
 ) -> Figure:
     """Draw the infrared image, and the visible picture with the infrared one laid over it."""
-    celsius = np.asarray(temperature) - KELVIN
+    celsius = np.asarray(temperature) - ZERO_CELSIUS
     limits = scales.ends(celsius, 0.5, 99.8, 1.0)
     with drawing.style():
         figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
@@ -69,7 +69,7 @@ def blink_pictures(
     Parameters are those of `draw_registration`.
     """
     shape = (visible.shape[0], visible.shape[1])
-    celsius = registration.warp(np.asarray(temperature) - KELVIN, raster, shape)
+    celsius = registration.warp(np.asarray(temperature) - ZERO_CELSIUS, raster, shape)
     limits = scales.ends(celsius, 0.5, 99.8, 1.0)
     plain = _rendered(registration, visible, tool)
     hot = _rendered(registration, visible, tool, celsius, limits)

@@ -252,7 +252,7 @@ def _noise(image: Array) -> float:
 
 
 def _binned(image: Array) -> NDArray[np.int64]:
-    """Bins of equal width from nearly the least to nearly the greatest value."""
+    """Bins of equal width from nearly the least to nearly the largest value."""
     low, high = np.percentile(image, _ENDS)
     fraction = (image - low) / max(high - low, np.finfo(float).tiny)
     return np.asarray(np.clip(fraction * _BINS, 0, _BINS - 1), np.int64)
@@ -317,12 +317,7 @@ def _shifted_scores(
             yield score, shift
 
 
-def _score(
-    level: _Level,
-    pixels: Array,
-    bins: NDArray[np.int64],
-    edges: Array,
-) -> float | None:
+def _score(level: _Level, pixels: Array, bins: NDArray[np.int64], edges: Array) -> float | None:
     """Mutual information times common edges of samples at pixels; None if too few overlap."""
     column, row = np.rint(pixels).astype(np.int64).T
     rows, columns = level.codes.shape
@@ -370,7 +365,7 @@ def _shifted(matrix: Array, shift: tuple[float, float]) -> Array:
 
 
 def _apart(one: Array, other: Array, level: _Level, frame: NormalisedFrame) -> float:
-    """Distance of two maps of the image in samples: where it is greatest, of two corners."""
+    """Distance of two maps of the image in samples: where it is largest, of two corners."""
     corners = frame.unit(level.places[[0, -1]])
     apart = mapped_places(one, corners) - mapped_places(other, corners)
     return float(np.hypot(apart[:, 0], apart[:, 1]).max()) / _sample(level, frame)

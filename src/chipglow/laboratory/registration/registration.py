@@ -17,7 +17,6 @@ from chipglow.text import Notes
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
 Method: TypeAlias = Literal["points", "dots", "mutual-information"]
 MODELS: Final = ("similarity", "affine", "homography")
-METHODS: Final = ("points", "dots", "mutual-information")
 
 _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
 _FLATTEST: Final = 0.01
@@ -74,9 +73,6 @@ class Registration:
             )
         if not abs(np.linalg.det(self.matrix)) > 0:
             raise ValueError("registration: matrix: is singular, expected one with an inverse")
-        for name, text, known in (("model", self.model, MODELS), ("method", self.method, METHODS)):
-            if text not in known:
-                raise ValueError(f"registration: {name} is {text!r}, expected {' or '.join(known)}")
         if not self.degrees_of_freedom > 0:
             raise ValueError(
                 f"registration: degrees_of_freedom is {self.degrees_of_freedom!r}, expected over 0"
@@ -109,7 +105,7 @@ class Registration:
         return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
-        """Standard uncertainty of a mapped position in m: median and greatest over an image.
+        """Standard uncertainty of a mapped position in m: median and largest over an image.
 
         It is the root of the sum of the variances along x and y.
         """
@@ -154,7 +150,7 @@ class PointFit:
     """The points: x and y in m, and column and row in the visible picture, each of shape (n, 2)."""
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point, a row each."""
+        """Every point; one row each."""
         return pd.DataFrame(
             {
                 "point": np.arange(1, len(self.positions) + 1),

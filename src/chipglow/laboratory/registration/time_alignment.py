@@ -1,19 +1,22 @@
-"""When two cameras took their frames: clocks with an unknown offset, by an event that both saw."""
+"""Offset and drift of two cameras' clocks, from an event that both recorded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import log
 from typing import Final
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.special import stdtr
 
+from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import Array
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 _FEWEST: Final = 6
 _LEAST_OVERLAP: Final = 0.5
@@ -82,7 +85,7 @@ def align_times(
     Notes
     -----
     The visible signal, smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
-    54 (2010) 1167), is put to the infrared times; the correlation of both is greatest at the offset
+    54 (2010) 1167), is put to the infrared times; the correlation of both is largest at the offset
     that is least squares for infrared = a + b visible(time). All offsets are tried, a third
     of a visible frame apart, at which at least half of the infrared frames have visible ones;
     Gauss-Newton ends it. What the spline cannot follow, faster than the visible camera's frames,
@@ -136,7 +139,7 @@ def simultaneous_frames(
     Returns
     -------
     list of ndarray
-        For each infrared frame the numbers of the visible frames, from 0; empty if there is none.
+        For each infrared frame the numbers of the visible frames, from 0; empty if none.
     """
     begin = alignment.visible_time(infrared_times)
     end = alignment.visible_time(infrared_times + integration_time)
@@ -295,3 +298,58 @@ def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> tuple
         f"An offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as well, "
         f"with a correlation of {correlations[rival]:.2f}: they are periodic, or say little.",
     )
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingAlignment:
+    """The clocks of two recordings; made by `align_recordings`."""
+
+    clocks: TimeAlignment
+    """How they go by each other."""
+    infrared_times: Array
+    """When each infrared integration began in s, shape (n,)."""
+    visible_frames: list[NDArray[np.int64]]
+    """Numbers of the visible frames that were exposed within each, from 0."""
+    notes: Notes = field(default_factory=Notes)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every infrared frame; one row each."""
+        return pd.DataFrame(
+            {
+                "infrared_frame": np.arange(self.infrared_times.size),
+                "infrared_time_us": 1e6 * self.infrared_times,
+                "visible_frames": [" ".join(map(str, found)) for found in self.visible_frames],
+            }
+        )
+
+
+def align_recordings(
+    registration: Registration,
+    infrared: Measurement,
+    visible: Recording,
+    region: tuple[float, float, float, float],
+) -> RecordingAlignment:
+    """Find the offset of two cameras' clocks by the mean brightness of a region."""
+    if "integration_time" not in infrared.data.attrs:
+        raise ValueError("the measurement does not state its integration_time")
+    integration = float(infrared.data.attrs["integration_time"])
+    hot, bright = region_signals(
+        registration, infrared.radiance, infrared.raster, visible.signal, region
+    )
+    exposure = visible.integration_time or float(np.median(np.diff(visible.times)))
+    notes = Notes()
+    if visible.integration_time is None:
+        notes.assumed.append(
+            f"A visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
+        )
+    times = infrared.times
+    clocks = align_times(times + integration / 2, hot, visible.times + exposure / 2, bright)
+    within = simultaneous_frames(clocks, times, integration, visible.times, exposure)
+    notes.warnings.extend(clocks.warnings)
+    return RecordingAlignment(clocks, times, within, notes)
+
+
+def infrared_radiance(measurement: Measurement, frame: int) -> Array:
+    """Radiance of a frame as `fit_images` and `fit_dots` take it: NaN where a pixel is dead."""
+    dead = measurement.flags[frame] & Flag.DEAD > 0
+    return np.where(dead, np.nan, measurement.radiance[frame])

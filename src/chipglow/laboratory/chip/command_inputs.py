@@ -1,23 +1,59 @@
-"""The tool that is meant: stated, described in a file, or found in the image."""
+"""Tools and curves as commands name them: in a file, or found in the image."""
 
+import os
 from dataclasses import dataclass, field
 from math import degrees, hypot
-from typing import Final
+from pathlib import Path
+from typing import Annotated, Final
 
 import numpy as np
 
 from chipglow.camera import Measurement
+from chipglow.io import ToolSection
+from chipglow.io.column_file import read_polyline
 from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
-from chipglow.laboratory.chip.tool_description import tool_of
-from chipglow.laboratory.chip.tool_position import ToolUncertainty
-from chipglow.scene import Tool
-from chipglow.text import Notes
+from chipglow.laboratory.chip.tool_position import ToolUncertainty, tool_of
+from chipglow.quantities import Array, Parameter
+from chipglow.quantities.units import Position
+from chipglow.scene import PlacedTool, Tool
+from chipglow.text import Notes, load_described
 
 _FACE: Final = 200e-6
 """Length of the face in m on which a tool that was given is compared with one that is seen."""
-
 _CLEARLY: Final = 4.0
 """Two places of the face differ if they are this many standard uncertainties apart, or more."""
+
+
+class ToolDescription(ToolSection):
+    """A cutting tool and where it is."""
+
+    tip: Annotated[
+        tuple[Position, Position] | None,
+        Parameter(
+            "Where the tip is in the measurement's coordinates: x of the edge's leftmost point, y "
+            "of its lowest one; at the origin by default.",
+            allowed="none, or [-12 um, 3.5 um]",
+        ),
+    ] = None
+
+    def build(self) -> Tool:
+        """The tool in the measurement's coordinates."""
+        tool = super().build()
+        return tool if self.tip is None else PlacedTool(tool, self.tip)
+
+
+def load_tool(path: str | Path) -> Tool:
+    """Read a tool from a YAML file."""
+    return load_described(ToolDescription, path).build()
+
+
+def read_curve(path: str | os.PathLike[str]) -> Array:
+    """Read a curve from a CSV file."""
+    path = Path(path)
+    curve, _ = read_polyline(path)
+    if len(curve) < 2:
+        raise ValueError(f"{path}: {len(curve)} points, expected 2 or more")
+    return curve
 
 
 @dataclass(frozen=True)
@@ -39,7 +75,7 @@ def chosen_tool(
     if tool is None:
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":
-        given = tool_of(measurement, tool)
+        given = load_tool(tool)
         return ChosenTool(given, Notes(warnings=_contradictions(measurement, given)))
     found = find_tool(measurement)
     used = found.uncertainty if position is None else None
@@ -48,7 +84,7 @@ def chosen_tool(
 
 
 def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
-    """A warning, if the image clearly shows a rake face elsewhere than where the tool's is said."""
+    """Warn if the image clearly shows a rake face away from that of the given tool."""
     try:
         found = find_tool(measurement)
     except ValueError:

@@ -1,5 +1,6 @@
-"""A frame of a measurement as a picture, and how its temperatures are spread."""
+"""A frame of a measurement and calibrations as figures."""
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -8,12 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from chipglow.camera import Flag, Measurement
+from chipglow.camera import CalibrationFit, FittedCalibration, Flag, Measurement
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID
-from chipglow.quantities import Array
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION, VOID
+from chipglow.quantities import ZERO_CELSIUS, Array
 
 _FLAGS: Final = {
     Flag.UNDER_RANGE: ("below the lower range limit", VOID),
@@ -25,11 +26,15 @@ _IMAGE_HEIGHTS: Final = (2.0, 6.0)
 _HISTOGRAM: Final = 2.2
 _BINS: Final = 80
 
+_COLOURS: Final = (BLUE, VERMILLION, GREEN)
+_MARKS: Final = ("o", "s", "^")
+_SAMPLES: Final = 300
+
 
 def draw_measurement(measurement: Measurement, time: float | None = None) -> Figure:
     """Draw the radiance temperature of a frame, its flags, and how the temperatures are spread."""
     index = shown_frame(measurement.times, time, "measurement")
-    celsius = measurement.radiance_temperature()[index] - KELVIN
+    celsius = measurement.radiance_temperature()[index] - ZERO_CELSIUS
     flags, raster = measurement.flags[index], measurement.raster
     least, most = _IMAGE_HEIGHTS
     height = min(max(5.6 * raster.rows / raster.columns, least), most)
@@ -70,3 +75,43 @@ def _draw_histogram(axes: Axes, celsius: Array) -> None:
     if known.size:
         low, high = scales.ends(known)
         axes.hist(known, np.linspace(low, high, _BINS).tolist(), color=BLUE)
+
+
+def draw_calibrations(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> Figure:
+    """Draw counts over temperature with the fits, and the residuals in K with uncertainties."""
+    with drawing.style():
+        figure = drawing.new_figure(5.2)
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        first = next(iter(fits.values()))
+        upper.plot(
+            first.temperatures - ZERO_CELSIUS, first.counts, "o", color=GREY, label="blackbody"
+        )
+        for (name, fit), colour, mark in zip(fits.items(), _COLOURS, _MARKS, strict=False):
+            _draw_fit(upper, lower, name, fit, colour, mark)
+        upper.set_ylabel("counts")
+        upper.legend()
+        lower.axhline(0.0, color=GREY, linewidth=0.6)
+        lower.set_ylabel("residual / K")
+        lower.set_xlabel("temperature of the blackbody / °C")
+    return figure
+
+
+def _draw_fit(
+    upper: Axes,
+    lower: Axes,
+    name: str,
+    fit: CalibrationFit[FittedCalibration],
+    colour: str,
+    mark: str,
+) -> None:
+    calibration = fit.calibration
+    kelvins = np.linspace(calibration.lowest, calibration.highest, _SAMPLES)
+    counts = calibration.counts(kelvins)
+    upper.plot(kelvins - ZERO_CELSIUS, counts, color=colour, linewidth=1.0, label=name)
+    uncertainty = calibration.uncertainty(counts) / calibration.band.slope(kelvins)
+    lower.fill_between(kelvins - ZERO_CELSIUS, -uncertainty, uncertainty, color=colour, alpha=0.2)
+    bars = fit.standard_uncertainties / calibration.slope(fit.temperatures)
+    lower.errorbar(
+        fit.temperatures - ZERO_CELSIUS, fit.residuals_temperature, bars,
+        fmt=mark, color=colour, markersize=4, linewidth=0.8, label=name,
+    )  # fmt: skip

@@ -1,0 +1,177 @@
+"""Analysis grid and shear band on the image, and their profiles (the paper's Figures 7 and 9)."""
+
+from typing import Final
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+
+from chipglow.camera import Measurement
+from chipglow.drawing import drawing, scales
+from chipglow.laboratory.chip.band_profile import BandProfile, Stage
+from chipglow.laboratory.chip.rake_grid import RakeGrid
+from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.scene import Tool
+
+_HEIGHT: Final = 3.8
+_BAND_HEIGHT: Final = 4.2
+_AROUND: Final = 60e-6
+_ASIDE: Final = 0.08
+_MARKERS: Final = "osD^vP*X"
+_LEGEND_COLUMNS: Final = 3
+_MOST_NAMES: Final = 12
+_COLOURS: Final = matplotlib.colors.ListedColormap(
+    matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
+)
+_LINES: Final = {
+    Stage.DEVELOPING: (0, (4, 2)),
+    Stage.DEVELOPED: "solid",
+    Stage.MOVED: (0, (1, 1.5)),
+    Stage.NONE: "solid",
+}
+
+
+def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
+    """Draw a grid on the image that it was read from, and its profiles along the rake face."""
+    with drawing.style():
+        figure = drawing.new_figure(_HEIGHT)
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
+        _draw_grid(figure, left, measurement, grid)
+        _draw_profiles(right, grid)
+        partly = ((grid.frame_count > 0) & (grid.frame_count < grid.times.size)).any()
+        title = "depth into the chip" + "; hollow: usable in some frames only" * bool(partly)
+        figure.legend(loc="outside lower right", ncols=grid.depth.size, title=title)
+    return figure
+
+
+def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeGrid) -> None:
+    image = _mean_image(measurement, grid) - ZERO_CELSIUS
+    picture = _show(axes, image, measurement, grid.tool)
+    corners = 1e6 * grid.corners()
+    for line in (*corners, *corners.transpose(1, 0, 2)):
+        axes.plot(*line.T, color="black", linewidth=1.1, alpha=0.6)
+        axes.plot(*line.T, color="white", linewidth=0.6)
+    drawing.crop(axes, grid.corners(), measurement.raster, _AROUND)
+    axes.set_title("a) analysis grid")
+    drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
+
+
+def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
+    """Mean over the grid's frames of what is usable in K; NaN where no frame has a value."""
+    frames = np.isin(measurement.times, grid.times)
+    values = measurement.radiance_temperature()[frames]
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1)
+    return np.asarray(np.where(count > 0, mean, np.nan), dtype=np.float64)
+
+
+def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
+    several = grid.times.size > 1
+    mean = grid.frame_mean - ZERO_CELSIUS
+    bars = grid.frame_standard_deviation if several else grid.standard_deviation[0]
+    uncertainty = grid.frame_estimate.standard_uncertainty
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
+    for m, depth in enumerate(grid.depth):
+        if not grid.usable[:, m].any():
+            continue
+        aside = _ASIDE * (m - (grid.depth.size - 1) / 2) * grid.size
+        along = 1e6 * (grid.along + aside)
+        marker = _MARKERS[m % len(_MARKERS)]
+        axes.errorbar(
+            along,
+            mean[m],
+            np.nan_to_num(bars[m]),
+            color=colours[m],
+            marker=marker,
+            markersize=4,
+            linewidth=1.2,
+            elinewidth=0.8,
+            capsize=2,
+            label=f"{1e6 * depth:.3g} µm",
+        )
+        if grid.estimate.components:
+            drawing.shade(axes, along, mean[m], uncertainty[m], colours[m])
+        partly = grid.frame_count[m] < grid.times.size
+        hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
+        axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
+    axes.set_xlabel("distance along the rake face / µm")
+    axes.set_ylabel("radiance temperature / °C")
+    over = f"between {grid.times.size} frames" if several else "in a square"
+    bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
+    axes.set_title(f"b) profiles\nbars: standard deviation {over}{bands}")
+
+
+def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile) -> Figure:
+    """Draw the curves on the image of the reference, and the temperature along them."""
+    first, last = profile.times[[0, -1]]
+    colours = _COLOURS((profile.times - first) / max(last - first, 1e-12))
+    with drawing.style():
+        figure = drawing.new_figure(_BAND_HEIGHT)
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
+        _draw_curves(figure, left, measurement, tool, profile, colours)
+        for frame, colour in enumerate(colours):
+            _draw_profile(right, profile, frame, colour)
+        right.set_xlabel("distance from the cutting edge / µm")
+        right.set_ylabel("radiance temperature / °C")
+        right.set_title("b) along the band, ± 1 standard uncertainty")
+        if profile.times.size > _MOST_NAMES:
+            handles = [
+                right.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
+                for s in Stage
+                if s in profile.stage and s is not Stage.NONE
+            ]
+            _draw_times(figure, right, profile.times)
+        else:
+            handles = right.get_legend_handles_labels()[0]
+        figure.legend(handles=handles, loc="outside lower center", ncols=_LEGEND_COLUMNS)
+    return figure
+
+
+def _draw_times(figure: Figure, axes: Axes, times: Array) -> None:
+    """Which colour is which time, where there are too many curves to name each."""
+    span = matplotlib.colors.Normalize(1e6 * times[0], 1e6 * times[-1])
+    key = matplotlib.cm.ScalarMappable(span, _COLOURS)
+    figure.colorbar(key, ax=axes, label="time / µs", aspect=25)
+
+
+def _draw_curves(
+    figure: Figure,
+    axes: Axes,
+    measurement: Measurement,
+    tool: Tool,
+    profile: BandProfile,
+    colours: Array,
+) -> None:
+    away = np.abs(profile.offset)
+    frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
+    number = int(np.flatnonzero(measurement.times == profile.times[frame])[0])
+    image = measurement.data["radiance_temperature"][number].values - ZERO_CELSIUS
+    picture = _show(axes, image, measurement, tool)
+    for points, colour in zip(profile.points, colours, strict=True):
+        axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
+    drawing.draw_line(axes, profile.reference.points, scales.BLUE)
+    drawing.crop(axes, profile.points, measurement.raster, _AROUND)
+    axes.set_title(f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference")
+    figure.colorbar(
+        picture, ax=axes, label="radiance temperature / °C", location="bottom", aspect=25
+    )
+
+
+def _draw_profile(axes: Axes, profile: BandProfile, frame: int, colour: Array) -> None:
+    values = profile.temperature[frame] - ZERO_CELSIUS
+    if not np.isfinite(values).any():
+        return
+    along, uncertainty = 1e6 * profile.distance, profile.estimate.standard_uncertainty[frame]
+    stage = profile.stage[frame]
+    label = f"{1e6 * profile.times[frame]:.4g} µs, {stage}"
+    axes.plot(along, values, color=colour, linestyle=_LINES[stage], label=label)
+    drawing.shade(axes, along, values, uncertainty, colour)
+
+
+def _show(axes: Axes, celsius: Array, measurement: Measurement, tool: Tool) -> AxesImage:
+    known = celsius[np.isfinite(celsius)]
+    limits = (float(known.min()), float(np.percentile(known, 99.9)) + 1.0)
+    return drawing.show_image(axes, celsius, measurement.raster, tool, scales.HEAT, limits)

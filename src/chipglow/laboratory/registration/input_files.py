@@ -1,0 +1,125 @@
+"""Pictures of a visible camera, and points seen in both images, from files."""
+
+import csv
+import os
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageSequence, UnidentifiedImageError
+
+from chipglow.camera import Recording
+from chipglow.io import atomic_path
+from chipglow.io.cameras import camera_formats, read_recording
+from chipglow.io.cameras.formats import find_format
+from chipglow.quantities import Array
+from chipglow.scene import Raster
+from chipglow.text import read_small_text
+
+PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif")
+
+_MOST_PIXELS: Final = 400_000_000
+_TURN: Final = 600
+
+_VISIBLE: Final = ["visible_column", "visible_row"]
+_BY_LENGTH: Final = ["x_um", "y_um", *_VISIBLE]
+_BY_PIXEL: Final = ["infrared_column", "infrared_row", *_VISIBLE]
+_HALF: Final = 0.5
+
+
+def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
+    """Read frames of a visible camera."""
+    path = Path(path)
+    if path.suffix.lower() in PICTURE_SUFFIXES:
+        frames = _frames(path)
+        times = np.arange(len(frames), dtype=np.float64) * (1.0 if interval is None else interval)
+        return Recording(frames, "counts", times, f"picture {path.name}")
+    if camera_formats()[find_format(path)].states_quantity:
+        return read_recording(path, interval=interval)
+    return read_recording(path, quantity="counts", unit="counts", interval=interval)
+
+
+def _frames(path: Path) -> NDArray[np.float32]:
+    if path.stat().st_size == 0:
+        raise ValueError(f"{path}: is empty, expected a picture")
+    try:
+        with Image.open(path) as picture:
+            count = getattr(picture, "n_frames", 1)
+            if count * picture.width * picture.height > _MOST_PIXELS:
+                raise ValueError(f"{path}: expected up to {_MOST_PIXELS} pixels in all")
+            frames = [_brightness(page) for page in ImageSequence.Iterator(picture)]
+    except (UnidentifiedImageError, Image.DecompressionBombError):
+        raise ValueError(f"{path}: expected a picture, such as PNG, TIFF or JPEG") from None
+    except (SyntaxError, EOFError, OSError) as error:
+        raise ValueError(f"{path}: is damaged or cut short: {error}") from None
+    if len({frame.shape for frame in frames}) > 1:
+        raise ValueError(f"{path}: has pages of several sizes, expected one size")
+    return np.stack(frames)
+
+
+def _brightness(page: Image.Image) -> NDArray[np.float32]:
+    """Pages of one channel as they are, with 16 bits or more too; others as luminance."""
+    one = page.mode in ("1", "L", "I", "F") or page.mode.startswith("I;")
+    return np.asarray(page if one else page.convert("L"), np.float32)
+
+
+def write_blink(pictures: tuple[NDArray[np.uint8], ...], path: str | Path) -> None:
+    """Write pictures that are shown in turns, again and again, as a GIF."""
+    first, *others = (Image.fromarray(picture).quantize(255) for picture in pictures)
+    with atomic_path(path) as temporary:
+        first.save(temporary, "GIF", save_all=True, append_images=others, duration=_TURN, loop=0)
+
+
+def read_points(
+    path: str | os.PathLike[str], raster: Raster, shape: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Read points from a CSV file."""
+    path = Path(path)
+    lines = read_small_text(path).rstrip().splitlines()
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
+    if rows[0] not in (_BY_LENGTH, _BY_PIXEL):
+        raise ValueError(
+            f"{path}, line 1: {','.join(rows[0])!r}, expected {','.join(_BY_LENGTH)!r} "
+            f"or {','.join(_BY_PIXEL)!r}"
+        )
+    points = np.array([_point(path, i, row) for i, row in enumerate(rows[1:], 2)]).reshape(-1, 4)
+    positions = points[:, :2] * 1e-6
+    if rows[0] == _BY_PIXEL:
+        corner = np.array([raster.left, raster.top])
+        positions = corner + (points[:, :2] + _HALF) * raster.spacing * [1.0, -1.0]
+    _check_inside(path, points, positions, raster, shape)
+    return positions, points[:, 2:]
+
+
+def _point(path: Path, line: int, row: list[str]) -> list[float]:
+    try:
+        values = [float(cell) for cell in row]
+    except ValueError:
+        values = []
+    if len(values) != len(_BY_LENGTH) or not np.isfinite(values).all():
+        raise ValueError(f"{path}, line {line}: {','.join(row)!r}, expected four numbers")
+    return values
+
+
+def _check_inside(
+    path: Path,
+    points: Array,
+    positions: Array,
+    raster: Raster,
+    shape: tuple[int, int],
+) -> None:
+    left, right, bottom, top = raster.extent
+    for line, (point, place) in enumerate(zip(points, positions, strict=True), 2):
+        if not (left <= place[0] <= right and bottom <= place[1] <= top):
+            raise ValueError(
+                f"{path}, line {line}: {point[0]:g}, {point[1]:g} is outside the infrared image, "
+                f"expected x {1e6 * left:.6g} to {1e6 * right:.6g} um and y {1e6 * bottom:.6g} to "
+                f"{1e6 * top:.6g} um, or columns 0 to {raster.columns - 1} and rows 0 to "
+                f"{raster.rows - 1}"
+            )
+        if not (-_HALF <= point[2] <= shape[1] - _HALF and -_HALF <= point[3] <= shape[0] - _HALF):
+            raise ValueError(
+                f"{path}, line {line}: {point[2]:g}, {point[3]:g} is outside the visible picture, "
+                f"expected columns 0 to {shape[1] - 1} and rows 0 to {shape[0] - 1}"
+            )
