@@ -10,10 +10,9 @@ from typing import NamedTuple
 import pytest
 from hypothesis import settings
 from numba import set_num_threads
-from PIL import Image
+from undrawn import leave_undrawn
 
 from chipglow.cutting import FLOW_LAWS
-from chipglow.drawing import drawing
 from chipglow.io.sandbox import Sandbox, _failure
 from chipglow.io.sources import SourceError
 
@@ -116,15 +115,7 @@ def reproduce_quick(folder):
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Figures of a report are files of one pixel: drawing them takes longer than all the rest."""
-
-    def save(figure, folder, name):
-        png, svg = folder / f"{name}.png", folder / f"{name}.svg"
-        Image.new("RGB", (1, 1)).save(png)
-        svg.write_text('<svg xmlns="http://www.w3.org/2000/svg"/>', encoding="utf-8")
-        return png, svg
-
-    monkeypatch.setattr(drawing, "save", save)
+    leave_undrawn(monkeypatch)
 
 
 @pytest.fixture

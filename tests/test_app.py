@@ -506,6 +506,7 @@ def test_a_missing_panel_is_named_with_its_extra(monkeypatch):
         chipglow.explore()
 
 
+@pytest.mark.slow
 def test_a_signal_ends_the_server_whatever_is_at_work():
     code = """
 import os, signal

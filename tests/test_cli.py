@@ -6,6 +6,7 @@ import sys
 from contextlib import contextmanager
 from json import dumps, loads
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import typer
 import yaml
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
+from undrawn import leave_undrawn
 
 from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
@@ -33,6 +35,7 @@ from chipglow.surface import UniformSurface
 
 ROOT = Path(__file__).parents[1]
 RASTER = AnalyticChip().raster
+ANALYSIS = "analysis: {exposures: 2, phases: 1, textures: 1, psf_widths: [8 um]}"
 STUDY = f"""
 title: A chip in closed form
 cutting:
@@ -61,9 +64,8 @@ def chip_scene():
     return AnalyticChip().scene()
 
 
-@pytest.fixture
-def runs(monkeypatch, chip_scene):
-    """The cutting simulation replaced by a chip in closed form."""
+def replace_cut(monkeypatch, scene):
+    """Replace the cutting simulation by a chip in closed form; returns the list of its runs."""
     calls = []
 
     def cut_chip(
@@ -77,7 +79,7 @@ def runs(monkeypatch, chip_scene):
         preview=None,
     ):
         calls.append(simulation)
-        for frame in chip_scene.frames():
+        for frame in scene.frames():
             on_frame(frame)
             if preview:
                 preview.on_frame(frame)
@@ -91,9 +93,33 @@ def runs(monkeypatch, chip_scene):
 
 
 @pytest.fixture
-def scene(folder, chip_scene):
-    write_scene(chip_scene, folder / "scene.nc")
-    return folder / "scene.nc"
+def runs(monkeypatch, chip_scene):
+    return replace_cut(monkeypatch, chip_scene)
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory, chip_scene):
+    path = tmp_path_factory.mktemp("scene") / "scene.nc"
+    write_scene(chip_scene, path)
+    return path
+
+
+@pytest.fixture
+def scene(folder, scene_file):
+    return Path(copy(scene_file, folder))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, chip_scene):
+    """Folder and output of ``chipglow run`` with the study."""
+    work = tmp_path_factory.mktemp("run")
+    (work / "study.yaml").write_text(STUDY)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CHIPGLOW_CACHE", str(work.parent / "run-cache"))
+        patch.chdir(work)
+        leave_undrawn(patch)
+        replace_cut(patch, chip_scene)
+        return work, chipglow("run", "study.yaml", "--out", "results")
 
 
 def chipglow(*arguments):
@@ -152,28 +178,28 @@ def test_init_writes_the_papers_study_and_keeps_what_is_there(folder):
     assert load_study("study.yaml") == Study()
 
 
-def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
-    result = chipglow("run", "study.yaml", "--out", "results")
+def test_run_writes_a_report_and_prints_the_comparison(finished):
+    work, result = finished
     assert result.exit_code == 0, result.output
     assert "results/report.html" in result.output
-    for heading in ("quantity", "the paper", "here", "95 % interval", "differs", "−42", "90"):
+    for heading in ("quantity", "the paper", "this study", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
     assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
     assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
     assert citation["references"][0]["title"] in last
-    names = {path.name for path in (folder / "results").iterdir()}
-    assert {
+    names = {path.name for path in (work / "results").iterdir()}
+    assert names >= {
         "report.html",
         "summary.json",
         "summary.schema.json",
         "results.nc",
         "study.yaml",
         "figures",
-    } <= names
-    assert load_study("results/study.yaml") == load_study("study.yaml")
-    assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
+    }
+    assert load_study(work / "results" / "study.yaml") == load_study(work / "study.yaml")
+    assert sorted(path.name for path in work.iterdir()) == ["results", "study.yaml"]
 
 
 @pytest.fixture
@@ -243,26 +269,57 @@ def test_a_place_that_is_not_there_is_refused_before_anything_is_computed(comman
     assert runs == []
 
 
-PICTURES = ("--plot", "--overlay")
-OUT_ENDINGS = {"register": ".yaml", "wavelengths": ".csv"}
-ENDINGS = {"--out": ".nc", "--table": ".csv", "--pairs": ".csv", "--blink": ".gif"}
-WRITTEN = [
+COMMANDS = typer.main.get_command(app).commands
+FIGURE = ".png, .pdf or .svg"
+ENDINGS = {
+    ("rake", "--out"): ".csv or .nc",
+    ("shearband", "--out"): ".csv or .nc",
+    ("psf", "--out"): ".nc",
+    ("wavelengths", "--out"): ".csv",
+    ("register", "--out"): ".yaml or .yml",
+    ("register", "--pairs"): ".csv",
+    ("register", "--blink"): ".gif",
+    ("cut", "--preview"): ".mp4 or .gif",
+}
+FILES = [
     (name, option.opts[0])
-    for name, command in typer.main.get_command(app).commands.items()
+    for name, command in COMMANDS.items()
     for option in command.params
-    if option.opts[0] in (*PICTURES, *ENDINGS) and option.metavar == "FILE"
+    if option.opts[0]
+    in ("--out", "--plot", "--overlay", "--table", "--pairs", "--blink", "--preview")
+    and option.metavar == "FILE"
+]
+QUANTITIES = [
+    (name, option.opts[0])
+    for name, command in COMMANDS.items()
+    for option in command.params
+    if option.metavar in ("TEMPERATURE", "KELVINS", "LENGTH", "TIME")
 ]
 
 
-@pytest.mark.parametrize(("command", "option"), WRITTEN)
+def required(name):
+    """Values of everything that a command requires, of files that do not exist."""
+    for parameter in COMMANDS[name].params:
+        if parameter.required:
+            option = parameter.opts[0]
+            yield from ((option,) if option.startswith("--") else ())
+            yield {"TEMPERATURE": "300 K"}.get(parameter.metavar, "none.nc")
+
+
+@pytest.mark.parametrize(("command", "option"), FILES)
 def test_a_file_that_cannot_be_written_is_refused_before_anything_is_read(command, option):
-    """Of all commands, without the files that they need."""
-    if option in PICTURES:
-        message = f"{option}: a.txt, expected a file that ends in .png, .pdf or .svg"
+    ending = FIGURE if option in ("--plot", "--overlay") else ENDINGS.get((command, option))
+    if ending:
+        message = f"{option}: a.txt, expected a file that ends in {ending}"
         assert_refused(chipglow(command, option, "a.txt"), message)
-    ending = OUT_ENDINGS.get(command) if option == "--out" else None
-    ending = ending or ENDINGS.get(option, ".PNG")
-    assert_refused(chipglow(command, option, f"no/a{ending}"), "there is no folder no")
+    name = f"no/a{(ending or '.nc').split()[0].strip(',').upper()}"
+    result = chipglow(command, *required(command), option, name)
+    assert_refused(result, "there is no folder no")
+
+
+@pytest.mark.parametrize(("command", "option"), QUANTITIES)
+def test_a_quantity_without_a_unit_is_refused(command, option):
+    assert_refused(chipglow(command, *required(command), option, "3"), f"{option}: 3 has no unit")
 
 
 def test_a_bad_study_is_refused_and_writes_nothing(folder, runs):
@@ -273,7 +330,7 @@ def test_a_bad_study_is_refused_and_writes_nothing(folder, runs):
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
 
 
-def test_cut_writes_the_scene(folder, runs):
+def test_cut_writes_the_scene_and_keeps_it_in_the_cache(folder, runs, tmp_path):
     result = chipglow("cut", "study.yaml", "--out", "scene.nc")
     assert result.exit_code == 0, result.output
     assert len(open_scene(folder / "scene.nc").times) == AnalyticChip().frames
@@ -286,16 +343,16 @@ def test_cut_writes_the_scene(folder, runs):
     # The paper's edge of 20 um is known, and too small for the default cell.
     assert result.stderr.count("Warning") == 1
     assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
-
-
-def test_cut_warns_of_too_much_inertia(folder, runs):
-    (folder / "study.yaml").write_text(
-        STUDY.replace("  field_of", "  numerics: {mass_scaling: 200}\n  field_of")
-    )
-    result = chipglow("cut", "study.yaml", "--out", "scene.nc")
-    assert result.exit_code == 0, result.output
-    assert "Warning: The scaled mass's momentum is worth 1.8% of the cutting force" in result.stderr
-    assert "lower mass_scaling, now 200." in result.stderr
+    listed = chipglow("cache", "list").output
+    assert re.search(r"\d MB  scene-[0-9a-f]{32}\.nc", listed)
+    assert re.search(r"1 scenes, \d+\.\d MB in ", listed)
+    with full_disk(50_000):
+        result = chipglow("cut", "study.yaml", "--out", "second.nc")
+    assert_refused(result, "chipglow: second.nc: File too large")
+    assert len(runs) == 1
+    assert sorted(path.name for path in folder.iterdir()) == ["scene.nc", "study.yaml"]
+    assert re.search(r"\d MB freed", chipglow("cache", "clear").output)
+    assert list((tmp_path / "cache").iterdir()) == []
 
 
 def write_foreign_chip(path, scene):
@@ -307,8 +364,9 @@ def write_foreign_chip(path, scene):
     np.savez(path, material=material, **fields)
 
 
-def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(
-    folder, runs, chip_scene, read_here
+@pytest.mark.slow
+def test_run_analyses_an_imported_scene_instead_of_the_cut(
+    folder, runs, chip_scene, finished, read_here
 ):
     write_foreign_chip(folder / "chip.npz", chip_scene)
     described = {
@@ -323,10 +381,7 @@ def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(
     (folder / "import.yaml").write_text(dumps(described))
     result = chipglow("import", "import.yaml", "--out", "scene.nc")
     assert result.exit_code == 0, result.output
-    (folder / "study.yaml").write_text(
-        "scene: scene.nc\ncutting: {tool: {}}\n"
-        "analysis: {exposures: 2, phases: 1, textures: 1, psf_widths: [8 um]}\n"
-    )
+    (folder / "study.yaml").write_text(f"scene: scene.nc\ncutting: {{tool: {{}}}}\n{ANALYSIS}\n")
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert runs == []
@@ -335,14 +390,13 @@ def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(
     report = (folder / "results" / "report.html").read_text()
     assert "The scene has no tool" in report
     assert str(folder / "scene.nc") in report
-    foreign = loads((folder / "results" / "summary.json").read_text())["results"]
-
     # The same chip with its own tool and coordinates: textures differ, but not by much.
-    write_scene(chip_scene, folder / "scene.nc")
-    result = chipglow("run", "study.yaml", "--out", "own")
-    assert result.exit_code == 0, result.output
-    assert "Assumed: The scene" not in result.stderr
-    own = loads((folder / "own" / "summary.json").read_text())["results"]
+    work, own_result = finished
+    assert "Assumed: The scene" not in own_result.stderr
+    foreign, own = (
+        loads((results / "results" / "summary.json").read_text())["results"]
+        for results in (folder, work)
+    )
     for name in ("rake_error_degC", "band_error_degC"):
         assert foreign[name] == pytest.approx(own[name], rel=0.2), name
 
@@ -409,10 +463,8 @@ def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--start", "20", "--start: 20 has no unit, expected a time such as 10 us"),
         ("--start", "35 us", "scene.nc: exposure: 3.5e-05 s to"),
         ("--chip", "chip 3", "--chip: 'chip 3' is unknown, expected one of chip 1, chip 2"),
-        ("--out", "no/m.nc", "no folder no"),
     ],
 )
 def test_measure_refuses_what_it_cannot_do_and_writes_nothing(
@@ -441,15 +493,6 @@ def test_a_disk_that_fills_up_during_the_cut_leaves_nothing(command, folder, run
     assert_refused(result, f"{tmp_path / 'cache'}/scene-", "File too large")
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
     assert list((tmp_path / "cache").iterdir()) == []
-
-
-def test_a_disk_too_full_for_the_scene_is_not_the_caches(folder, runs):
-    assert chipglow("cut", "study.yaml", "--out", "first.nc").exit_code == 0
-    with full_disk(50_000):
-        result = chipglow("cut", "study.yaml", "--out", "second.nc")
-    assert_refused(result, "chipglow: second.nc: File too large")
-    assert len(runs) == 1
-    assert sorted(path.name for path in folder.iterdir()) == ["first.nc", "study.yaml"]
 
 
 def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder, earlier_results):
@@ -499,13 +542,4 @@ def test_a_run_that_is_ended_from_outside_leaves_nothing(folder, tmp_path):
     assert process.returncode == 130
     assert "chipglow: interrupted, nothing was written" in errors
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
-    assert list((tmp_path / "cache").iterdir()) == []
-
-
-def test_the_cache_is_listed_with_its_size_and_cleared(runs, tmp_path):
-    assert chipglow("cut", "study.yaml", "--out", "scene.nc").exit_code == 0
-    listed = chipglow("cache", "list").output
-    assert re.search(r"\d MB  scene-[0-9a-f]{32}\.nc", listed)
-    assert re.search(r"1 scenes, \d+\.\d MB in ", listed)
-    assert re.search(r"\d MB freed", chipglow("cache", "clear").output)
     assert list((tmp_path / "cache").iterdir()) == []

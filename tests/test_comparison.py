@@ -389,13 +389,13 @@ def test_the_command_writes_what_it_says(folder):
     ("options", "message"),
     [
         ((*FILES, "one.nc", "one.nc", *USUAL), "one.nc: is there twice"),
-        ((*FILES, "--uncertainty", "5"), "--uncertainty: 5 has no unit"),
         ((*FILES, "--uncertainty", "-5 K"), "--uncertainty: -5 K, expected over 0 K"),
         ((*FILES, "--emissivity-uncertainty", "2"), "--emissivity-uncertainty: 2, expected 0"),
-        ((*FILES, "--position", "1 s"), "--position: '1 s' is not a length"),
         ((*FILES, "--curve", "one.nc"), "one.nc: expected"),
-        ((*FILES, "--reference", "1 s"), "--reference: 1 s, expected 0 us to 20 us"),
-        ((*FILES, "--plot", "a.txt"), "a.txt, expected a file that ends in .png"),
+        (
+            (*FILES, "--reference", "1 s"),
+            "--reference: 1000000 us is not in the measurement, expected 0 us to 20 us",
+        ),
         (("measured.nc", "curve.csv"), "curve.csv: curve: unit: is missing"),
         ((*FILES, *USUAL, "--out", "."), "which chipglow did not write"),
     ],
@@ -406,7 +406,6 @@ def test_what_the_command_cannot_do_is_one_line(folder, options, message):
     last = result.output.strip().splitlines()[-1]
     assert message in last
     assert last.startswith("chipglow: ")
-    assert not (folder / "a.txt").exists()
 
 
 def test_two_uncertainties_of_one_measurement_are_refused(folder):

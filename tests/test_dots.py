@@ -235,8 +235,8 @@ def test_the_command_registers_by_dots(tmp_path, monkeypatch):
     result = CliRunner().invoke(app, ["register", *arguments], env={"COLUMNS": "120"})
     output = " ".join(result.output.split())
     assert result.exit_code == 0, output
-    assert "Infrared: 19 bright dots of a radius of" in output
-    assert "Visible: 19 dark dots of a radius of" in output
+    assert "Infrared: 19 bright dots with a radius of" in output
+    assert "Visible: 19 dark dots with a radius of" in output
     assert "Assumed: The visible picture is not mirrored, is turned by up to 30 degrees" in output
     found = load_registration("map.yaml")
     assert (found.method, found.notes.warnings) == ("dots", [])

@@ -7,7 +7,7 @@ import pytest
 from analytic_chip import AnalyticChip
 
 from chipglow.analysis.cut import _unaccounted
-from chipglow.cli.inertia import say_of_cut
+from chipglow.cli.cutting import say_of_cut
 from chipglow.cli.screen import begin
 from chipglow.cutting import (
     AISI_1045,

@@ -440,12 +440,6 @@ def test_calibrate_says_what_is_doubtful(laboratory):
         (["nothing.csv", "--band", "3.8-5.1 um"], "nothing.csv"),
         (["chip.npy", "--band", "3.8-5.1 um"], "chip.npy: expected text"),
         (["few.csv", "--band", "3.8-5.1 um"], "few.csv: calibration: 1 points"),
-        (["points.csv", "--band", "3.8-5.1 um", "--plot", "a.txt"], "--plot"),
-        (["points.csv", "--band", "3.8-5.1 um", "--out", "no/where.yaml"], "no folder"),
-        (
-            ["points.csv", "--band", "3.8-5.1 um", "--common-uncertainty", "2"],
-            "--common-uncertainty: 2 has no unit",
-        ),
     ],
 )
 def test_calibrate_refuses_in_one_line(laboratory, arguments, message):

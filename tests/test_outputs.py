@@ -145,7 +145,8 @@ def inputs(tmp_path, monkeypatch):
     (tmp_path / "study.yaml").write_text("scene: scene.nc\n")
     (tmp_path / "list.yaml").write_text("frames: [frames.npy]\n")
     np.save("frames.npy", np.zeros((2, 3, 4)))
-    (tmp_path / "linked.nc").hardlink_to("scene.nc")
+    for name in ("linked.nc", "linked.gif"):
+        (tmp_path / name).hardlink_to("scene.nc")
     return tmp_path
 
 
@@ -154,7 +155,7 @@ def inputs(tmp_path, monkeypatch):
     [
         ("cut study.yaml --out study.yaml", "study.yaml: is also an input (study.yaml)"),
         ("cut study.yaml --out scene.nc", "scene.nc: is also an input (scene.nc)"),
-        ("cut study.yaml --out new.nc --preview scene.nc", "scene.nc: is also an input"),
+        ("cut study.yaml --out new.nc --preview linked.gif", "linked.gif: is also an input"),
         ("measure scene.nc --study study.yaml --out linked.nc", "linked.nc: is also an input"),
         ("import list.yaml --out frames.npy", "frames.npy: is also an input (frames.npy)"),
         ("rake scene.nc --out scene.nc", "scene.nc: is also an input"),

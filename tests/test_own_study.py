@@ -174,12 +174,12 @@ def test_a_dear_cut_is_begun_only_if_the_user_says_so(agreed, asked, monkeypatch
     dear = Study(cutting={"numerics": {"cell": "2 um"}})
     if asked:
         with pytest.raises(typer.Abort):
-            progress.say_where_it_starts(dear, False, agreed)
+            progress.confirm_cost(dear, False, agreed)
     else:
-        progress.say_where_it_starts(dear, False, agreed)
+        progress.confirm_cost(dear, False, agreed)
     assert len(questions) == asked
     assert "Expected: about" in capsys.readouterr().err
-    progress.say_where_it_starts(Study.quick(), False, False)
+    progress.confirm_cost(Study.quick(), False, False)
     assert len(questions) == asked
 
 

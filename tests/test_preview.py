@@ -359,28 +359,15 @@ def test_the_command_makes_a_movie_of_the_cut_and_then_of_its_scene(folder):
     assert {path.name for path in folder.iterdir()} == names
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [("a.avi", "ending in .mp4 or .gif"), ("none/a.gif", "there is no folder none")],
-)
-def test_a_preview_that_cannot_be_written_is_refused_before_the_cut(
-    folder, monkeypatch, name, said
-):
+def test_mp4_without_pyav_is_refused_before_the_cut(folder, monkeypatch):
     def no_run(*_, **__):
         raise AssertionError("the cut was started")
 
     monkeypatch.setattr(CuttingSimulation, "run", no_run)
-    result = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", name)
-    assert result.exit_code == 2
-    assert said in " ".join(result.output.split())
-    assert not (folder / "a.nc").exists()
-
-
-def test_mp4_without_pyav_is_one_line(folder, monkeypatch):
     monkeypatch.setattr("chipglow.io.movie_file.find_spec", lambda _: None)
     result = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", "a.mp4")
     assert result.exit_code == 2
-    assert result.output.startswith("chipglow: --preview: a.mp4: MP4 needs PyAV")
+    assert result.output.startswith("chipglow: a.mp4: MP4 needs PyAV")
     assert result.output.count("\n") == 1
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from typer.testing import CliRunner
+from undrawn import leave_undrawn
 
 from chipglow.analysis import (
     LinePlace,
@@ -207,20 +208,30 @@ analysis:
 """
 
 
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory):
+    """Folder and output of ``chipglow error``."""
+    work = tmp_path_factory.mktemp("error")
+    write_scene(plate(), work / "plate.nc")
+    (work / "study.yaml").write_text(STUDY)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(work)
+        leave_undrawn(patch)
+        return work, chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out")
+
+
 @pytest.fixture
-def folder(tmp_path, undrawn, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_scene(plate(), tmp_path / "plate.nc")
-    (tmp_path / "study.yaml").write_text(STUDY)
-    return tmp_path
+def folder(reported, undrawn, monkeypatch):
+    monkeypatch.chdir(reported[0])
+    return reported[0]
 
 
 def chipglow(*arguments):
     return CliRunner().invoke(app, arguments)
 
 
-def test_the_command_reports_without_a_word_of_cutting(folder):
-    done = chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out")
+def test_the_command_reports_without_a_word_of_cutting(folder, reported):
+    done = reported[1]
     assert done.exit_code == 0, done.output
     for word in ("hottest", "middle", "across", "pad"):
         assert word in done.output
@@ -249,8 +260,7 @@ def test_the_command_reports_without_a_word_of_cutting(folder):
         assert all(data[name].attrs.get("units") for name in data.data_vars)
 
 
-def test_the_study_as_run_runs_again(folder, undrawn):
-    assert chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out").exit_code == 0
+def test_the_study_as_run_runs_again(folder):
     done = chipglow("run", "out/study.yaml", "--out", "again")
     assert done.exit_code == 0, done.output
     first, second = (
@@ -260,29 +270,29 @@ def test_the_study_as_run_runs_again(folder, undrawn):
     assert first == second
 
 
-def test_one_emissivity_is_enough(folder, undrawn):
+def test_one_emissivity_is_enough(folder):
     (folder / "short.yaml").write_text("camera: {integration_time: 2 us, lower_limit: none}\n")
     done = chipglow(
-        "error", "plate.nc", "--study", "short.yaml", "--emissivity", "0.5", "--out", "out"
+        "error", "plate.nc", "--study", "short.yaml", "--emissivity", "0.5", "--out", "short"
     )
     assert done.exit_code == 0, done.output
-    assert (folder / "out" / "report.html").exists()
+    assert (folder / "short" / "report.html").exists()
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("plate.nc", "--emissivity", "1.5"), ("--emissivity", "1.5", "from 0 to 1")),
+        (("plate.nc", "--emissivity", "1.5"), ("emissivity", "1.5", "expected 0 to 1")),
         (("none.nc",), ("none.nc", "no such file")),
         (("plate.nc",), ("plate.nc", "no plastic strain", "kind: uniform")),
     ],
 )
 def test_what_cannot_be_is_one_sentence(folder, arguments, words):
-    done = chipglow("error", *arguments, "--out", "out")
+    done = chipglow("error", *arguments, "--out", "refused")
     assert done.exit_code != 0
     told = done.stderr
     assert all(word in told for word in words), told
-    assert not (folder / "out").exists()
+    assert not (folder / "refused").exists()
 
 
 def test_run_is_partial_where_something_is_missing_and_says_what(folder):

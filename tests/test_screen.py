@@ -63,8 +63,7 @@ def test_a_program_that_asks_wrongly_gets_the_line_and_no_object(file):
 
 
 def test_what_json_cannot_say_is_null(capsys):
-    screen = Screen()
-    screen.for_programs()
+    screen = Screen(json=True)
     frame = pd.DataFrame({"name": ["a", "b"], "value_K": [1.5, np.nan]})
     screen.table("all", frame, ["name"])
     screen.say("Two.", {"array": np.array([1.0, np.inf]), "count": np.int64(2)})
@@ -93,9 +92,10 @@ def test_a_pipe_gets_one_line_a_row_without_colours():
     assert [row.split()[0] for row in rows[: len(fields)]] == fields
 
 
-def test_a_narrow_terminal_loses_no_number(file):
-    wide = chipglow("shearband", file, COLUMNS="200").stdout
-    narrow = chipglow("shearband", file, COLUMNS="60").stdout
+@pytest.mark.parametrize("command", ["shearband", "rake"])
+def test_a_narrow_terminal_loses_no_number(file, command):
+    wide = chipglow(command, file, COLUMNS="200").stdout
+    narrow = chipglow(command, file, COLUMNS="60").stdout
     assert max(map(len, narrow.split("\n\n")[0].splitlines())) <= 60
     numbers = [word for word in wide.split("\n\n")[0].split() if word[-1].isdigit()]
     assert numbers
@@ -112,16 +112,19 @@ def test_the_doctor_finds_what_is_missing(monkeypatch):
     assert "packages: numpy (too old)" in result.stderr
 
 
-@pytest.mark.slow
-def test_threads_sleep_while_they_wait_unless_told_otherwise(monkeypatch):
-    monkeypatch.delenv("OMP_WAIT_POLICY")
-    assert "; passive while they wait" in run_piped("doctor").stdout
-    assert "; active while they wait" in run_piped("doctor", OMP_WAIT_POLICY="active").stdout
+def test_threads_sleep_while_they_wait_unless_told_otherwise():
+    code = "import chipglow, os; print(os.environ['OMP_WAIT_POLICY'])"
+    for given, expected in (({}, "passive"), ({"OMP_WAIT_POLICY": "active"}, "active")):
+        environment = {name: text for name, text in os.environ.items() if name != "OMP_WAIT_POLICY"}
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, env=environment | given, capture_output=True, text=True)
+        assert done.stdout.strip() == expected
 
 
 def test_the_doctor_computes_and_lists_the_optional_parts():
-    found = json.loads(chipglow("doctor", "--json").stdout)
+    found = json.loads(chipglow("doctor", "--json", OMP_WAIT_POLICY="active").stdout)
     assert found["values"]["greatest_radiance_difference"] < 1e-6
     parts = {row["extra"]: row["advice"] for row in found["tables"]["optional"]}
     assert parts["mesh"] == ""
     assert found["facts"]["machine"]["cache"]
+    assert found["facts"]["machine"]["threads"].endswith("; active while they wait")

@@ -8,10 +8,12 @@ from shutil import copy
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
+from matplotlib.figure import Figure
 from PIL import Image
 from typer.testing import CliRunner
 
 from chipglow.cli import app
+from chipglow.cli.screen import figure
 from chipglow.io import StoredScene, open_scene, write_scene
 from chipglow.quantities.format import rounded_text
 from chipglow.report import draw_scene, scene_summary
@@ -162,12 +164,17 @@ def test_uneven_times_are_said(tmp_path):
     assert "1 µs to 2 µs" in show(tmp_path / "scene.nc")[1]
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_command_draws(path, kind):
-    code, text = show("scene.nc", "--plot", f"scene.{kind}")
+def test_the_command_draws(path):
+    code, text = show("scene.nc", "--plot", "scene.png")
     assert code == 0, text
-    assert text.splitlines()[-1] == f"scene.{kind}"
-    assert (path.parent / f"scene.{kind}").read_bytes().startswith(KINDS[kind])
+    assert text.splitlines()[-1] == "scene.png"
+    assert (path.parent / "scene.png").read_bytes().startswith(KINDS["png"])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_figure_is_written_in_the_format_of_its_name(tmp_path, kind):
+    figure(Figure)(tmp_path / f"a.{kind.upper()}")
+    assert (tmp_path / f"a.{kind.upper()}").read_bytes().startswith(KINDS[kind])
 
 
 def test_the_picture_shows_the_flags_if_there_are_any():
@@ -207,8 +214,6 @@ def test_what_is_wrong_is_one_line(path):
     (path.parent / "camera.fff").write_bytes(b"FFF\0" + bytes(5000))
     for arguments, parts in (
         (["scene.nc", "--at", "2 ms"], ("--at: 2000 us is not in the scene", "0 us to 100 us")),
-        (["scene.nc", "--at", "20"], ("--at: 20 has no unit", "10 us")),
-        (["scene.nc", "--plot", "scene.jpg"], ("--plot: scene.jpg", ".png, .pdf or .svg")),
         (["camera.fff"], ("camera.fff: not a NetCDF-4 file", "chipglow convert inspects")),
         (["none.nc"], ("none.nc: there is no such file",)),
         (["cut.nc"], ("cut.nc: not a NetCDF-4 file, or truncated",)),

@@ -20,7 +20,7 @@ from chipglow.camera import (
     Veil,
 )
 from chipglow.cli.screen import begin
-from chipglow.cli.showing_measurement import say_measurement
+from chipglow.cli.showing import say_measurement
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster

@@ -505,11 +505,9 @@ def test_the_command_takes_the_line_of_several_temperatures(folder):
     [
         (["--emissivity", "none.nc"], "none.nc: there is no such file"),
         (["--emissivity", "1.5"], "emissivity: is 1.5, expected over 0 to 1"),
-        (["--emissivity", "0.4", "--reflected", "warm"], "--reflected: 'warm'"),
         (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "expected none with a file"),
         (["--emissivity", "e.nc"], "is known of other, expected one of the regions"),
         (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),
-        (["--emissivity", "0.4", "--table", "no/t.csv"], "no"),
     ],
 )
 def test_bad_input_is_one_line(folder, arguments, message):

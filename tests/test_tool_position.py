@@ -230,7 +230,7 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
             ["--tool", "found", "--position", "5 um"],
             found.tool,
             stated,
-            "--position 5 um in the place of what was found, ± 16 um along",
+            "--position 5 um instead of the detected one, ± 16 um along",
         ),
         (["--tool", "tool.yaml", "--position", "5 um"], None, stated, None),
         (["--tool", "tool.yaml"], None, None, None),

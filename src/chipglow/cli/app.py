@@ -3,30 +3,19 @@
 import gc
 import signal
 import sys
+from collections.abc import Callable
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
+from chipglow.cli import options as opt
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
-from chipglow.cli.options import (
-    Force,
-    Resume,
-    SceneFile,
-    StudyFile,
-    Yes,
-    argument,
-    file_option,
-    flag,
-    folder_option,
-    option,
-    picture_option,
-)
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
@@ -48,7 +37,7 @@ app = typer.Typer(
 cache_app = typer.Typer(help="List or delete cached scenes.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 
-ResultFolder = Annotated[Path, folder_option("Results folder; earlier results are replaced.")]
+ResultFolder = Annotated[Path, opt.folder("Results folder; earlier results are replaced.")]
 
 
 def main() -> None:
@@ -77,7 +66,7 @@ def _show_version(wanted: bool) -> None:
 
 def _use_json(wanted: bool) -> None:
     if wanted:
-        current().for_programs()
+        current().json = True
 
 
 @app.callback()
@@ -102,43 +91,43 @@ def _chipglow(
 @app.command()
 def reproduce(
     quick: Annotated[
-        bool, flag("--quick", "Use coarse cells and samples; takes about a minute.")
+        bool, opt.flag("--quick", "Use coarse cells and samples; takes about a minute.")
     ] = False,
     steady_tool: Annotated[
         bool,
-        flag(
+        opt.flag(
             "--steady-tool",
             "Also run the study with a steady-state tool temperature; doubles the run time.",
         ),
     ] = False,
     out: ResultFolder = PAPER_FOLDER,
-    force: Force = False,
-    resume: Resume = False,
-    yes: Yes = False,
+    force: opt.Force = False,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
 ) -> None:
     """Reproduce the paper's study and compare the results with the published values."""
     from chipglow.cli.results import write_results
     from chipglow.report import QUICK
     from chipglow.study import Study
 
-    if quick:
-        write_results(Study.quick(), out, force, resume, yes, [QUICK], steady_tool)
-    else:
-        write_results(Study(), out, force, resume, yes, steady_tool=steady_tool)
+    study, remarks = (Study.quick(), [QUICK]) if quick else (Study(), [])
+    write_results(study, out, force, resume, yes, remarks, steady_tool)
 
 
 @app.command()
 def init(
-    path: Annotated[Path, argument("STUDY", "File to write.", writable=True)] = Path("study.yaml"),
-    force: Annotated[bool, flag("--force", "Replace an existing file.")] = False,
+    path: Annotated[Path, opt.argument("STUDY", "File to write.", writable=True)] = Path(
+        "study.yaml"
+    ),
+    force: Annotated[bool, opt.flag("--force", "Replace an existing file.")] = False,
     of_import: Annotated[
-        bool, flag("--import", "Write the description of an import instead.")
+        bool, opt.flag("--import", "Write the description of an import instead.")
     ] = False,
     of_measurement: Annotated[
-        bool, flag("--measurement", "Write the description of a camera file instead.")
+        bool, opt.flag("--measurement", "Write the description of a camera file instead.")
     ] = False,
     schema: Annotated[
-        bool, flag("--schema", "Write its JSON schema, for editors that check YAML.")
+        bool, opt.flag("--schema", "Write its JSON schema, for editors that check YAML.")
     ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
@@ -151,26 +140,24 @@ def init(
         raise ValueError("--import and --measurement cannot be combined")
     if path.exists() and not force:
         raise FileExistsError(f"{path}: already exists; choose another name or pass --force")
+    kinds: dict[str, tuple[type, Callable[[Any], str]]] = {
+        "study": (Study, study_text),
+        "import": (import_description(), import_text),
+        "measurement": (MeasurementDescription, measurement_text),
+    }
+    kind, write = kinds["import" if of_import else "measurement" if of_measurement else "study"]
     with atomic_path(path) as temporary:
-        if of_import:
-            imported = import_description()
-            text = json_schema(imported) if schema else import_text(imported())
-        elif of_measurement:
-            measurement = MeasurementDescription
-            text = json_schema(measurement) if schema else measurement_text(measurement())
-        else:
-            text = json_schema(Study) if schema else study_text(Study())
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(json_schema(kind) if schema else write(kind()), encoding="utf-8")
     current().file(path)
 
 
 @app.command()
 def run(
-    study: StudyFile,
+    study: opt.StudyFile,
     out: ResultFolder,
-    force: Force = False,
-    resume: Resume = False,
-    yes: Yes = False,
+    force: opt.Force = False,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
 ) -> None:
     """Run a study: cut, measure, analyse and report."""
     from chipglow.cli.results import write_results
@@ -181,68 +168,75 @@ def run(
 
 @app.command()
 def error(
-    scene: SceneFile,
+    scene: opt.SceneFile,
     study: Annotated[
         Path | None,
-        option(
+        opt.value(
             "STUDY",
             "Study file defining surface, camera and places; omitted settings default to the "
             "paper's.",
         ),
     ] = None,
     emissivity: Annotated[
-        float | None, option("NUMBER", "Uniform emissivity, instead of the study's surface.")
+        float | None, opt.value("NUMBER", "Uniform emissivity, instead of the study's surface.")
     ] = None,
     out: ResultFolder = ERROR_FOLDER,
-    force: Force = False,
+    force: opt.Force = False,
 ) -> None:
     """Compute the measurement error for any scene (cut, weld, melt pool, plate, ...)."""
-    from chipglow.cli.results import write_errors
-    from chipglow.cli.scene_error import study_of
+    from chipglow.cli.results import write_results
+    from chipglow.study import Study, errors, load_study
+    from chipglow.surface import UniformEmissivity
 
-    write_errors(study_of(scene, study, emissivity), out, force)
+    if not scene.is_file():
+        raise FileNotFoundError(f"{scene}: no such file")
+    loaded = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
+    if emissivity is not None:
+        loaded = loaded.model_copy(update={"surface": UniformEmissivity(emissivity)})
+    write_results(loaded, out, force, compute=errors)
 
 
 @app.command()
 def cut(
-    study: StudyFile,
-    out: Annotated[Path, file_option("Scene to write, NetCDF.")],
+    study: opt.StudyFile,
+    out: Annotated[Path, opt.file("Scene to write, NetCDF.")],
     preview: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            writable=True,
-            help="Movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of the "
+        opt.file(
+            "Movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of the "
             "whole cut; with --resume, of the rest; of a cached cut, of the recorded part.",
+            ".mp4",
+            ".gif",
         ),
     ] = None,
-    resume: Resume = False,
-    yes: Yes = False,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
 ) -> None:
     """Run only the cutting simulation of a study."""
     from chipglow.cli.cutting import cut_study
     from chipglow.study import load_study
 
     cut_study(load_study(study), out, preview, resume, yes)
-    current().file(out)
-    if preview is not None:
-        current().file(preview)
 
 
 @app.command("import")
 def import_source(
     source: Annotated[
         Path,
-        argument("SOURCE", "Mesh, grid, point cloud or movie, or YAML file describing an import."),
+        opt.argument(
+            "SOURCE", "Mesh, grid, point cloud or movie, or YAML file describing an import."
+        ),
     ],
     out: Annotated[
-        Path | None, file_option("Scene to write, NetCDF. Omit it to only inspect the source.")
+        Path | None, opt.file("Scene to write, NetCDF. Omit it to only inspect the source.")
     ] = None,
     settings: Annotated[
         list[str] | None,
-        option("FIELD=VALUE", "Set a field of the import (units.length=mm). Repeatable.", "--set"),
+        opt.value(
+            "FIELD=VALUE", "Set a field of the import (units.length=mm). Repeatable.", "--set"
+        ),
     ] = None,
-    resume: Annotated[bool, flag("--resume", "Resume an interrupted import.")] = False,
+    resume: Annotated[bool, opt.flag("--resume", "Resume an interrupted import.")] = False,
 ) -> None:
     """Import meshes, grids, points or movies as a scene."""
     from chipglow.cli.importing import import_fields
@@ -253,15 +247,15 @@ def import_source(
 
 @app.command()
 def measure(
-    scene: SceneFile,
-    study: Annotated[Path, option("STUDY", "Study file defining surface and camera.")],
-    out: Annotated[Path, file_option("Measurement to write, NetCDF.")],
+    scene: opt.SceneFile,
+    study: Annotated[Path, opt.value("STUDY", "Study file defining surface and camera.")],
+    out: Annotated[Path, opt.file("Measurement to write, NetCDF.")],
     start: Annotated[
-        str | None,
-        option("TIME", "Start of the first exposure, e.g. '400 us'. Default: that of the scene."),
+        float | None,
+        opt.time("Start of the first exposure, e.g. '400 us'. Default: that of the scene."),
     ] = None,
     chip: Annotated[
-        str | None, option("NAME", "One of the study's chips. Default: the first.")
+        str | None, opt.value("NAME", "One of the study's chips. Default: the first.")
     ] = None,
 ) -> None:
     """Measure a scene with a study's camera."""
@@ -276,31 +270,23 @@ app.command()(wavelengths)
 
 @app.command()
 def show(
-    file: Annotated[Path, argument("FILE", "Scene or measurement, a NetCDF file.")],
+    file: Annotated[Path, opt.argument("FILE", "Scene or measurement, a NetCDF file.")],
     at: Annotated[
-        str | None, option("TIME", "Time of the frame, e.g. '400 us'. Default: the middle.")
+        float | None, opt.time("Time of the frame, e.g. '400 us'. Default: the middle.")
     ] = None,
-    plot: Annotated[Path | None, picture_option("Draw the fields at that time")] = None,
+    plot: Annotated[Path | None, opt.picture("Draw the fields at that time")] = None,
 ) -> None:
     """Show the contents of a scene or measurement: samples, times, values and provenance."""
-    from chipglow.io import is_measurement
+    from chipglow.cli.showing import show as show_file
 
-    if is_measurement(file):
-        from chipglow.cli.showing_measurement import show_measurement
-
-        show_measurement(file, at, plot)
-    else:
-        from chipglow.cli.showing import check_shown, show_scene
-
-        check_shown(file)
-        show_scene(file, at, plot)
+    show_file(file, at, plot)
 
 
 @app.command("app")
 def open_app(
     path: Annotated[
         Path | None,
-        argument(
+        opt.argument(
             "[PATH]",
             "Scene or measurement (NetCDF), or results folder. Default: a small bundled scene.",
             show_default=False,
@@ -308,14 +294,16 @@ def open_app(
     ] = None,
     address: Annotated[
         str,
-        option(
+        opt.value(
             "ADDRESS",
             "Address to listen on. Other addresses than loopback admit anyone with the printed "
             "URL, unencrypted.",
         ),
     ] = "127.0.0.1",
-    port: Annotated[int, option("PORT", "Port; 0 for any free one.")] = 0,
-    browser: Annotated[bool, flag("--browser/--no-browser", "Open the page in a browser.")] = True,
+    port: Annotated[int, opt.value("PORT", "Port; 0 for any free one.")] = 0,
+    browser: Annotated[
+        bool, opt.flag("--browser/--no-browser", "Open the page in a browser.")
+    ] = True,
 ) -> None:
     """Change camera settings in a browser and see the error change. Stop with Ctrl-C."""
     import webbrowser
@@ -325,8 +313,7 @@ def open_app(
     def announce(url: str) -> None:
         screen = current()
         screen.say(f"The app is at {url}\nCtrl-C ends it.", {"url": url})
-        if screen.is_for_programs:
-            screen.close()
+        screen.close()
         if browser:
             webbrowser.open(url)
 
@@ -336,21 +323,19 @@ def open_app(
 @app.command()
 def materials(
     name: Annotated[
-        str | None, argument("NAME", "Material to show: a name, or your own file (.yaml).")
+        str | None, opt.argument("NAME", "Material to show: a name, or your own file (.yaml).")
     ] = None,
-    plot: Annotated[Path | None, picture_option("Draw flow stress and heat properties")] = None,
+    plot: Annotated[Path | None, opt.picture("Draw flow stress and heat properties")] = None,
 ) -> None:
     """List the materials, or show the properties of one with their sources."""
-    from chipglow.cli.materials import list_materials, plot_material, show_material
+    from chipglow.cli.materials import list_materials, show_material
 
-    if name is None:
-        if plot is not None:
-            raise ValueError("--plot requires the name of a material")
+    if name is not None:
+        show_material(name, plot)
+    elif plot is not None:
+        raise ValueError("--plot requires the name of a material")
+    else:
         list_materials()
-        return
-    show_material(name)
-    if plot is not None:
-        plot_material(name, plot)
 
 
 @app.command()

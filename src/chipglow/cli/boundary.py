@@ -7,8 +7,7 @@ from typing import Any, Final
 import typer
 from typer.core import TyperGroup
 
-from chipglow.cli import screen
-from chipglow.cli.options import check_outputs
+from chipglow.cli import options as opt, screen
 
 BAD_INPUT: Final = 2
 FAILED: Final = 1
@@ -42,6 +41,11 @@ class Boundary(TyperGroup):
             return done
         except (BrokenPipeError, typer.Exit):
             raise
+        except typer.BadParameter as error:
+            if error.param is None or not error.message:  # a missing value
+                raise
+            message = error.message.removeprefix("Value error, ")
+            raise _ended(f"{error.param.opts[0]}: {message}", BAD_INPUT) from None
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None
         except KeyboardInterrupt as error:
@@ -79,7 +83,7 @@ def _complete(group: TyperGroup, option: Any) -> None:
 
 def _checked(run: Any) -> Callable[..., Any]:
     def checked(**values: Any) -> Any:
-        check_outputs(run, values)
+        opt.check_outputs(run, values)
         return run(**values)
 
     return checked

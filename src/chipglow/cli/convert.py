@@ -5,23 +5,22 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from chipglow.cli.options import Settings, argument, file_option
+from chipglow.cli import options as opt
+from chipglow.cli.screen import current, finish
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording
 
 
 def convert(
-    source: Annotated[Path, argument("SOURCE", "Camera file, or YAML file describing one.")],
+    source: Annotated[Path, opt.argument("SOURCE", "Camera file, or YAML file describing one.")],
     out: Annotated[
-        Path | None, file_option("Measurement to write, NetCDF. Omit it to only inspect the file.")
+        Path | None, opt.file("Measurement to write, NetCDF. Omit it to only inspect the file.")
     ] = None,
-    settings: Settings = None,
+    settings: opt.Settings = None,
 ) -> None:
     """Convert a camera file to a measurement."""
-    from chipglow.cli.finish import finish
-    from chipglow.cli.screen import current
-    from chipglow.cli.showing_measurement import say_measurement
+    from chipglow.cli.showing import say_measurement
     from chipglow.io import is_measurement, write_measurement
     from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
 
@@ -51,10 +50,11 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
     from chipglow.cli.showing import microseconds
 
     frames, rows, columns = recording.signal.shape
+    first, last = map(microseconds, recording.times[[0, -1]])
     yield "camera", recording.camera
-    yield "holds", f"{recording.quantity} as {recording.signal.dtype.name}"
+    yield "values", f"{recording.quantity} as {recording.signal.dtype.name}"
     yield "frames", f"{frames} of {columns} x {rows} pixels"
-    yield "times", f"{microseconds(recording.times[0])} to {microseconds(recording.times[-1])}"
+    yield "times", f"{first} to {last}"
     if recording.integration_time is not None:
         yield "integration time", microseconds(recording.integration_time)
     if recording.range_name is not None:

@@ -1,24 +1,38 @@
 """The command ``chipglow cut``: the cutting simulation, and optionally a movie of it."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import sys
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
+from math import isfinite, nan
 from pathlib import Path
 from shutil import copyfile
+from typing import Final
 
 from rich.console import Console
 
-from chipglow.cli.inertia import say_of_cut
-from chipglow.cli.progress import progress_bars, say_where_it_starts
+from chipglow.cli.progress import confirm_cost, progress_bars
+from chipglow.cli.screen import current
 from chipglow.io import atomic_path, open_scene
-from chipglow.laboratory.chip import inertia, resolution_warnings
+from chipglow.laboratory.chip import Inertia, inertia, resolution_warnings
 from chipglow.scene import Frame
 from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
+from chipglow.text import Notes
+
+_INERTIA: Final = {
+    "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
+    "force_fraction": "momentum flux {:.2%} of the mean cutting force",
+}
 
 
 def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agreed: bool) -> None:
     """Run the cut, or take it from the cache, and write the scene."""
-    with atomic_path(out) as temporary, _movie(study, preview) as on_preview:
-        say_where_it_starts(study, resume, agreed)
+    movie: AbstractContextManager[Callable[[Frame], None] | None] = nullcontext()
+    if preview is not None:
+        from chipglow.report import cut_movie
+
+        movie = cut_movie(preview, preview_raster(study), study.cutting.simulation())
+    with atomic_path(out) as temporary, movie as on_preview:
+        confirm_cost(study, resume, agreed)
         if on_preview:
             _announce_preview(study, resume)
         with progress_bars() as progress:
@@ -26,23 +40,20 @@ def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agree
     scene = open_scene(out)
     say_of_cut(inertia(scene), resolution_warnings(scene))
     scene.data.close()
+    current().file(out)
+    if preview is not None:
+        current().file(preview)
 
 
-@contextmanager
-def _movie(study: Study, path: Path | None) -> Iterator[Callable[[Frame], None] | None]:
-    if path is None:
-        yield None
-        return
-    from chipglow.io import check_movie_path
-
-    try:
-        check_movie_path(path)
-    except ValueError as error:
-        raise ValueError(f"--preview: {error}") from None
-    from chipglow.report import cut_movie
-
-    with cut_movie(path, preview_raster(study), study.cutting.simulation()) as on_preview:
-        yield on_preview
+def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
+    """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
+    fractions = {name: getattr(inertia, name, nan) for name in _INERTIA}
+    known = {name: fraction for name, fraction in fractions.items() if isfinite(fraction)}
+    if known:
+        texts = ", ".join(_INERTIA[name].format(fraction) for name, fraction in known.items())
+        current().say(f"Scaled mass after the build-up: {texts}.", known, sys.stderr)
+    own = [inertia.warning] if inertia and inertia.warning else []
+    current().notes(Notes(warnings=[*own, *warnings]))
 
 
 def _announce_preview(study: Study, resume: bool) -> None:

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
+from chipglow.cli.screen import current, figure, finish
 from chipglow.cutting import material_file, material_names
 from chipglow.text import Notes
 
@@ -27,8 +26,10 @@ def _row(name: str) -> dict[str, str]:
     }
 
 
-def show_material(name: str) -> None:
-    """Print all properties of a material, with units and numbered sources."""
+def show_material(name: str, plot: Path | None) -> None:
+    """Print all properties of a material, with units and numbered sources; optionally draw it."""
+    from chipglow.report.materials import material_figure
+
     material = material_file(name)
     sources = list(dict.fromkeys(number.source for number in material.properties))
     rows = [
@@ -43,14 +44,9 @@ def show_material(name: str) -> None:
     screen = current()
     screen.say(f"{material.name}: {material.description}")
     screen.heading()
-    screen.table("properties", pd.DataFrame(rows), ["field", "value", "note"])
+    columns = ["field", "value", "note"]
+    screen.table("properties", pd.DataFrame(rows), columns, unbroken=("field",))
     screen.heading()
     for count, source in enumerate(sources, 1):
         screen.heading(f"({count}) {source}")
-
-
-def plot_material(name: str, path: Path) -> None:
-    """Draw a material."""
-    from chipglow.report.materials import material_figure
-
-    finish(Notes(), (path, figure(material_figure, material_file(name))))
+    finish(Notes(), (plot, figure(material_figure, material)))

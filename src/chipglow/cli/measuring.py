@@ -5,14 +5,15 @@ from math import floor
 from pathlib import Path
 
 from chipglow.camera import Measurement
-from chipglow.cli.finish import finish
 from chipglow.cli.progress import progress_bars
-from chipglow.cli.times import parse_instant
+from chipglow.cli.screen import finish
 from chipglow.io import open_scene, write_measurement
 from chipglow.study import Study, fit
 
 
-def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
+def measure_scene(
+    path: Path, study: Study, out: Path, start: float | None, chip: str | None
+) -> None:
     """Measure a scene with a study's camera and write the measurement."""
     fitted = fit(study, open_scene(path))
     camera = study.camera.on(fitted.scene.raster, study.seed)
@@ -20,7 +21,7 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
-    first = float(scene.times[0]) if start is None else parse_instant("--start", start)
+    first = float(scene.times[0]) if start is None else start
     duration = camera.frame_duration(scene.raster)
     left = float(scene.times[-1]) + scene.frame_spacing - first - duration
     count = max(floor(left * camera.frame_rate) + 1, 1)

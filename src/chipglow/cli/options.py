@@ -5,6 +5,7 @@ What a command writes is checked before it does anything: see `check_outputs`.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from functools import partial
 from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, get_args
@@ -17,9 +18,30 @@ def argument(metavar: str, text: str, **settings: Any) -> Any:
     return typer.Argument(metavar=metavar, help=text, **settings)
 
 
-def option(metavar: str, text: str, *names: str) -> Any:
+def value(metavar: str, text: str, *names: str) -> Any:
     """Return an option with its placeholder and help, named after its parameter by default."""
     return typer.Option(*names, metavar=metavar, help=text)
+
+
+def _quantity_option(metavar: str, kind: str, text: str) -> Any:
+    """Return the option of a quantity with a unit, parsed to SI by a constant of the units."""
+
+    def parse(value: str | float) -> float:
+        from chipglow.quantities import units
+
+        try:
+            return value if isinstance(value, float) else getattr(units, kind).parse(value)
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+
+    return typer.Option(metavar=metavar, help=text, parser=parse, show_default=False)
+
+
+temperature = partial(_quantity_option, "TEMPERATURE", "TEMPERATURE")
+kelvins = partial(_quantity_option, "KELVINS", "TEMPERATURE_DIFFERENCE")
+length = partial(_quantity_option, "LENGTH", "LENGTH")
+time = partial(_quantity_option, "TIME", "INSTANT")
+duration = partial(_quantity_option, "TIME", "TIME")
 
 
 def flag(name: str, text: str) -> Any:
@@ -34,8 +56,18 @@ StudyFile: TypeAlias = Annotated[Path, argument("STUDY", "Study, a YAML file.")]
 SceneFile: TypeAlias = Annotated[Path, argument("SCENE", "Scene, a NetCDF file.")]
 Settings: TypeAlias = Annotated[
     list[str] | None,
-    option(
-        "FIELD=VALUE", "Set a field of the description, e.g. 'pitch=6 um'. Repeatable.", "--set"
+    value("FIELD=VALUE", "Set a field of the description, e.g. 'pitch=6 um'. Repeatable.", "--set"),
+]
+RegionsFile: TypeAlias = Annotated[Path, value("FILE", "Regions of the image, a YAML file.")]
+ReflectedUncertainty: TypeAlias = Annotated[
+    float | None, kelvins("Standard uncertainty of the reflected temperature, e.g. '2 K'.")
+]
+Drift: TypeAlias = Annotated[
+    float | None,
+    value(
+        "NUMBER",
+        "Relative standard uncertainty of the radiance between recordings, e.g. 0.01. Default: "
+        "from several images at one temperature.",
     ),
 ]
 Yes: TypeAlias = Annotated[
@@ -43,16 +75,15 @@ Yes: TypeAlias = Annotated[
 ]
 Resume: TypeAlias = Annotated[bool, flag("--resume", "Resume an interrupted cut.")]
 ReferenceFrame: TypeAlias = Annotated[
-    str | None,
-    option(
-        "TIME",
+    float | None,
+    time(
         "Measured frame with the fully developed band. Default: the place of the given curve, or "
         "the hottest and longest band that begins near the cutting edge.",
     ),
 ]
 ToolChoice: TypeAlias = Annotated[
     str | None,
-    option(
+    value(
         "FILE|found",
         "Tool, a YAML file with the keys of a study's cutting.tool and tip, or 'found' to detect "
         "the rake face in the image. Default: the tool that the measurement states.",
@@ -60,34 +91,36 @@ ToolChoice: TypeAlias = Annotated[
 ]
 
 
-def picture_option(what: str) -> Any:
-    """Return the option of a figure to draw."""
-    return _output(f"{what}, PNG, PDF or SVG.", _check_picture)
-
-
-def table_option(what: str) -> Any:
-    """Return the option of results to write as a table or as arrays."""
-    return _output(f"{what}, .csv or .nc.", _check_table)
-
-
-def file_option(what: str, *endings: str) -> Any:
-    """Return the option of another file to write, with the allowed endings of its name."""
-
-    def check(option: str, path: Path) -> None:
-        if endings and path.suffix.lower() not in endings:
-            raise ValueError(f"{option}: {path}, expected a file that ends in {endings[0]}")
-
-    return _output(what, check)
-
-
-def folder_option(what: str) -> Any:
-    """Return the option of a results folder to write."""
-    return typer.Option(metavar="DIR", help=what, file_okay=False, writable=True)
-
-
 Force: TypeAlias = Annotated[
-    bool, typer.Option("--force", help="Keep files in the folder that chipglow did not write.")
+    bool, flag("--force", "Keep files in the folder that chipglow did not write.")
 ]
+
+
+def file(text: str, *endings: str) -> Any:
+    """Return the option of a file to write, with the allowed endings of its name."""
+
+    def check(option: typer.CallbackParam, path: Path | None) -> Path | None:
+        if path is not None and endings and path.suffix.lower() not in endings:
+            allowed = " or ".join(filter(None, (", ".join(endings[:-1]), endings[-1])))
+            raise ValueError(f"{option.opts[0]}: {path}, expected a file that ends in {allowed}")
+        return path
+
+    return typer.Option(metavar="FILE", help=text, callback=check, writable=True)
+
+
+def picture(text: str) -> Any:
+    """Return the option of a figure to draw."""
+    return file(f"{text}, PNG, PDF or SVG.", ".png", ".pdf", ".svg")
+
+
+def table(text: str) -> Any:
+    """Return the option of results to write as a table or as arrays."""
+    return file(f"{text}, .csv or .nc.", ".csv", ".nc")
+
+
+def folder(text: str) -> Any:
+    """Return the option of a results folder to write."""
+    return typer.Option(metavar="DIR", help=text, file_okay=False, writable=True)
 
 
 def check_outputs(command: Callable[..., Any], values: Mapping[str, Any]) -> None:
@@ -104,9 +137,12 @@ def check_outputs(command: Callable[..., Any], values: Mapping[str, Any]) -> Non
 
 
 def _outputs(command: Callable[..., Any]) -> dict[str, Any]:
-    parameters = signature(command).parameters
-    options = {name: (*get_args(one.annotation), None)[1] for name, one in parameters.items()}
-    return {name: one for name, one in options.items() if getattr(one, "writable", False)}
+    return {
+        name: option
+        for name, parameter in signature(command).parameters.items()
+        for option in get_args(parameter.annotation)[1:]
+        if getattr(option, "writable", False)
+    }
 
 
 def _inputs(value: Any) -> Iterator[Path]:
@@ -150,26 +186,3 @@ def _check_folder(path: Path, inputs: Iterable[Path], force: bool) -> None:
         place = other.resolve()
         if place.is_relative_to(target) and place not in ours:
             raise ValueError(f"{path}: holds the input {other}, expected another folder")
-
-
-def _output(help_text: str, check: Callable[[str, Path], None]) -> Any:
-    def checked(option: typer.CallbackParam, path: Path | None) -> Path | None:
-        if path is not None:
-            from chipglow.io.atomic import check_output
-
-            check(option.opts[0], path)
-            check_output(path)
-        return path
-
-    return typer.Option(metavar="FILE", help=help_text, callback=checked, writable=True)
-
-
-def _check_picture(option: str, path: Path) -> None:
-    if path.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{option}: {path}, expected a file that ends in .png, .pdf or .svg")
-
-
-def _check_table(_: str, path: Path) -> None:
-    from chipglow.io import check_table_path
-
-    check_table_path(path)

@@ -7,15 +7,7 @@ from typing import Final
 
 import typer
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskID,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress, TaskID, TimeElapsedColumn
 
 from chipglow.study import (
     Progress as Report,
@@ -26,7 +18,8 @@ from chipglow.study import (
     kept_progress,
 )
 
-_ROOM: Final = 4
+_MARGIN: Final = 4
+"""Columns that a bar leaves free."""
 
 MUCH_TIME: Final = 300.0
 """Expected time of a cut in s above which the user is asked first."""
@@ -35,7 +28,7 @@ MUCH_DISK: Final = 2e9
 """Expected size of the cached scene in bytes above which the user is asked first."""
 
 
-def say_where_it_starts(study: Study, resume: bool, agreed: bool) -> None:
+def confirm_cost(study: Study, resume: bool, agreed: bool) -> None:
     """Print the state of earlier runs and the expected cost; ask before a large one."""
     console = Console(stderr=True)
     if is_cut(study):
@@ -76,18 +69,11 @@ def say_checkpoint(what: str, progress: float, resume: bool) -> None:
 @contextmanager
 def progress_bars() -> Iterator[Report]:
     """Show a progress bar on stderr for each step that is reported."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
     console = Console(stderr=True)
     # Where Ctrl-C shows as ^C behind a bar that fills its line, the next bar would be one too low.
-    console.width = max(console.width - _ROOM, _ROOM)
-    with Progress(*columns, console=console) as bars:
+    console.width = max(console.width - _MARGIN, _MARGIN)
+    elapsed = "left,", TimeElapsedColumn(), "elapsed"
+    with Progress(*Progress.get_default_columns(), *elapsed, console=console) as bars:
         tasks: dict[str, TaskID] = {}
 
         def report(step: str, fraction: float) -> None:

@@ -4,63 +4,47 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from chipglow.cli.options import (
-    MeasurementFile,
-    Settings,
-    ToolChoice,
-    option,
-    picture_option,
-    table_option,
-)
+from chipglow.cli import options as opt
+from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
     from chipglow.camera import Measurement
-    from chipglow.cli.screen import Screen
     from chipglow.laboratory.chip import RakeGrid
 
 
 def rake(
-    measurement: MeasurementFile,
-    tool: ToolChoice = None,
-    frame: Annotated[str, option("N|all", "Index of the frame, or all.")] = "all",
+    measurement: opt.MeasurementFile,
+    tool: opt.ToolChoice = None,
+    frame: Annotated[str, opt.value("N|all", "Index of the frame, or all.")] = "all",
     at: Annotated[
-        str | None, option("TIME", "Use only the frame nearest to this time, e.g. '2 ms'.")
+        float | None, opt.time("Use only the frame nearest to this time, e.g. '2 ms'.")
     ] = None,
-    pixels: Annotated[float, option("NUMBER", "Side of a square in pixels.")] = 3.0,
-    depth: Annotated[str, option("LENGTH", "Depth of the grid into the chip.")] = "90 um",
+    pixels: Annotated[float, opt.value("NUMBER", "Side of a square in pixels.")] = 3.0,
+    depth: Annotated[float, opt.length("Depth of the grid into the chip. Default: 90 um.")] = 90e-6,
     position: Annotated[
-        str | None,
-        option(
-            "LENGTH",
+        float | None,
+        opt.length(
             "Standard uncertainty of the tool's position along and across its face. Default: that "
             "of a found tool, otherwise none.",
         ),
     ] = None,
-    out: Annotated[Path | None, table_option("Write the squares of every frame")] = None,
-    plot: Annotated[
-        Path | None, picture_option("Draw the grid on the image and its profiles")
-    ] = None,
-    settings: Settings = None,
+    out: Annotated[Path | None, opt.table("Write the squares of every frame")] = None,
+    plot: Annotated[Path | None, opt.picture("Draw the grid on the image and its profiles")] = None,
+    settings: opt.Settings = None,
 ) -> None:
     """Average the radiance temperature in squares along the rake face (the paper's Figure 7)."""
-    from chipglow.cli.finish import figure, finish
-    from chipglow.cli.screen import current
     from chipglow.laboratory.chip import ToolUncertainty, chosen_tool, rake_grid
     from chipglow.laboratory.chip.figures import draw_rake_grid
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
-    from chipglow.quantities.option import parse
-    from chipglow.quantities.units import LENGTH
 
-    reach = parse("--depth", LENGTH, depth)
-    stated = parse("--position", LENGTH, position)
-    given = None if stated is None else ToolUncertainty(stated, stated)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
-    screen = current()
     chosen = chosen_tool(measured, tool, position)
-    grid = rake_grid(measured, chosen.tool, pixels, reach, frames, given or chosen.uncertainty)
-    _print(screen, grid)
+    given = chosen.uncertainty if position is None else ToolUncertainty(position, position)
+    grid = rake_grid(measured, chosen.tool, pixels, depth, frames, given)
+    _print_squares(grid)
+    screen = current()
     screen.budget("budget", grid.frame_estimate, "Standard uncertainty of the squares' means")
     screen.remarks(chosen.notes + grid.notes)
     finish(
@@ -70,7 +54,7 @@ def rake(
     )
 
 
-def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:
+def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[int] | None:
     """Return the indices of the chosen frames, or None for all."""
     from chipglow.cli.times import frame_at
 
@@ -86,7 +70,7 @@ def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int]
     return [int(frame)]
 
 
-def _print(screen: "Screen", grid: "RakeGrid") -> None:
+def _print_squares(grid: "RakeGrid") -> None:
     several = grid.times.size > 1
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"
     squares = grid.mean_frame()
@@ -98,4 +82,4 @@ def _print(screen: "Screen", grid: "RakeGrid") -> None:
         for n, depth in enumerate(depths)
     }
     title = f"radiance temperature / °C ± standard deviation {over}"
-    screen.table("squares", wide.reset_index(), columns, title, columns.values())
+    current().table("squares", wide.reset_index(), columns, title, columns.values())

@@ -1,61 +1,38 @@
 """The command ``chipglow register``: infrared images on visible pictures."""
 
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
-from chipglow.cli.options import Settings, argument, file_option, option, picture_option
+from chipglow.cli import options as opt
+from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from chipglow.camera import Measurement
-    from chipglow.cli.screen import Screen
-    from chipglow.laboratory.registration import (
-        DotFit,
-        ImageFit,
-        PointFit,
-        RecordingAlignment,
-        Registration,
-    )
+    from chipglow.laboratory import registration as lab
 
-    Points = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
-class ModelName(StrEnum):
-    """Types of the map."""
-
-    SIMILARITY = "similarity"
-    AFFINE = "affine"
-    HOMOGRAPHY = "homography"
-
-
-class MethodName(StrEnum):
-    """Ways to find the map."""
-
-    POINTS = "points"
-    DOTS = "dots"
-    MUTUAL_INFORMATION = "mutual-information"
+Model: TypeAlias = Literal["similarity", "affine", "homography"]
+Method: TypeAlias = Literal["points", "dots", "mutual-information"]
 
 
 def register(
-    infrared: Annotated[Path, argument("INFRARED", "Measurement file.")],
-    visible: Annotated[Path, argument("VISIBLE", "Image, or a visible camera's file (CINE, ...).")],
+    infrared: Annotated[Path, opt.argument("INFRARED", "Measurement file.")],
+    visible: Annotated[
+        Path, opt.argument("VISIBLE", "Image, or a visible camera's file (CINE, ...).")
+    ],
     points: Annotated[
         Path | None,
-        option(
+        opt.value(
             "FILE",
-            "Points seen in both, CSV: x_um,y_um,visible_column,visible_row, or infrared_column,"
-            "infrared_row and the same.",
+            "Points seen in both, CSV with columns x_um, y_um (or infrared_column, infrared_row), "
+            "visible_column, visible_row.",
         ),
     ] = None,
-    model: Annotated[ModelName, typer.Option(help="Type of the map.")] = ModelName.AFFINE,
+    model: Annotated[Model, typer.Option(help="Type of the map.")] = "affine",
     method: Annotated[
-        MethodName | None,
+        Method | None,
         typer.Option(
             help="Default: points if given, otherwise mutual-information; dots are those of a "
             "target, e.g. a heated plate with holes."
@@ -63,115 +40,99 @@ def register(
     ] = None,
     known: Annotated[
         Path | None,
-        option("FILE", "Use a map written by --out, e.g. of a target.", "--map"),
+        opt.value("FILE", "Use a map written by --out, e.g. of a target.", "--map"),
     ] = None,
     tool: Annotated[
         Path | None,
-        option(
+        opt.value(
             "FILE",
             "Tool to draw, a YAML file with the keys of a study's cutting.tool and tip. Default: "
             "the tool that the measurement states, if any.",
         ),
     ] = None,
-    frame: Annotated[int, option("N", "Index of the infrared frame.")] = 0,
-    visible_frame: Annotated[int, option("N", "Index of the visible frame.")] = 0,
+    frame: Annotated[int, opt.value("N", "Index of the infrared frame.")] = 0,
+    visible_frame: Annotated[int, opt.value("N", "Index of the visible frame.")] = 0,
     align: Annotated[
         str | None,
-        option(
+        opt.value(
             "REGION",
             "Also find the clock offset from the mean brightness of a region (left, bottom, right, "
             "top), e.g. '-90 um, 20 um, -10 um, 120 um'.",
         ),
     ] = None,
     visible_interval: Annotated[
-        str | None, option("TIME", "Interval of the visible frames, if the file does not state it.")
+        float | None,
+        opt.duration("Interval of the visible frames, if the file does not state it."),
     ] = None,
     out: Annotated[
-        Path | None, file_option("Write the map for later use, .yaml.", ".yaml", ".yml")
+        Path | None, opt.file("Write the map for later use, .yaml.", ".yaml", ".yml")
     ] = None,
     pairs: Annotated[
         Path | None,
-        file_option("With --align, write the visible frames of each infrared frame, CSV.", ".csv"),
+        opt.file("With --align, write the visible frames of each infrared frame, CSV.", ".csv"),
     ] = None,
-    overlay: Annotated[Path | None, picture_option("Draw both images overlaid")] = None,
-    blink: Annotated[Path | None, file_option("Write both images in turn, .gif.", ".gif")] = None,
-    settings: Settings = None,
+    overlay: Annotated[Path | None, opt.picture("Draw both images overlaid")] = None,
+    blink: Annotated[Path | None, opt.file("Write both images in turn, .gif.", ".gif")] = None,
+    settings: opt.Settings = None,
 ) -> None:
     """Map each point of an infrared image to a visible image."""
-    from chipglow.cli.finish import figure, finish
-    from chipglow.cli.screen import current
+    from chipglow.laboratory import registration as lab
     from chipglow.laboratory.chip import load_tool
     from chipglow.laboratory.measurement import load_measurement
-    from chipglow.laboratory.registration import (
-        align_recordings,
-        fit_points,
-        load_registration,
-        read_pictures,
-        read_points,
-        write_registration,
-    )
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
-    from chipglow.laboratory.registration.input_files import write_blink
+    from chipglow.laboratory.registration.input_files import PICTURE_SUFFIXES, write_blink
     from chipglow.laboratory.result_file import write_frame
-    from chipglow.quantities.option import parse
-    from chipglow.quantities.units import TIME
 
     if pairs is not None and align is None:
         raise ValueError("--pairs requires --align")
     _check_method(method, points, known)
-    interval = parse("--visible-interval", TIME, visible_interval)
     region = None if align is None else _region(align)
-    measured, seen = load_measurement(infrared, settings or ()), read_pictures(visible, interval)
-    if region is not None:
-        _check_times(visible, interval)
+    if region and visible_interval is None and visible.suffix.lower() in PICTURE_SUFFIXES:
+        raise ValueError(f"--align requires --visible-interval: {visible} contains no times")
+    measured = load_measurement(infrared, settings or ())
+    pictures = lab.read_pictures(visible, visible_interval)
     _check_frame("--frame", frame, measured.times.size)
-    _check_frame("--visible-frame", visible_frame, seen.times.size)
-    picture = seen.signal[visible_frame]
+    _check_frame("--visible-frame", visible_frame, pictures.times.size)
+    picture = pictures.signal[visible_frame]
     outline = measured.tool if tool is None else load_tool(tool)
-    screen = current()
-    fit: PointFit | DotFit | ImageFit | None = None
+    fit: lab.PointFit | lab.DotFit | lab.ImageFit | None = None
     if known is not None:
-        found = load_registration(known)
+        registration = lab.load_registration(known)
     else:
         if points is not None:
-            fit = fit_points(*read_points(points, measured.raster, picture.shape), model.value)
+            fit = lab.fit_points(*lab.read_points(points, measured.raster, picture.shape), model)
         else:
-            fit = _by_images(measured, frame, picture, model, method)
-        _print_fit(screen, fit)
-        found = fit.registration
-    _say(screen, found, measured)
-    notes = found.notes + measured.notes + seen.notes.about(str(visible))
+            by_images = lab.fit_dots if method == "dots" else lab.fit_images
+            fit = by_images(lab.infrared_radiance(measured, frame), measured.raster, picture, model)
+        _print_fit(fit)
+        registration = fit.registration
+    _print_registration(registration, measured)
+    notes = registration.notes + measured.notes + pictures.notes.about(str(visible))
     aligned = []
     if region is not None:
-        clocks = align_recordings(found, measured, seen, region)
-        _say_clocks(screen, clocks)
+        clocks = lab.align_recordings(registration, measured, pictures, region)
+        _print_clocks(clocks)
         notes += clocks.notes
         aligned = [(pairs, partial(write_frame, clocks.to_frame()))]
     temperature = measured.radiance_temperature()[frame]
-    shown = found, temperature, measured.raster, picture, outline
+    shown = registration, temperature, measured.raster, picture, outline
+    marks = fit.points if isinstance(fit, lab.DotFit) else fit
+    marked = (marks.positions, marks.pixels) if isinstance(marks, lab.PointFit) else None
     finish(
         notes,
         *aligned,
-        (out, partial(write_registration, found)),
-        (overlay, figure(draw_registration, *shown, _marked(fit))),
+        (out, partial(lab.write_registration, registration)),
+        (overlay, figure(draw_registration, *shown, marked)),
         (blink, lambda path: write_blink(blink_pictures(*shown), path)),
     )
 
 
-def _marked(fit: "PointFit | DotFit | ImageFit | None") -> "Points | None":
-    """Points to draw on both images."""
-    from chipglow.laboratory.registration import DotFit, PointFit
-
-    points = fit.points if isinstance(fit, DotFit) else fit
-    return (points.positions, points.pixels) if isinstance(points, PointFit) else None
-
-
-def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
+def _check_method(method: Method | None, points: Path | None, known: Path | None) -> None:
     if known is not None and (points is not None or method is not None):
         raise ValueError("--map cannot be combined with --points or --method")
-    if method == MethodName.POINTS and points is None:
+    if method == "points" and points is None:
         raise ValueError("--method points requires --points")
-    if method not in (None, MethodName.POINTS) and points is not None:
+    if method not in (None, "points") and points is not None:
         raise ValueError(f"--method {method} cannot be combined with --points")
 
 
@@ -195,92 +156,68 @@ def _check_frame(option: str, number: int, count: int) -> None:
         raise ValueError(f"{option}: {number}, expected 0 to {count - 1}")
 
 
-def _check_times(path: Path, interval: float | None) -> None:
-    from chipglow.laboratory.registration.input_files import PICTURE_SUFFIXES
+def _print_fit(fit: "lab.PointFit | lab.DotFit | lab.ImageFit") -> None:
+    from chipglow.laboratory import registration as lab
 
-    if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
-        raise ValueError(f"--align requires --visible-interval: {path} contains no times")
-
-
-def _by_images(
-    measured: "Measurement",
-    frame: int,
-    picture: "NDArray[Any]",
-    model: ModelName,
-    method: MethodName | None,
-) -> "DotFit | ImageFit":
-    from chipglow.laboratory.registration import fit_dots, fit_images, infrared_radiance
-
-    fit = fit_dots if method == MethodName.DOTS else fit_images
-    return fit(infrared_radiance(measured, frame), measured.raster, picture, model.value)
-
-
-def _print_fit(screen: "Screen", fit: "PointFit | DotFit | ImageFit") -> None:
-    from chipglow.laboratory.registration import DotFit, ImageFit
-
-    if isinstance(fit, ImageFit):
+    screen = current()
+    if isinstance(fit, lab.ImageFit):
         screen.say(
             f"Mutual information: {fit.information:.3f} bits a pixel; score of the placement "
             f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
             f"{fit.by_chance.max():.3g}.",
             {"mutual_information_bits": fit.information, "placement_score": fit.placement},
         )
-    else:
-        _print_points(screen, fit.points if isinstance(fit, DotFit) else fit)
-    if isinstance(fit, DotFit):
-        match = len(fit.points.pixels)
+        return
+    points = fit.points if isinstance(fit, lab.DotFit) else fit
+    columns = ["point", "x_um", "y_um", "visible_column", "visible_row", "residual"]
+    screen.table("points", points.to_frame(), columns)
+    freedom = points.registration.degrees_of_freedom
+    screen.say(
+        f"Scatter of the points: {points.scatter:.2f} visible pixels in column and in row, with "
+        f"{freedom:.0f} degrees of freedom.",
+        {"scatter_pixel": points.scatter, "degrees_of_freedom": freedom},
+    )
+    if isinstance(fit, lab.DotFit):
+        match = len(points.pixels)
         for name, dots in (("Infrared", fit.infrared), ("Visible", fit.visible)):
             screen.say(
-                f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a "
+                f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots with a "
                 f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match.",
                 {f"{name.lower()}_dots": len(dots.pixels), "matching_dots": match},
             )
 
 
-def _print_points(screen: "Screen", fit: "PointFit") -> None:
-    columns = ["point", "x_um", "y_um", "visible_column", "visible_row", "residual"]
-    screen.table("points", fit.to_frame(), columns)
-    screen.say(
-        f"Scatter of the points: {fit.scatter:.2f} visible pixels in column and in row, with "
-        f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom.",
-        {
-            "scatter_pixel": fit.scatter,
-            "degrees_of_freedom": fit.registration.degrees_of_freedom,
-        },
-    )
-
-
-def _say(screen: "Screen", found: "Registration", measured: "Measurement") -> None:
+def _print_registration(registration: "lab.Registration", measured: "Measurement") -> None:
     raster = measured.raster
-    size, turn, mirrored = found.geometry(raster)
-    typical, worst = found.uncertainty(raster)
-    screen.say(
-        f"A visible pixel is {1e6 * size:.4g} um in the middle of the infrared image, turned by "
+    size, turn, mirrored = registration.geometry(raster)
+    typical, worst = registration.uncertainty(raster)
+    current().say(
+        f"A visible pixel is {1e6 * size:.4g} um at the centre of the infrared image, rotated by "
         f"{turn:.2f} degrees{', mirrored' if mirrored else ''}.",
         {"visible_pixel_um": 1e6 * size, "rotation_deg": turn, "mirrored": mirrored},
     )
-    screen.say(
-        f"Standard uncertainty of a mapped position: {1e6 * typical:.2g} um "
-        f"({typical / raster.spacing:.2g} infrared pixels) in the median, {1e6 * worst:.2g} um "
-        "at most.",
+    current().say(
+        f"Standard uncertainty of a mapped position: median {1e6 * typical:.2g} um "
+        f"({typical / raster.spacing:.2g} infrared pixels), maximum {1e6 * worst:.2g} um.",
         {"position_uncertainty_um": 1e6 * typical, "greatest_position_uncertainty_um": 1e6 * worst},
     )
 
 
-def _say_clocks(screen: "Screen", found: "RecordingAlignment") -> None:
-    unsure = float(found.clocks.covariance[0, 0]) ** 0.5
-    screen.say(
-        f"Visible clock = infrared clock + {1e6 * found.clocks.offset:.2f} us, standard "
-        f"uncertainty {1e6 * unsure:.2g} us, correlation {found.clocks.correlation:.3f}.",
+def _print_clocks(alignment: "lab.RecordingAlignment") -> None:
+    clocks = alignment.clocks
+    offset, uncertainty = 1e6 * clocks.offset, 1e6 * float(clocks.covariance[0, 0]) ** 0.5
+    current().say(
+        f"Visible clock = infrared clock + {offset:.2f} us, standard uncertainty "
+        f"{uncertainty:.2g} us, correlation {clocks.correlation:.3f}.",
         {
-            "clock_offset_us": 1e6 * found.clocks.offset,
-            "clock_offset_uncertainty_us": 1e6 * unsure,
-            "correlation": found.clocks.correlation,
+            "clock_offset_us": offset,
+            "clock_offset_uncertainty_us": uncertainty,
+            "correlation": clocks.correlation,
         },
     )
-    empty = sum(numbers.size == 0 for numbers in found.visible_frames)
+    empty = sum(numbers.size == 0 for numbers in alignment.visible_frames)
     if empty:
-        screen.say(
-            f"{empty} of {found.infrared_times.size} infrared frames have no visible one.",
+        current().say(
+            f"{empty} of {alignment.infrared_times.size} infrared frames have no visible frame.",
             {"frames_without_visible": empty},
         )

@@ -11,14 +11,14 @@ from pathlib import Path
 import pandas as pd
 
 from chipglow.analysis import Analysis
-from chipglow.cli.inertia import say_of_cut
-from chipglow.cli.progress import progress_bars, say_where_it_starts
+from chipglow.cli.cutting import say_of_cut
+from chipglow.cli.progress import confirm_cost, progress_bars
 from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
 from chipglow.report import result_rows, write_report
 from chipglow.report.paper import CITATION
-from chipglow.study import Progress, Study, errors, run, study_text
+from chipglow.study import Progress, Study, run, study_text
 from chipglow.text import Notes
 
 
@@ -26,67 +26,22 @@ def write_results(
     study: Study,
     folder: Path,
     force: bool,
-    resume: bool,
-    agreed: bool,
+    resume: bool = False,
+    agreed: bool = False,
     remarks: Sequence[str] = (),
     steady_tool: bool = False,
+    compute: Callable[..., Analysis] = run,
 ) -> None:
-    """Run a study, write its report and print its results.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    folder : Path
-        Folder of the results; it appears when they are complete.
-    force : bool
-        Whether to keep files in the folder that chipglow did not write. By default such a folder
-        is refused before anything is computed.
-    resume : bool
-        Whether to resume a cut that an earlier run left unfinished.
-    agreed : bool
-        Whether the user agreed beforehand to the cost.
-    remarks : sequence of str
-        Remarks to consider before quoting a number: printed, and on the page.
-    steady_tool : bool
-        Whether to compare with the same study with a tool at steady-state temperature.
-    """
-    beside = study.with_steady_tool() if steady_tool else None
-    _write(study, folder, force, resume, agreed, remarks, run, beside)
-
-
-def write_errors(study: Study, folder: Path, force: bool) -> None:
-    """Write and print the measurement error of a study's scene, of a cut or not.
-
-    Parameters
-    ----------
-    study : Study
-        The study.
-    folder, force
-        As for `write_results`.
-    """
-    _write(study, folder, force, False, True, (), errors)
-
-
-def _write(
-    study: Study,
-    folder: Path,
-    force: bool,
-    resume: bool,
-    agreed: bool,
-    remarks: Sequence[str],
-    compute: Callable[..., Analysis],
-    beside: Study | None = None,
-) -> None:
+    """Analyse a study, write its report and print its results."""
+    steady_study = study.with_steady_tool() if steady_tool else None
     with atomic_folder(folder, force) as temporary:
-        if study.scene is None:
-            say_where_it_starts(study, resume, agreed)
-        if beside is not None:
-            say_where_it_starts(beside, resume, agreed)
+        for each in (study, steady_study):
+            if each is not None and each.scene is None:
+                confirm_cost(each, resume, agreed)
         assumed: list[str] = []
         with progress_bars() as progress:
             analysis = compute(study, progress, resume, assumed.append)
-            steady, failed = _steady(beside, progress, resume)
+            steady, failed = _steady(steady_study, progress, resume)
             analysis = replace(analysis, failed={**analysis.failed, **failed})
             progress("report", 0.0)
             titled = _titled(study, analysis)
@@ -107,24 +62,24 @@ def _write(
         screen.say(remark)
     failures = [f"{title} failed: {reason}" for title, reason in analysis.failed.items()]
     screen.notes(Notes(assumed, [*analysis.warnings, *failures]))
-    if analysis.cut is not None:
-        say_of_cut(analysis.cut.forces.inertia if analysis.cut.forces else None)
-    screen.missing(analysis.missing)
-    if screen.is_for_programs:
-        text = (folder / "summary.json").read_text(encoding="utf-8")
-        screen.values({"summary": json.loads(text)})
+    if analysis.cut is not None and analysis.cut.forces:
+        say_of_cut(analysis.cut.forces.inertia)
+    screen.notes(Notes(), analysis.missing)
+    if screen.json:
+        summary = (folder / "summary.json").read_text(encoding="utf-8")
+        screen.values({"summary": json.loads(summary)})
     screen.file(folder / report.relative_to(temporary), "Report")
     screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}. {CITATION}")
 
 
 def _steady(
-    beside: Study | None, progress: Progress, resume: bool
+    study: Study | None, progress: Progress, resume: bool
 ) -> tuple[Analysis | None, Mapping[str, str]]:
     """Return the analysis with a steady tool, or why it failed; each step is named so."""
-    if beside is None:
+    if study is None:
         return None, {}
     try:
-        analysis = run(beside, lambda step, done: progress(f"{step}, steady tool", done), resume)
+        analysis = run(study, lambda step, done: progress(f"{step}, steady tool", done), resume)
     except ValueError as error:
         return None, {"steady tool": str(error)}
     if analysis.cut is None:
@@ -160,7 +115,7 @@ def _print_table(analysis: Analysis, study: Study) -> None:
     names = {
         "quantity": "quantity",
         **({"the paper": "paper"} if compared else {"reference": "reference"}),
-        "here": "mean",
+        "this study": "mean",
         "95 % interval": "interval",
         **({"differs": "differs"} if compared else {}),
     }

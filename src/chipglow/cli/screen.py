@@ -3,15 +3,16 @@
 import json
 import os
 import sys
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
-from chipglow.cli.tables import screen_table
+from chipglow.cli.tables import budget_frame, facts_table, screen_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
     from rich.console import Console
     from rich.table import Table
 
@@ -22,40 +23,19 @@ if TYPE_CHECKING:
 _PIPE_WIDTH: Final = 200
 """Width of tables in a pipe or a file, so that each row is one line."""
 
-Facts: TypeAlias = Iterable[tuple[str, str]]
-"""Names with their texts."""
-
 
 class Screen:
     """Output of one command.
 
-    Text is printed immediately: results on stdout, notes on stderr. With JSON, everything is
-    collected and printed by `close` as one object.
+    Text is printed immediately: results on stdout, notes on stderr. With `json`, nothing is
+    printed before `close`, which prints everything as one object.
     """
 
-    def __init__(self) -> None:
-        self._kept: dict[str, Any] | None = None
-
-    def for_programs(self) -> None:
-        """Print one JSON object instead of text."""
-        from importlib.metadata import version
-
-        self._kept = {
-            "chipglow": version("chipglow"),
-            "tables": {},
-            "facts": {},
-            "values": {},
-            "sentences": [],
-            "assumed": [],
-            "warnings": [],
-            "missing": [],
-            "files": [],
-        }
-
-    @property
-    def is_for_programs(self) -> bool:
-        """Whether one JSON object is printed."""
-        return self._kept is not None
+    def __init__(self, json: bool = False) -> None:
+        self.json = json
+        self._record: dict[str, Any] = {key: {} for key in ("tables", "facts", "values")}
+        for key in ("sentences", "assumed", "warnings", "missing", "files"):
+            self._record[key] = []
 
     def table(
         self,
@@ -65,94 +45,80 @@ class Screen:
         title: str | None = None,
         unbroken: Collection[str] = (),
     ) -> None:
-        """Print a frame as `screen_table` formats it, or add its rows to the JSON object.
+        """Print a frame as `screen_table` formats it.
 
         A table without a name repeats another one and is omitted from the JSON object.
         """
-        if self._kept is None:
+        if name is not None:
+            self._record["tables"].setdefault(name, []).extend(frame.to_dict("records"))
+        if not self.json:
             self._print(screen_table(frame, columns, title, unbroken))
-        elif name is not None:
-            records = frame.to_dict("records")
-            self._kept["tables"].setdefault(name, []).extend(map(_plain, records))
 
     def budget(self, name: str, estimate: "Estimate", title: str) -> None:
         """Print the uncertainty budget of values in K below a title."""
-        from chipglow.cli.tables import budget_frame
-
         self.heading(f"\n{title}")
         self.table(name, budget_frame(estimate))
         self.heading()
 
-    def facts(self, name: str, rows: Facts) -> None:
+    def facts(self, name: str, rows: Iterable[tuple[str, str]]) -> None:
         """Print names with their texts."""
-        if self._kept is not None:
-            self._kept["facts"].setdefault(name, {}).update(rows)
-            return
-        from chipglow.cli.tables import facts_table
+        rows = list(rows)
+        self._record["facts"].setdefault(name, {}).update(rows)
+        if not self.json:
+            self._console().print(facts_table(rows))
 
-        self._out().print(facts_table(rows))
+    def heading(self, text: str = "", stream: TextIO | None = None) -> None:
+        """Print a line that the JSON object omits, by default on stdout."""
+        if not self.json:
+            print(text, file=stream, flush=True)
 
-    def heading(self, text: str = "") -> None:
-        """Print a line that the JSON object omits."""
-        if self._kept is None:
-            self._out().print(text, soft_wrap=True)
-
-    def say(self, sentence: str, values: Mapping[str, Any] | None = None) -> None:
+    def say(
+        self,
+        sentence: str,
+        values: Mapping[str, Any] | None = None,
+        stream: TextIO | None = None,
+    ) -> None:
         """Print a sentence of the result; the JSON object also gets its numbers."""
-        if self._kept is None:
-            self._out().print(sentence, soft_wrap=True)
-        else:
-            self._kept["sentences"].append(sentence.strip())
-            self._kept["values"].update(_plain(values or {}))
-
-    def aside(self, sentence: str, values: Mapping[str, Any] | None = None) -> None:
-        """Print a sentence on stderr; the JSON object treats it as `say` does."""
-        if self._kept is None:
-            print(sentence, file=sys.stderr, flush=True)
-        else:
-            self.say(sentence, values)
+        self.heading(sentence, stream)
+        self._record["sentences"].append(sentence.strip())
+        self.values(values or {})
 
     def values(self, values: Mapping[str, Any]) -> None:
         """Add numbers to the JSON object only."""
-        if self._kept is not None:
-            self._kept["values"].update(_plain(values))
+        self._record["values"].update(values)
 
-    def notes(self, notes: "Notes") -> None:
-        """Print assumptions and warnings on stderr."""
+    def notes(self, notes: "Notes", missing: Iterable[str] = ()) -> None:
+        """Print assumptions and warnings on stderr, and which results are missing on stdout."""
         self._sentences("assumed", "Assumed", notes.assumed, sys.stderr)
         self._sentences("warnings", "Warning", notes.warnings, sys.stderr)
+        self._sentences("missing", "Missing", missing, sys.stdout)
 
     def remarks(self, notes: "Notes") -> None:
         """Print the remarks among notes."""
         for sentence in notes.remarks:
             self.say(sentence)
 
-    def missing(self, sentences: Iterable[str]) -> None:
-        """Print which results are missing, and why."""
-        self._sentences("missing", "Missing", sentences, sys.stdout)
-
     def file(self, path: Path, what: str = "") -> None:
         """Print the name of a written file."""
-        if self._kept is None:
-            print(f"{what}: {path}" if what else path)
-        else:
-            self._kept["files"].append(str(path))
+        self.heading(f"{what}: {path}" if what else str(path))
+        self._record["files"].append(str(path))
 
     def close(self) -> None:
         """Print the JSON object, if any, once; a server does so early."""
-        if self._kept is not None:
-            found = json.dumps(self._kept, ensure_ascii=False, allow_nan=False, indent=1)
-            print(found, flush=True)
-            self._kept = None
+        if self.json and self._record:
+            from importlib.metadata import version
+
+            result = {"chipglow": version("chipglow")} | _plain(self._record)
+            print(json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1), flush=True)
+            self._record = {}
 
     def _print(self, table: "Table") -> None:
         """Print a table; on a narrow terminal each row becomes a list of its cells."""
         from rich.measure import Measurement
 
-        from chipglow.cli.tables import facts_table
-
-        console = self._out()
-        if Measurement.get(console, console.options, table).minimum <= console.width:
+        console = self._console()
+        unlimited = console.options.update(max_width=10 * _PIPE_WIDTH)
+        if Measurement.get(console, unlimited, table).minimum <= console.width:
             console.print(table)
             return
         if table.title:
@@ -162,14 +128,12 @@ class Screen:
             console.print()
             console.print(facts_table(zip(heads, map(str, row), strict=True)))
 
-    def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: Any) -> None:
+    def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: TextIO) -> None:
         for sentence in sentences:
-            if self._kept is None:
-                print(f"{head}: {sentence}", file=stream, flush=True)
-            else:
-                self._kept[key].append(sentence)
+            self._record[key].append(sentence)
+            self.heading(f"{head}: {sentence}", stream)
 
-    def _out(self) -> "Console":
+    def _console(self) -> "Console":
         from rich.console import Console
 
         console = Console(highlight=False, markup=False)
@@ -181,16 +145,37 @@ class Screen:
 _CURRENT: ContextVar[Screen] = ContextVar("screen")
 
 
-def begin() -> Screen:
+def begin() -> None:
     """Start the output of a command."""
-    screen = Screen()
-    _CURRENT.set(screen)
-    return screen
+    _CURRENT.set(Screen())
 
 
 def current() -> Screen:
     """Return the output of the running command."""
     return _CURRENT.get()
+
+
+def finish(notes: "Notes", *files: tuple[Path | None, Callable[[Path], object]]) -> None:
+    """Print assumptions and warnings, then write each file that has a path."""
+    screen = current()
+    screen.notes(notes)
+    for path, write in files:
+        if path is not None:
+            write(path)
+            screen.file(path)
+
+
+def figure(draw: "Callable[..., Figure]", *arguments: Any) -> Callable[[Path], None]:
+    """Return a function that draws a figure and writes it in the format of the file's name."""
+
+    def write(path: Path) -> None:
+        from chipglow.io import atomic_path
+
+        drawn = draw(*arguments)
+        with atomic_path(path) as temporary:
+            drawn.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
+
+    return write
 
 
 def _plain(value: Any) -> Any:

@@ -1,49 +1,74 @@
-"""The command ``chipglow show`` for scenes."""
+"""The command ``chipglow show`` for scenes and measurements."""
 
 import json
 from collections.abc import Iterator, Mapping
 from math import degrees
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.cli.finish import figure, finish
-from chipglow.cli.screen import current
-from chipglow.cli.times import parse_instant
-from chipglow.drawing.frames import shown_frame
-from chipglow.io import StoredScene, is_scene, open_scene
+from chipglow.camera import Flag, Measurement
+from chipglow.cli.screen import current, figure, finish
+from chipglow.cli.times import frame_at
+from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
-from chipglow.report import SceneSummary, draw_scene, scene_summary
-from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
+from chipglow.laboratory.measurement import MeasurementSummary, measurement_summary
+from chipglow.radiometry import Band
+from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
+
+if TYPE_CHECKING:
+    from chipglow.report import SceneSummary
 
 _LONGEST: Final = 800
 _MOST_NUMBERS: Final = 8
+_FLAG_NAMES: Final = {
+    Flag.UNDER_RANGE: "below the lower range limit or the calibration",
+    Flag.SATURATED: "saturated or above the calibration",
+    Flag.DEAD: "dead",
+    Flag.REPLACED: "replaced by neighbours",
+}
+_PRINTED_APART: Final = (
+    "assumed", "warnings", "band_lower", "band_upper", "pitch", "tool_", "integration_time",
+    "lower_limit", "netd",
+)  # fmt: skip
+"""Beginnings of the names of a measurement's attributes that are not listed as such."""
 
 _Rows: TypeAlias = Iterator[tuple[str, str]]
 
 
-def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
-    """Print the contents of a scene and optionally draw it."""
+def show(path: Path, at: float | None, plot: Path | None) -> None:
+    """Print the contents of a scene or a measurement and optionally draw it."""
+    if is_measurement(path):
+        _show_measurement(path, at, plot)
+    else:
+        _show_scene(path, at, plot)
+
+
+def _show_scene(path: Path, at: float | None, plot: Path | None) -> None:
+    from chipglow.report import draw_scene, scene_summary
+
+    _check_shown(path)
     scene = open_scene(path)
-    time = None if at is None else _time_in(scene, at)
+    time = None if at is None else scene.times[frame_at("--at", at, scene.times, "scene")]
     summary = scene_summary(scene, time)
     screen = current()
-    screen.facts("scene", _facts(scene, path))
+    screen.facts("scene", _scene_facts(scene, path))
     screen.heading(f"\nAt {microseconds(scene.times[summary.index])}:")
     screen.facts("state", _state(summary))
     screen.heading()
     _show_fields(summary)
-    screen.values(raster_values(scene.raster, scene.times))
+    screen.values(_raster_values(scene.raster, scene.times))
     screen.values({"at_us": 1e6 * scene.times[summary.index]})
-    show_attributes(_other_attributes(scene))
+    _show_attributes(scene.data.attrs, ("tool_",))
     finish(Notes(), (plot, figure(draw_scene, scene, time)))
     scene.data.close()
 
 
-def check_shown(path: Path) -> None:
+def _check_shown(path: Path) -> None:
     """Raise an error if a file is neither a scene nor similar to one."""
     if path.is_file() and not holds(path, ()):
         raise ValueError(
@@ -56,18 +81,28 @@ def check_shown(path: Path) -> None:
         )
 
 
-def _time_in(scene: Scene, at: str) -> float:
-    time = parse_instant("--at", at)
-    try:
-        shown_frame(scene.times, time, "scene")
-    except ValueError as error:
-        raise ValueError(f"--at: {error}") from None
-    return time
+def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
+    from chipglow.laboratory.measurement.figures import draw_measurement
+
+    measurement = read_measurement(path)
+    times = measurement.times
+    time = None if at is None else times[frame_at("--at", at, times, "measurement")]
+    say_measurement(measurement, time)
+    finish(measurement.notes, (plot, figure(draw_measurement, measurement, time)))
 
 
-def _facts(scene: StoredScene, path: Path) -> _Rows:
+def say_measurement(measurement: Measurement, time: float | None = None) -> None:
+    """Print the contents of a measurement."""
+    screen = current()
+    summary = measurement_summary(measurement, time)
+    screen.facts("measurement", _measurement_facts(measurement, summary))
+    screen.values(_raster_values(measurement.raster, measurement.times))
+    _show_attributes(measurement.data.attrs, _PRINTED_APART)
+
+
+def _scene_facts(scene: StoredScene, path: Path) -> _Rows:
     raster, times, data = scene.raster, scene.times, scene.data
-    yield from where_and_when("samples", raster, times)
+    yield from _where_and_when("samples", raster, times)
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
     if "force_time" in data:
@@ -79,7 +114,7 @@ def _facts(scene: StoredScene, path: Path) -> _Rows:
     yield "file", f"{size / 1e6:,.1f} MB, {each:.2g} bytes a sample ({scene.compression})"
 
 
-def where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Rows:
+def _where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Rows:
     """Describe the positions of samples or pixels, and the times of the frames."""
     left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
     yield name, f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
@@ -107,7 +142,7 @@ def _tool_text(tool: Tool) -> str:
     return ", ".join(parts)
 
 
-def _state(summary: SceneSummary) -> _Rows:
+def _state(summary: "SceneSummary") -> _Rows:
     fractions = (
         f"{kind.name.lower()} {100 * fraction:.3g} %"
         for kind, fraction in summary.fractions.items()
@@ -122,8 +157,8 @@ def _state(summary: SceneSummary) -> _Rows:
         )
 
 
-def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
-    """Return the numbers of `where_and_when`."""
+def _raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
+    """Return the numbers of `_where_and_when`."""
     return {
         "rows": raster.rows,
         "columns": raster.columns,
@@ -133,59 +168,89 @@ def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
     }
 
 
-def _show_fields(summary: SceneSummary) -> None:
+def _show_fields(summary: "SceneSummary") -> None:
     everywhere = f"in {len(summary.sampled)} frames"
     columns = {everywhere if name == "overall" else name: name for name in summary.fields}
     current().table("fields", summary.fields, columns, "Over the material", unbroken=("field",))
 
 
-def show_attributes(attributes: Mapping[str, Any]) -> None:
-    """Print the attributes of a file, if any, below a heading."""
-    if not attributes:
-        return
-    screen = current()
-    screen.heading("\nAttributes:")
-    screen.facts("attributes", attribute_rows(attributes))
-    screen.values({"attributes": attributes})
-
-
-def _other_attributes(scene: Scene) -> dict[str, Any]:
-    """Return the attributes of a scene without those of the tool."""
-    attributes = scene.data.attrs.items()
-    return {str(name): value for name, value in attributes if not str(name).startswith("tool_")}
-
-
-def attribute_rows(attributes: Mapping[str, Any]) -> _Rows:
-    """Return attributes as texts of limited length."""
-    for name, value in attributes.items():
-        yield name, _shortened(_attribute_text(value))
+def _show_attributes(attributes: Mapping[Any, Any], omitted: tuple[str, ...]) -> None:
+    """Print the other attributes of a file, if any, below a heading."""
+    others = {
+        str(name): value for name, value in attributes.items() if not str(name).startswith(omitted)
+    }
+    if others:
+        screen = current()
+        screen.heading("\nAttributes:")
+        texts = {name: _attribute_text(value) for name, value in others.items()}
+        screen.facts("attributes", texts.items())
+        screen.values({"attributes": others})
 
 
 def _attribute_text(value: Any) -> str:
-    """Return an attribute as text; JSON is flattened by its keys."""
-    if not isinstance(value, str):
-        return str(value)
+    """Return an attribute as text of limited length; JSON is flattened by its keys."""
+    text = str(value)
     try:
-        parsed = json.loads(value)
+        parsed = json.loads(text)
     except (ValueError, RecursionError):
-        return value
-    return ", ".join(_leaves("", parsed)) if isinstance(parsed, dict) else value
-
-
-def _leaves(name: str, value: Any) -> Iterator[str]:
-    if isinstance(value, dict) and value:
-        for key, inner in value.items():
-            yield from _leaves(f"{name}.{key}" if name else str(key), inner)
-    elif isinstance(value, list) and len(value) > _MOST_NUMBERS:
-        yield f"{name} [{len(value)} values]"
-    else:
-        yield f"{name} {value}"
-
-
-def _shortened(text: str) -> str:
+        parsed = None
+    if isinstance(parsed, dict):
+        leaves = pd.json_normalize(parsed).to_dict("records")[0]
+        text = ", ".join(f"{name} {_leaf_text(leaf)}" for name, leaf in leaves.items())
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} … ({len(text)} characters)"
+
+
+def _leaf_text(value: Any) -> str:
+    is_long = isinstance(value, list) and len(value) > _MOST_NUMBERS
+    return f"[{len(value)} values]" if is_long else str(value)
 
 
 def microseconds(time: float) -> str:
     """Return a time in s as text in µs."""
     return f"{time * 1e6:.7g} µs"
+
+
+def _measurement_facts(
+    measurement: Measurement, summary: MeasurementSummary
+) -> Iterator[tuple[str, str]]:
+    data = measurement.data
+    yield from _where_and_when("pixels", measurement.raster, measurement.times)
+    if "integration_time" in data.attrs:
+        yield "integration time", microseconds(float(data.attrs["integration_time"]))
+    if "lower_limit" in data.attrs:
+        yield "lower range limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
+    if {"netd", "netd_temperature"} <= set(data.attrs):
+        netd, kelvins = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
+        yield "NETD", f"{1e3 * netd:.3g} mK at {kelvins - 273.15:.4g} °C, half of the range filled"
+    if {"band_lower", "band_upper"} <= set(data.attrs):
+        band = measurement.band
+        shape = "" if band.response is None else f", {_response_text(band)}"
+        yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
+    if measurement.tool is not None:
+        yield "tool", _tool_text(measurement.tool)
+    yield "radiance temperature", _celsius(summary.overall)
+    yield f"at {microseconds(measurement.times[summary.index])}", _celsius(summary.now)
+    if summary.uncertainty is None:
+        yield "its calibration", "uncertainty not known"
+    else:
+        least, greatest = summary.uncertainty
+        yield "its calibration", f"standard uncertainty {least:.2g} K to {greatest:.2g} K"
+    yield "usable pixels", f"{100 * summary.usable:.4g} %"
+    for flag, name in _FLAG_NAMES.items():
+        if summary.fractions[flag]:
+            yield name, f"{100 * summary.fractions[flag]:.3g} %"
+
+
+def _response_text(band: Band) -> str:
+    """Describe a response curve."""
+    wavelengths = 1e6 * band.wavelengths
+    values = np.asarray(band.response(band.wavelengths) if band.response else 1.0)
+    mean, peak = np.average(wavelengths, weights=values), wavelengths[values.argmax()]
+    return f"response with its mean at {mean:.4g} µm and its peak at {peak:.4g} µm"
+
+
+def _celsius(kelvins: tuple[float, float, float] | None) -> str:
+    if kelvins is None:
+        return "none: no pixel is usable"
+    least, median, greatest = (f"{value - 273.15:.1f} °C" for value in kelvins)
+    return f"{least} to {greatest}, median {median}"

@@ -26,6 +26,7 @@ _SHORT: Final = {
     "aicc": "AICc",
     "bic": "BIC",
     "chi squared": "chi²",
+    "E n": "E_n",
 }
 _PLUS_MINUS: Final = " ± "
 _SPREADS: Final = ("uncertainty", "deviation")

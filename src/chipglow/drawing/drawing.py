@@ -1,4 +1,4 @@
-"""How figures look: sizes, colours, images on micrometre axes."""
+"""Style of figures: sizes, colours, images on micrometre axes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,28 +42,21 @@ _STYLE: Final[Any] = {
 
 
 def style() -> Any:
-    """Context in which figures are made."""
+    """Return the context in which figures are drawn."""
     return matplotlib.rc_context(_STYLE)
 
 
 def new_figure(height: float) -> Figure:
-    """Empty figure of the page's width and a height in inches."""
+    """Return an empty figure of the page's width and a height in inches."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
-    """Empty figure of the page's width for rows of images, as high as they need.
+    """Return an empty figure of the page's width for rows of images, as high as they need.
 
-    Parameters
-    ----------
-    raster : Raster
-        What an image shows.
-    panel_width : float
-        Width of an image in inches.
-    rows : int
-        Number of rows of images.
+    `panel_width` is the width of an image in inches.
     """
     panel = panel_width * raster.rows / raster.columns
     figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
@@ -93,7 +86,7 @@ def show_image(
     *,
     log: bool = False,
 ) -> AxesImage:
-    """Image with the tool's outline; grey where there is no value. See `length_unit`."""
+    """Draw an image with the tool's outline; undefined values are grey. See `length_unit`."""
     factor, unit = length_unit(raster)
     extent = np.array(raster.extent) * factor
     shown = matplotlib.colormaps.get_cmap(colours).with_extremes(bad=VOID)
@@ -113,13 +106,13 @@ def show_image(
 
 
 def length_unit(raster: Raster) -> tuple[float, str]:
-    """Factor from m and name of the unit in which an image's axes are read: µm, or mm."""
+    """Return the unit of an image's axes, µm or mm: its factor from m, and its name."""
     longest = raster.spacing * max(raster.rows, raster.columns)
     return (1e6, "µm") if longest < _LARGEST_IN_MICRONS else (1e3, "mm")
 
 
 def time_unit(longest: float) -> tuple[float, str]:
-    """Factor from s and name of the unit in which times are read."""
+    """Return the unit of times up to the longest: its factor from s, and its name."""
     if longest < 1e-3:
         return 1e6, "µs"
     return (1e3, "ms") if longest < 1.0 else (1.0, "s")
@@ -132,22 +125,17 @@ def veil(
     colour: str = "white",
     opacity: float = 0.5,
 ) -> None:
-    """Make part of an image paler, or give it a colour."""
+    """Cover part of an image with a translucent colour."""
     layer = np.broadcast_to(to_rgba(colour), (*where.shape, 4)).copy()
     layer[..., 3] = np.where(where, opacity, 0.0)
     axes.imshow(layer, extent=tuple(np.array(raster.extent) * length_unit(raster)[0]))
 
 
 def draw_tool(axes: Axes, tool: Tool, factor: float = 1e6) -> None:
-    """The tool's outline, seen on dark and on light ground."""
+    """Draw the tool's outline, visible on dark and light backgrounds."""
     outline = tool.outline(3e-3) * factor
     axes.plot(*outline.T, color="white", linewidth=2.2)
     axes.plot(*outline.T, color="black", linewidth=1.0)
-
-
-def black_tool(axes: Axes, tool: Tool) -> None:
-    """The tool in black."""
-    axes.fill(*(tool.outline(3e-3) * 1e6).T, color="black")
 
 
 def draw_line(
@@ -157,7 +145,7 @@ def draw_line(
     label: str = "",
     factor: float = 1e6,
 ) -> None:
-    """A curve in metres on axes of another unit, seen on dark and on light ground."""
+    """Draw a curve in m on axes of another unit, visible on dark and light backgrounds."""
     axes.plot(*(points * factor).T, color="white", linewidth=3.0)
     axes.plot(*(points * factor).T, color=colour, linewidth=1.6, label=label)
 
@@ -169,7 +157,7 @@ def colour_bar(
     label: str,
     location: Literal["right", "bottom"] = "right",
 ) -> None:
-    """Colour bar beside one or several axes, with its quantity and unit; arrows where it ends."""
+    """Draw a colour bar; arrows show that values exceed its limits."""
     values, low, high = picture.get_array(), picture.norm.vmin, picture.norm.vmax
     assert values is not None and low is not None and high is not None
     under, over = bool(np.any(values < low)), bool(np.any(values > high))
@@ -181,21 +169,7 @@ def colour_bar(
 
 @dataclass(frozen=True)
 class ImagePanel:
-    """An image with its title and its colour bar.
-
-    Parameters
-    ----------
-    title, label : str
-        Above the image, and beside the colour bar with the unit.
-    image : ndarray
-        Values, NaN where there is none, shape (y, x).
-    limits : tuple
-        Ends of the colours.
-    colours : str
-        Name of the colour map.
-    log : bool
-        Whether the colours go by the logarithm.
-    """
+    """An image with its title and a colour bar with a label between limits; NaN is void."""
 
     title: str
     label: str
@@ -205,7 +179,7 @@ class ImagePanel:
     log: bool = False
 
     def draw(self, figure: FigureBase, axes: Axes, raster: Raster, tool: Tool | None) -> None:
-        """Draw it, with the labels of its axes only at the edges of the figure."""
+        """Draw the image, with axis labels only at the edges of the figure."""
         picture = show_image(
             axes, self.image, raster, tool, self.colours, self.limits, log=self.log
         )
@@ -237,19 +211,7 @@ def leave_out(axes: Axes, above: Axes | None, raster: Raster) -> None:
 def draw_mean(
     axes: Axes, along: NDArray[np.float64], draws: NDArray[np.float64], colour: str, name: str
 ) -> None:
-    """Draw the mean of draws with a standard deviation to either side, and the first dotted.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where to draw.
-    along : ndarray
-        Positions, shape (n,).
-    draws : ndarray
-        Values, one row per draw, shape (draws, n); NaN where undefined.
-    colour, name : str
-        Colour of the curves and their name in the legend.
-    """
+    """Draw the mean of draws, one per row, ± a standard deviation, and the first draw dotted."""
     mean, deviation = draws.mean(axis=0), draws.std(axis=0)
     axes.plot(along, mean, color=colour, label=name)
     shade(axes, along, mean, deviation, colour, 0.2)
@@ -265,14 +227,14 @@ def shade(
     opacity: float = 0.15,
     label: str = "",
 ) -> None:
-    """A band of a half width to either side of a curve, such as its uncertainty."""
+    """Shade a half width on either side of a curve, such as its uncertainty."""
     axes.fill_between(
         along, middle - half, middle + half, color=colour, alpha=opacity, linewidth=0, label=label
     )
 
 
 def crop(axes: Axes, points: NDArray[np.float64], raster: Raster, around: float) -> None:
-    """Show the part of an image on micrometre axes that holds points in m, and what is around."""
+    """Limit micrometre axes to points in m and a margin around them."""
     left, right, bottom, top = (1e6 * edge for edge in raster.extent)
     known = 1e6 * points[np.isfinite(points).all(axis=-1)]
     (x_least, y_least), (x_most, y_most) = known.min(axis=0), known.max(axis=0)

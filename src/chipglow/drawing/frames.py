@@ -5,21 +5,10 @@ from numpy.typing import NDArray
 
 
 def shown_frame(times: NDArray[np.float64], time: float | None, whose: str) -> int:
-    """Number of the frame nearest to a time; of the middle one for None.
+    """Return the index of the frame nearest to a time in s; without a time, of the middle frame.
 
-    Parameters
-    ----------
-    times : ndarray
-        Times of the frames in s, ascending, shape (n,).
-    time : float, optional
-        The time in s.
-    whose : str
-        Whose frames they are, as errors call it.
-
-    Raises
-    ------
-    ValueError
-        If the time is over half a frame before the first or after the last.
+    Raises ValueError, naming `whose` frames they are, if the time is more than half a frame before
+    the first or after the last.
     """
     if time is None:
         return (len(times) - 1) // 2

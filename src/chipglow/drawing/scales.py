@@ -1,4 +1,4 @@
-"""Colours of figures and the limits of their scales, for whatever draws them."""
+"""Colours of figures and the limits of their scales."""
 
 from typing import Any, Final
 
@@ -22,17 +22,7 @@ KELVIN: Final = 273.15
 def ends(
     image: NDArray[Any], low: float = 0.0, high: float = 100.0, least: float = 0.0
 ) -> tuple[float, float]:
-    """Ends of the colours of an image: two percentiles of what is known, apart from each other.
-
-    Parameters
-    ----------
-    image : ndarray
-        Values, NaN where there is none.
-    low, high : float
-        The percentiles.
-    least : float
-        How far apart they are at least.
-    """
+    """Return the limits of an image's colours: two percentiles, at least `least` apart."""
     known = image[np.isfinite(image)]
     if known.size == 0:
         return 0.0, 1.0
@@ -42,7 +32,7 @@ def ends(
 
 
 def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> float:
-    """Limit of a scale: a percentile of the magnitudes, up to the next whole step."""
+    """Return a percentile of the magnitudes, rounded up to a multiple of a step."""
     known = np.abs(values[np.isfinite(values)])
     if known.size == 0:
         return step

@@ -116,7 +116,7 @@ def dual_spectrum(facts: Facts) -> Figure:
         left.set_title(f"visible, {frame.time * 1e6:.0f} µs")
         right.set_title(f"infrared, {name}")
         for axes in (left, right):
-            drawing.black_tool(axes, tool)
+            axes.fill(*(1e6 * tool.outline(3e-3)).T, color="black")
             axes.set_facecolor(GREY)
             axes.label_outer()
     drawing.colour_bar(figure, picture, list(grid[:, 1]), "radiance temperature / °C")

@@ -7,18 +7,9 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Notes:
-    """Sentences on what a result rests on; each is a whole sentence.
+    """Assumptions, warnings and remarks on a result; each is a whole sentence.
 
     The lists grow while a result is made. ``a + b`` holds each sentence of both once.
-
-    Parameters
-    ----------
-    assumed : list of str
-        Assumptions that were necessary.
-    warnings : list of str
-        Reasons why the result may be wrong.
-    remarks : list of str
-        What else a reader should know, such as what the file states.
     """
 
     assumed: list[str] = field(default_factory=list)

@@ -69,9 +69,9 @@ class ChosenTool:
 
 
 def chosen_tool(
-    measurement: Measurement, tool: str | None, position: str | None = None
+    measurement: Measurement, tool: str | None, position: float | None = None
 ) -> ChosenTool:
-    """The tool that an option ``--tool`` chooses."""
+    """Return the tool that an option ``--tool`` chooses."""
     if tool is None:
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":
@@ -112,12 +112,15 @@ def _found(found: FoundTool) -> str:
     )
 
 
-def _position(uncertainty: ToolUncertainty, position: str | None) -> str:
-    """Which uncertainty of the place of a found tool is used."""
+def _position(uncertainty: ToolUncertainty, position: float | None) -> str:
+    """Describe the uncertainty of the position of a detected tool."""
     found = (
         f"± {1e6 * uncertainty.along:.0f} um along the face, ± {1e6 * uncertainty.across:.1f} um "
         f"across it and ± {degrees(uncertainty.angle):.1f} deg (standard uncertainties)"
     )
     if position is None:
         return f"Position of the tool: found, {found}."
-    return f"Position of the tool: --position {position} in the place of what was found, {found}."
+    return (
+        f"Position of the tool: --position {1e6 * position:g} um instead of the detected one, "
+        f"{found}."
+    )
