@@ -140,11 +140,11 @@ class ExposureImages:
 
     def reference(self, camera: Camera) -> Array:
         """Reference temperature of a camera's pixels; see `reference_temperature`."""
-        return self._reference(replace(camera, psf=None, detector=None))
+        return self._reference(_optical(replace(camera, psf=None)))
 
     def radiance(self, camera: Camera) -> Array:
         """Radiance of a camera's pixels before its detector in W/(m² sr)."""
-        return self._formed(replace(camera, detector=None))
+        return self._formed(_optical(camera))
 
     def measured(self, camera: Camera) -> Array:
         """Measured radiance temperature in K, whether flagged or not."""
@@ -186,7 +186,9 @@ class ExposureImages:
         still = replace(self.exposure, peak_radiance=mean.astype(np.float32), centre_radiance=mean)
         chain = (
             self.reference(camera),
-            reference_temperature(camera, self.exposure, kind),
+            self.reference(camera)
+            if kind == self.kind
+            else reference_temperature(camera, self.exposure, kind),
             reference_temperature(camera, still, kind),
             self.measured(replace(quiet, psf=None)),
             self.measured(quiet),
@@ -236,6 +238,12 @@ def _blurred(exposure: Exposure, psf: PointSpreadFunction) -> Array:
     return blur(exposure.mean_radiance, psf, exposure.raster.spacing)
 
 
+def _optical(camera: Camera) -> Camera:
+    """The camera as far as its images before the detector depend on it."""
+    order = camera.psf_order if camera.psf else "optics"
+    return replace(camera, psf_order=order, detector=None, lower_limit=None, seed=0)
+
+
 def _formed(
     exposure: Exposure, blurred: Callable[[PointSpreadFunction], Array] | None, camera: Camera
 ) -> Array:
@@ -250,7 +258,7 @@ def _read(
     formed: Callable[[Camera], Array], start: float, camera: Camera
 ) -> tuple[Array, NDArray[np.bool_] | bool]:
     """Temperatures that a camera reads, and which its detector marks as unusable."""
-    radiance = formed(replace(camera, detector=None))
+    radiance = formed(_optical(camera))
     read, flags = camera.read(radiance[None], np.array([start]))
     kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
     return kelvins, False if flags is None else flags[0] & UNUSABLE != 0
