@@ -13,8 +13,7 @@ from numba import set_num_threads
 from undrawn import leave_undrawn
 
 from chipglow.cutting import FLOW_LAWS
-from chipglow.io.sandbox import Sandbox, _failure
-from chipglow.io.sources import SourceError
+from chipglow.io.sandbox import Sandbox, failure
 
 MOST_SECONDS = 1200
 
@@ -123,7 +122,7 @@ def read_here(monkeypatch):
     """Readers run in this process, without the 1.2 s that a subprocess takes to start."""
 
     @contextmanager
-    def answers(sandbox, job, most=0):
+    def answers(sandbox, job):
         yield answered(sandbox.name, job)
 
     monkeypatch.setattr(Sandbox, "answers", answers)
@@ -134,9 +133,7 @@ def answered(name, job):
     try:
         yield from job()
     except Exception as error:
-        failure = _failure(name, error)
-        wrong = FileNotFoundError if failure.kind == "missing" else SourceError
-        raise wrong(failure.header["text"]) from error
+        raise failure(name, error) from error
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import os
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -70,8 +70,6 @@ class Broken(MovingBlock):
         for number, frame in enumerate(super().frames(raster, start)):
             if number == 2:
                 self.fail()
-            if self.how == "reshape":
-                frame = replace(frame, material=frame.material[1:])
             yield frame
 
     def fail(self):

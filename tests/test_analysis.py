@@ -399,7 +399,7 @@ def test_lines_across_the_rake_face_follow_its_normal():
     )
     np.testing.assert_allclose(lines["contact"][1], 860.0, rtol=0, atol=1e-9)
     assert found["contact"].distance[-1] == 120e-6
-    readings = place.read(images, pixels, lines)
+    readings = dict(zip(place.quantities, place.read(images, pixels, lines), strict=True))
     for quantity, expected in (
         ("mid-contact", -40.0),
         ("mean along the contact", -40.0),
@@ -422,8 +422,8 @@ def test_lines_beyond_the_image_have_no_reading():
             name: np.full((3, line.distance.size), np.nan)
             for name, line in place.lines(6e-6).items()
         }
-        for reading in place.read(np.full((3, *pixels.shape), np.nan), pixels, lines).values():
-            assert np.isnan(reading).all() and reading.shape == (3,)
+        readings = place.read(np.full((3, *pixels.shape), np.nan), pixels, lines)
+        assert np.isnan(readings).all() and readings.shape == (3, 3)
 
 
 # Segments

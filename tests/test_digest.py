@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from test_io import a_file, a_measurement
 
-from chipglow.io import digest, open_scene, read_measurement, write_measurement
+from chipglow.io import digest, is_scene, open_scene, read_measurement, write_measurement
+from chipglow.io.chunks import COMPRESSION, read_chunk, write_chunk
 from chipglow.io.digest import is_intact
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import open_arrays
@@ -56,6 +57,13 @@ def test_the_damaged_dataset_is_named(tmp_path, name):
         open_scene(path)
 
 
+def test_a_damaged_file_is_named_whatever_it_is(tmp_path):
+    path = a_file(tmp_path)
+    flip(path, place_of(path, "x"))
+    with pytest.raises(ValueError, match=r"scene\.nc: 'x' is damaged"):
+        is_scene(path)
+
+
 def test_damage_that_hdf5_does_not_see_is_found(tmp_path):
     path = a_file(tmp_path)
     flip(path, path.read_bytes().index(b"true temperature"))
@@ -84,6 +92,33 @@ def test_a_file_at_which_hdf5_loops_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr(digest, "PATIENCE", 0.0)
     with pytest.raises(ValueError, match=r"scene\.nc: .*HDF5 had not read the file after 0 s"):
         open_scene(path)
+
+
+def test_a_bit_that_makes_hdf5_loop_costs_no_more_than_the_time_limit(tmp_path, monkeypatch):
+    path = without_digest(a_file(tmp_path))
+    # The length of the first text in the global heap: HDF5 2.0 never ends reading it.
+    flip(path, path.read_bytes().index(b"GCOL") + 25, 2)
+    monkeypatch.setattr(digest, "PATIENCE", 2.0)
+    with pytest.raises(ValueError, match=r"scene\.nc: .*(HDF5 had not read .* 2 s|is damaged)"):
+        open_scene(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"chunks": (2, 4)}, {"shuffle": False}, {"fletcher32": True}, {"fillvalue": 7}],
+    ids=str,
+)
+def test_a_chunk_is_as_hdf5_reads_and_writes_it(tmp_path, change):
+    values = np.random.default_rng(1).normal(size=(3, 4)).astype(np.float32)
+    options = {"chunks": (1, 4), "fillvalue": 7, **COMPRESSION, **change}
+    with h5py.File(tmp_path / "T.h5", "w") as file:
+        one = file.create_dataset("one", (3, 4), np.float32, **options)
+        one[:2] = values[:2]
+        for index in range(3):
+            np.testing.assert_array_equal(read_chunk(one, index), one[index])
+        other = file.create_dataset("other", (3, 4), np.float32, chunks=(1, 4), **COMPRESSION)
+        write_chunk(other, 1, values[1])
+        np.testing.assert_array_equal(other[1], values[1])
 
 
 def test_a_compression_that_needs_a_plugin_is_named(tmp_path, monkeypatch):

@@ -1,8 +1,9 @@
 """Frames of splines: samples by another way of computing them, files, and the camera's pass."""
 
 from dataclasses import replace
+from math import prod
+from unittest.mock import Mock
 
-import h5py
 import numba
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from chipglow.camera.exposure import expose, expose_all
 from chipglow.camera.sweep import STEPS_PER_KELVIN
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
-from chipglow.io.decoded import Decoded
+from chipglow.io.chunks import read_chunk
 from chipglow.io.spline_file import STEPS
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, SceneError, ToolGeometry
@@ -212,7 +213,7 @@ def test_a_second_look_reads_nothing(tmp_path, monkeypatch):
             raise AssertionError("read again")
 
         with monkeypatch.context() as patch:
-            patch.setattr(h5py.Dataset, "__getitem__", refuse)
+            patch.setattr("chipglow.io.scene_file.read_chunk", refuse)
             again = scene.frame(3)
             with pytest.raises(AssertionError, match="read again"):
                 scene.frame(4)
@@ -245,16 +246,18 @@ def test_splines_go_on_from_a_checkpoint(tmp_path):
         np.testing.assert_array_equal(one.limits, other.limits)
 
 
-def test_kept_blocks_are_bounded_and_the_oldest_goes_first():
-    kept = Decoded(100)
-    for key, size in (("a", 40), ("b", 40)):
-        kept.keep(key, key.upper(), size)
-    assert kept.get("a") == "A"  # asked for later than b
-    kept.keep("c", "C", 50)
-    assert (kept.get("a"), kept.get("b"), kept.get("c")) == ("A", None, "C")
-    assert kept.held == 90
-    kept.keep("d", "D", 101)
-    assert kept.get("d") is None and kept.held == 90
+def test_what_stays_in_memory_is_bounded(tmp_path, monkeypatch):
+    path = a_file(tmp_path / "scene.nc")
+    read = Mock(side_effect=read_chunk)
+    monkeypatch.setattr("chipglow.io.scene_file.read_chunk", read)
+    one_frame = 2 * 4 * prod(a_lattice().shape)
+    monkeypatch.setattr("chipglow.io.scene_file.CACHED_BYTES", one_frame)
+    scene = open_scene(path)
+    read.reset_mock()
+    for index in (3, 3, 4, 3):
+        scene.splines(index)
+    nodes = [index for (dataset, index), _ in read.call_args_list if dataset.name == "/splines"]
+    assert nodes == [3, 4, 3]
 
 
 def test_a_frame_without_splines_and_one_that_is_not_finite_are_refused(tmp_path):

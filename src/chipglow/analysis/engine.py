@@ -20,7 +20,7 @@ from chipglow.analysis.cut import (
 )
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect
-from chipglow.analysis.looks import Looked, Schedule, Variables, View, look, row_variables
+from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
 from chipglow.analysis.places import BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
@@ -186,9 +186,7 @@ def analyse(
     variables = {
         **_scene_variables(task, frame, fields, looked),
         **_image_variables(measurements, looked, schedule.shown),
-        **row_variables(
-            looked.rows, schedule, HEADLINES if cut else {}, "segment" if cut else "exposure"
-        ),
+        **looked.variables(HEADLINES if cut else {}, "segment" if cut else "exposure"),
     }
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,

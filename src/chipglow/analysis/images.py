@@ -42,6 +42,9 @@ neighbours' samples. A single hot one would be the reference of the whole pixel.
 PARTS: Final = ("emissivity", "motion", "footprint", "psf", "detector")
 """Causes of the error in the order of the light; the parts that they contribute sum to it."""
 
+_KEPT: Final = 32
+"""Images and references of an exposure that are kept."""
+
 ALL: Final = "all"
 WITHOUT_PSF: Final = "without psf"
 
@@ -133,18 +136,23 @@ class ExposureImages:
         self.exposure, self.kind = exposure, kind
         blurred = lru_cache(1)(partial(_blurred, exposure)) if shares_blur else None
         self._formed = lru_cache(8)(partial(_formed, exposure, blurred))
-        self._read = lru_cache(32)(partial(_read, self._formed, exposure.start))
-        self._reference = lru_cache(32)(
-            lambda pixels: reference_temperature(pixels, exposure, kind)
-        )
+        self._read = lru_cache(_KEPT)(partial(_read, self._formed, exposure.start))
+        self._references: dict[tuple[object, ...], Array] = {}
 
     def reference(self, camera: Camera) -> Array:
         """Reference temperature of a camera's pixels; see `reference_temperature`."""
-        return self._reference(_optical(replace(camera, psf=None)))
+        key = camera.pitch, camera.offset, camera.shape, camera.fill_factor
+        reference = self._references.get(key)
+        if reference is None:
+            if len(self._references) >= _KEPT:
+                self._references.clear()
+            reference = reference_temperature(camera, self.exposure, self.kind)
+            self._references[key] = reference
+        return reference
 
     def radiance(self, camera: Camera) -> Array:
         """Radiance of a camera's pixels before its detector in W/(m² sr)."""
-        return self._formed(_optical(camera))
+        return self._formed(_without_detector(camera))
 
     def measured(self, camera: Camera) -> Array:
         """Measured radiance temperature in K, whether flagged or not."""
@@ -186,9 +194,7 @@ class ExposureImages:
         still = replace(self.exposure, peak_radiance=mean.astype(np.float32), centre_radiance=mean)
         chain = (
             self.reference(camera),
-            self.reference(camera)
-            if kind == self.kind
-            else reference_temperature(camera, self.exposure, kind),
+            reference_temperature(camera, self.exposure, kind),
             reference_temperature(camera, still, kind),
             self.measured(replace(quiet, psf=None)),
             self.measured(quiet),
@@ -233,15 +239,13 @@ def pixel_phases(camera: Camera, count: int) -> list[Camera]:
     ]
 
 
+def _without_detector(camera: Camera) -> Camera:
+    return replace(camera, detector=None) if camera.detector else camera
+
+
 def _blurred(exposure: Exposure, psf: PointSpreadFunction) -> Array:
     """Radiance of the samples behind the optics."""
     return blur(exposure.mean_radiance, psf, exposure.raster.spacing)
-
-
-def _optical(camera: Camera) -> Camera:
-    """The camera as far as its images before the detector depend on it."""
-    order = camera.psf_order if camera.psf else "optics"
-    return replace(camera, psf_order=order, detector=None, lower_limit=None, seed=0)
 
 
 def _formed(
@@ -258,7 +262,7 @@ def _read(
     formed: Callable[[Camera], Array], start: float, camera: Camera
 ) -> tuple[Array, NDArray[np.bool_] | bool]:
     """Temperatures that a camera reads, and which its detector marks as unusable."""
-    radiance = formed(_optical(camera))
+    radiance = formed(_without_detector(camera))
     read, flags = camera.read(radiance[None], np.array([start]))
     kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
     return kelvins, False if flags is None else flags[0] & UNUSABLE != 0

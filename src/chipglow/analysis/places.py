@@ -13,12 +13,13 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.images import Stack
+from chipglow.analysis.images import Array, Stack
 from chipglow.laboratory.chip import ShearBand
 from chipglow.scene import Line, Raster, Region, Tool, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
+_EXTREMES: Final = ("mean", "most negative", "greatest")
 NEAR: Final = 2.0
 """Distance in pixels within which an extremum of an image belongs to a place."""
 
@@ -28,6 +29,8 @@ class Place(ABC):
     """Somewhere in the images, with a name."""
 
     name: str
+    quantities: ClassVar[tuple[str, ...]]
+    """Names of the readings."""
     motion_samples: ClassVar[float] = 0.0
     """Where motion is read on its lines: distance in samples of the scene."""
 
@@ -40,8 +43,8 @@ class Place(ABC):
         return {}
 
     @abstractmethod
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        """Readings by what they are; NaN where the images show nothing.
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
+        """The `quantities`, shape (quantity, row); NaN where the images show nothing.
 
         `lines` holds the images along `lines`, shape (row, point) each.
         """
@@ -70,9 +73,10 @@ class PointPlace(Place):
     """The pixel that holds a point, x and y in m."""
 
     point: Point
+    quantities: ClassVar = ("pixel",)
 
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
-        return {"pixel": np.array([float(nearest(one, pixels, self.point)) for one in images])}
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
+        return np.array([[nearest(one, pixels, self.point) for one in images]])
 
     def outline(self) -> NDArray[np.float64]:
         return np.array([self.point])
@@ -83,6 +87,7 @@ class LinePlace(Place):
     """A polyline through two or more corners, x and y in m, read every half pixel."""
 
     corners: tuple[Point, ...]
+    quantities: ClassVar = _EXTREMES
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -102,7 +107,7 @@ class LinePlace(Place):
     def lines(self, pitch: float) -> Mapping[str, Line]:
         return {self.name: self.line(pitch)}
 
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         return _mean_and_extremes(lines[self.name])
 
     def outline(self) -> NDArray[np.float64]:
@@ -114,13 +119,14 @@ class RegionPlace(Place):
     """The pixels whose middle is in a region, which is in m."""
 
     region: Region
+    quantities: ClassVar = _EXTREMES
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.region.unit != "m":
             raise ValueError(f"{self.name}: is in pixels, expected lengths such as 120 um")
 
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         inside = self.region.shape.holds(*np.meshgrid(pixels.x, pixels.y))
         return _mean_and_extremes(images[:, inside])
 
@@ -134,10 +140,11 @@ class HottestPlace(Place):
     """The greatest temperature of each image, wherever it is: the error of a peak temperature."""
 
     name: str = "hottest pixel"
+    quantities: ClassVar = ("peak",)
 
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         greatest = np.where(np.isnan(images), -np.inf, images).max(axis=(1, 2))
-        return {"peak": np.where(np.isfinite(greatest), greatest, np.nan)}
+        return np.where(np.isfinite(greatest), greatest, np.nan)[None]
 
 
 @dataclass(frozen=True)
@@ -151,6 +158,11 @@ class RakePlace(Place):
     contact_length: float
     half_length: float
     step: float
+    quantities: ClassVar = (
+        "mid-contact",
+        "most negative within two pixels",
+        "mean along the contact",
+    )
     motion_samples: ClassVar[float] = 1.5  # from there on a sample shows the chip alone
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
@@ -164,17 +176,14 @@ class RakePlace(Place):
             "contact": Line(along, self.tool.rake_point(along)),
         }
 
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         across, contact = lines["rake"], lines["contact"]
         distance = _to_both_sides(self.half_length, self.step)
         reference = _mean(contact[0])
         errors = [_mean(measured - contact[0]) for measured in contact[1:]]
         lowest = _lowest_near(distance, across[1] - across[0], pixels.spacing)
-        return {
-            "mid-contact": across[:, np.argmin(np.abs(distance))],
-            "most negative within two pixels": across[:, lowest],
-            "mean along the contact": reference + np.array([0.0, *errors]),
-        }
+        along = reference + np.array([0.0, *errors])
+        return np.stack([across[:, np.argmin(np.abs(distance))], across[:, lowest], along])
 
     def outline(self) -> NDArray[np.float64]:
         return np.asarray(self.tool.rake_point(np.array([0.0, self.contact_length])))
@@ -191,22 +200,23 @@ class BandPlace(Place):
     band: ShearBand
     half_length: float
     step: float
+    quantities: ClassVar = (
+        "ridge of strain rate",
+        "ridge of measured temperature",
+        "most negative beside it",
+    )
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
         """The distance is 0 on the ridge, negative on the workpiece's side."""
         return {"band": self.band.across(self.half_length, self.step)}
 
-    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         across = lines["band"]
         distance = self.band.across(self.half_length, self.step).distance
         # A camera shows no strain rate: the hottest is the centre for who has the image alone.
         hottest = _lowest_near(distance, -across[1], pixels.spacing)
         lowest = _lowest_near(distance, across[1] - across[0], inf)
-        return {
-            "ridge of strain rate": across[:, np.argmin(np.abs(distance))],
-            "ridge of measured temperature": across[:, hottest],
-            "most negative beside it": across[:, lowest],
-        }
+        return across[:, [int(np.argmin(np.abs(distance))), hottest, lowest]].T
 
     def outline(self) -> NDArray[np.float64]:
         return self.band.ridge.points
@@ -229,17 +239,13 @@ def _mean(values: Stack) -> float:
     return float(known.mean()) if known.size else nan
 
 
-def _mean_and_extremes(values: Stack) -> dict[str, Stack]:
+def _mean_and_extremes(values: Stack) -> Array:
     """Mean, and where the error is most negative and greatest, shape (row, n) of pixels."""
     known = values[:, np.isfinite(values).all(axis=0)]
     if known.shape[1] == 0:
-        return {"mean": np.full(len(values), np.nan)}
+        return np.full((3, len(values)), np.nan)
     errors = known[1] - known[0]
-    return {
-        "mean": known.mean(axis=1),
-        "most negative": known[:, errors.argmin()],
-        "greatest": known[:, errors.argmax()],
-    }
+    return np.stack([known.mean(axis=1), known[:, errors.argmin()], known[:, errors.argmax()]])
 
 
 def _microns(values: NDArray[np.float64]) -> str:

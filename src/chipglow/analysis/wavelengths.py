@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from chipglow.analysis.cut import Progress, find_cut, middle_frame, spread_starts
-from chipglow.analysis.images import Array, around, pixel_phases
+from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
 from chipglow.analysis.places import PointPlace
 from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
@@ -65,7 +65,12 @@ class WavelengthPlan:
     def __post_init__(self) -> None:
         if len(self.bands) < 2 or len(set(self.bands)) < len(self.bands):
             raise ValueError(f"bands: {len(self.bands)}, expected two or more that differ")
-        for name in ("misregistration", "delay", "emissivity_uncertainty", "exponent_uncertainty"):
+        for name in (
+            "misregistration",
+            "delay",
+            "emissivity_uncertainty",
+            "exponent_uncertainty",
+        ):
             value = getattr(self, name)
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"{name}: {value!r}, expected 0 or more")
@@ -81,6 +86,12 @@ class WavelengthPlan:
     def ratios(self) -> list[tuple[int, ...]]:
         """Numbers of the bands that are compared: each alone, then the pairs."""
         return [*((number,) for number in range(len(self.bands))), *self.pairs]
+
+    def thermometer(self, pair: Sequence[int]) -> RatioThermometer:
+        """The ratio of two bands of a grey body."""
+        first, second = (self.bands[number] for number in pair)
+        exponent = log((second.lower + second.upper) / (first.lower + first.upper))
+        return RatioThermometer(first, second, 1.0, self.exponent_uncertainty * exponent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,115 +341,102 @@ def _draws(
     """
     duration = cameras[0].integration_time
     views = views_of(surface, scene, cameras)
-    exposures = late = expose_views(scene, views, spot.start, duration)
+    exposures = expose_views(scene, views, spot.start, duration)
+    images = late = [ExposureImages(one, shares_blur=True) for one in exposures]
     if plan.delay:
-        late = expose_views(scene, views, spot.start + plan.delay, duration)
+        delayed = expose_views(scene, views, spot.start + plan.delay, duration)
+        late = [ExposureImages(one, shares_blur=True) for one in delayed]
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
     pixels = [
         np.transpose(
             [
-                _of_pixel(phase, exposure, later, centre, plan.misregistration)
+                _of_pixel(phase, seen, later, centre, plan.misregistration)
                 for phase, centre in zip(pixel_phases(camera, phases), centres, strict=True)
             ]
         )
-        for camera, exposure, later in zip(cameras, exposures, late, strict=True)
+        for camera, seen, later in zip(cameras, images, late, strict=True)
     ]
     part, window = around(scene.raster, centres)
     at_centres = partial(sample, raster=window, points=centres)
     local = [np.stack([one.centre_radiance[part], one.mean_radiance[part]]) for one in exposures]
     truth = true_temperature(scene, spot.start + duration / 2)[part]
-    steps, misregistration, gains, uncertainties = zip(
-        *(
-            _ratio(plan, bands, truth, local, pixels, at_centres)
-            if len(bands) > 1
-            else _alone(
-                plan, cameras[bands[0]], truth, local[bands[0]], pixels[bands[0]], at_centres
-            )
-            for bands in plan.ratios
-        ),
-        strict=True,
-    )
-    return xr.Dataset(
-        {
-            "truth": ("draw", at_centres(truth)),
-            "step": (("ratio", "cause", "draw"), np.stack(steps)),
-            "misregistration": (("ratio", "direction", "draw"), np.stack(misregistration)),
-            "gain": (("ratio", "draw"), np.stack(gains)),
-            "emissivity_uncertainty": (("ratio", "draw"), np.stack(uncertainties)),
-            "radiance": (("band", "draw"), np.stack(pixels)[:, _FORMED]),
-        }
-    )
-
-
-_Result = tuple[Array, Array, Array, Array]
-"""Steps, errors by misregistration, gain and uncertainty by the emissivity, all by draw."""
-
-
-def _alone(
-    plan: WavelengthPlan,
-    camera: Camera,
-    truth: Array,
-    local: Array,
-    pixels: Array,
-    at_centres: Callable[[Array], Array],
-) -> _Result:
-    """One band, by the emissivity that is at the pixel's centre."""
-    band = camera.band
-    environment = 0.0 if camera.reflected is None else float(band.radiance(camera.reflected))
-    emitted = np.asarray(band.radiance(truth)) - environment
-    of_samples = (local[0] - environment) / emitted
-    emissivity, own = at_centres(of_samples), at_centres(truth)
-
-    def temperature(radiance: Array, by: Array) -> Array:
-        return np.asarray(band.temperature((radiance - environment) / by + environment))
-
-    chain = [
-        own,
-        *(at_centres(temperature(one, of_samples)) for one in local),
-        temperature(pixels[_IDEAL], emissivity),
-        *2 * [temperature(pixels[_FORMED], emissivity)],
+    compared = [
+        _compared(plan, cameras, bands, truth, local, pixels, at_centres) for bands in plan.ratios
     ]
-    slope = np.asarray(band.slope(own))
-    return (
-        np.diff(chain, axis=0),
-        np.zeros((len(_DIRECTIONS), own.size)),
-        pixels[_FORMED] / (emissivity * slope),
-        plan.emissivity_uncertainty * (np.asarray(band.radiance(own)) - environment) / slope,
+    return xr.concat(compared, "ratio").assign(
+        truth=("draw", at_centres(truth)),
+        radiance=(("band", "draw"), np.stack(pixels)[:, _FORMED]),
     )
 
 
-def _ratio(
+def _compared(
     plan: WavelengthPlan,
-    pair: Sequence[int],
+    cameras: Sequence[Camera],
+    bands: Sequence[int],
     truth: Array,
     local: Sequence[Array],
     pixels: Sequence[Array],
     at_centres: Callable[[Array], Array],
-) -> _Result:
-    """The ratio of two bands, as of a grey body."""
-    bands = [plan.bands[number] for number in pair]
-    middles = [band.lower + band.upper for band in bands]
-    uncertainty = plan.exponent_uncertainty * log(middles[1] / middles[0])
-    thermometer = RatioThermometer(bands[0], bands[1], 1.0, uncertainty)
-    (here, there), own = (pixels[number] for number in pair), at_centres(truth)
-    formed = thermometer.temperature(here[_FORMED], there[_FORMED])
+) -> xr.Dataset:
+    """One band, by the emissivity at the pixel's centre, or the ratio of two, as of a grey body.
+
+    `truth` and `local` are those of the samples around the centres: true temperature, and by band
+    the radiance in the middle of the exposure and its mean.
+    """
+    own, first = at_centres(truth), cameras[bands[0]]
+    on_samples: Callable[..., Array]
+    in_pixels: Callable[..., Array]
+    formed = [pixels[number][_FORMED] for number in bands]
+    if len(bands) > 1:
+        thermometer = plan.thermometer(bands)
+        on_samples = in_pixels = thermometer.temperature
+        gain, uncertainty = (
+            1 / thermometer.sensitivity(own),
+            thermometer.uncertainty(own),
+        )
+    else:
+        band, reflected = first.band, first.reflected
+        environment = 0.0 if reflected is None else float(band.radiance(reflected))
+        emissivity = (local[bands[0]][0] - environment) / (band.radiance(truth) - environment)
+        at_centre, slope = at_centres(emissivity), band.slope(own)
+        on_samples = partial(_by_emissivity, band, environment, emissivity)
+        in_pixels = partial(_by_emissivity, band, environment, at_centre)
+        gain = formed[0] / (at_centre * slope)
+        uncertainty = plan.emissivity_uncertainty * (band.radiance(own) - environment) / slope
+    # A band alone is neither delayed nor shifted.
+    second = [pixels[number] for number in bands[1:]]
+    temperature = in_pixels(*formed)
     chain = [
         own,
-        *map(at_centres, thermometer.temperature(local[pair[0]], local[pair[1]])),
-        thermometer.temperature(here[_IDEAL], there[_IDEAL]),
-        formed,
-        thermometer.temperature(here[_FORMED], there[_DELAYED]),
+        *map(at_centres, on_samples(*(local[number] for number in bands))),
+        in_pixels(*(pixels[number][_IDEAL] for number in bands)),
+        temperature,
+        in_pixels(formed[0], *(one[_DELAYED] for one in second)),
     ]
-    return (
-        np.diff(chain, axis=0),
-        thermometer.temperature(here[_FORMED], there[_SHIFTED:]) - formed,
-        1 / thermometer.sensitivity(own),
-        thermometer.uncertainty(own),
+    shifted = in_pixels(formed[0], *(one[_SHIFTED:] for one in second)) - temperature
+    return xr.Dataset(
+        {
+            "step": (("cause", "draw"), np.diff(chain, axis=0)),
+            "misregistration": (
+                ("direction", "draw"),
+                np.broadcast_to(shifted, (len(_DIRECTIONS), own.size)),
+            ),
+            "gain": ("draw", gain),
+            "emissivity_uncertainty": ("draw", uncertainty),
+        }
     )
 
 
+def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: Array) -> Array:
+    """Temperature by radiance and emissivity in a band, and the radiance that is reflected."""
+    return np.asarray(band.temperature((radiance - environment) / emissivity + environment))
+
+
 def _of_place(
-    name: str, parts: Sequence[xr.Dataset], cameras: Sequence[Camera], plan: WavelengthPlan
+    name: str,
+    parts: Sequence[xr.Dataset],
+    cameras: Sequence[Camera],
+    plan: WavelengthPlan,
 ) -> xr.Dataset:
     """All draws of a place but those with a pixel at whose centre there is no material."""
     data = xr.concat(parts, "draw").dropna("draw", subset=["truth"])
@@ -465,30 +463,23 @@ def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
 
 
 def _of_pixel(
-    camera: Camera,
-    exposure: Exposure,
-    late: Exposure,
-    centre: Array,
-    distance: float,
+    camera: Camera, images: ExposureImages, late: ExposureImages, centre: Array, distance: float
 ) -> list[float]:
     """Radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
-    raster = exposure.raster
 
-    def read(camera: Camera, of: Exposure, shift: tuple[float, float] = (0.0, 0.0)) -> float:
+    def read(camera: Camera, of: ExposureImages, shift: tuple[float, float] = (0.0, 0.0)) -> float:
         # The pixel that looks elsewhere is one of a grid that begins within the first pixel.
         corner = np.mod(np.array(camera.offset) + np.multiply(shift, [1, -1]), camera.pitch)
         moved = replace(camera, offset=(float(corner[0]), float(corner[1])))
-        return float(nearest(_image(moved, of), moved.pixels(raster), centre + shift))
+        pixels = moved.pixels(of.exposure.raster)
+        return float(nearest(of.radiance(moved), pixels, centre + shift))
 
-    own = read(camera, exposure)
+    shifts = [(distance * x, distance * y) for x, y in _DIRECTIONS]
     return [
-        read(_ideal(camera), exposure),
-        own,
-        own if late is exposure else read(camera, late),
-        *(
-            read(camera, exposure, (distance * x, distance * y)) if distance else own
-            for x, y in _DIRECTIONS
-        ),
+        read(_ideal(camera), images),
+        read(camera, images),
+        read(camera, late),
+        *(read(camera, images, shift) for shift in shifts),
     ]
 
 

@@ -242,16 +242,15 @@ class SceneModel:
                 effects={ALL: CASES[ALL]},
             )
             laid = {CURSOR: camera.lay(one[CURSOR], scene)}
-            draws.append(look(scene, one, laid, camera, schedule, lambda _: None).rows)
+            draws.append(look(scene, one, laid, camera, schedule, lambda _: None))
         progress(1.0)
-        pixel = np.stack([rows["readings"][0, CURSOR, "pixel"][0, 0] for rows in draws])
+        pixel = np.stack([looked.read[0, 0, 0] for looked in draws])
         error = pixel[..., 1] - pixel[..., 0]
         return Drawn(
             state,
             {
-                name: np.concatenate([rows["lines"][0, title, title][0, 0, :, 1] for rows in draws])
-                - KELVIN
-                for name, title in LINES.items()
+                name: np.concatenate([looked.along[row, 0, 0, :, 1] for looked in draws]) - KELVIN
+                for row, name in enumerate(LINES)
             },
             Distribution(error, ("texture", "pixel phase")) if np.isfinite(error).all() else None,
         )

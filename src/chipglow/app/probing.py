@@ -4,11 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from chipglow.io import is_measurement, open_scene, read_measurement
-from chipglow.io.sandbox import Message
 from chipglow.io.sources import SourceError
 
 
-def probed(path: Path, name: str) -> Iterator[Message]:
+def probed(path: Path, name: str) -> Iterator[None]:
     """Read what opening will read; errors call the file by its name."""
     try:
         if is_measurement(path):
@@ -18,4 +17,4 @@ def probed(path: Path, name: str) -> Iterator[Message]:
             scene.frame(len(scene) // 2)
     except (ValueError, OSError) as error:
         raise SourceError(str(error).replace(str(path), name)) from None
-    yield Message({})
+    yield None

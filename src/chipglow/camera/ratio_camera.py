@@ -177,21 +177,9 @@ class RatioCamera:
 
 
 def views_of(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> list[View]:
-    """A surface as several cameras look at it.
+    """A surface as several cameras of a global shutter look at it.
 
-    Parameters
-    ----------
-    surface : Surface
-        The surface. Where the band does not matter to it, it is laid on the scene once.
-    scene : Scene
-        What it is laid on.
-    cameras : sequence of Camera
-        The cameras.
-
-    Raises
-    ------
-    ValueError
-        If one has a rolling shutter.
+    Where the band does not matter to the surface, it is laid on the scene once.
     """
     for camera in cameras:
         if camera.line_time is not None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chipglow.io.interrupts import uninterrupted
-from chipglow.io.unfinished import hold
+from chipglow.io.unfinished import has_checkpoint, hold
 
 MANIFEST: Final = ".chipglow-files"
 """File in a folder of results that lists the files that chipglow wrote there, one a line."""
@@ -29,91 +29,50 @@ _RENAME_EXCHANGE: Final = 2
 def atomic_path(
     path: str | os.PathLike[str], keep: Callable[[Path], bool] = lambda _: False
 ) -> Iterator[Path]:
-    """Write a file under a temporary name; move it into place at the end.
+    """Write a file under a temporary name in the same folder; move it into place at the end.
 
-    Parameters
-    ----------
-    path : path-like
-        The file to write; an existing file is replaced. Of a symbolic link its target is written.
-    keep : callable, optional
-        Told the temporary name if the block raises: whether to leave that file where it is.
-
-    Yields
-    ------
-    pathlib.Path
-        Temporary name in the same folder, with the same suffix. If the block raises, the file of
-        this name is removed, or kept, and `path` stays as it was.
-
-    Raises
-    ------
-    OSError
-        As `check_output`; or if nothing can be written there; the message names `path`.
+    An existing file is replaced; of a symbolic link the target. If the block raises, `path` stays
+    as it was, and the temporary file is removed unless `keep` says that it stays.
     """
     path = check_output(Path(path))
-    temporary = _temporary_beside(path)
-    try:
-        with _errors_name(path, temporary):
+    with _temporary(path, Path.touch) as temporary:
+        try:
             yield temporary
             temporary.replace(path)
-    finally:
-        if not keep(temporary):
-            temporary.unlink(missing_ok=True)
+        finally:
+            if not keep(temporary):
+                temporary.unlink(missing_ok=True)
 
 
 @contextmanager
 def atomic_folder(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
     """Fill a folder of results under a temporary name; move it into place at the end.
 
-    Temporary folders of the same results whose process was killed are removed first.
-
-    Parameters
-    ----------
-    path : path-like
-        The folder to write. Files that chipglow wrote there earlier are replaced.
-    force : bool
-        Keep other files that the folder holds. By default such a folder is refused.
-
-    Yields
-    ------
-    pathlib.Path
-        Temporary folder beside it. If the block raises, it is removed and `path` stays as it was.
-
-    Raises
-    ------
-    OSError
-        As `check_output_folder`; or if nothing can be written there; the message names `path`.
+    Files that chipglow wrote there earlier are replaced. A folder with other files is refused; with
+    `force` it keeps them. If the block raises, `path` stays as it was.
     """
     path = check_output_folder(Path(path), force)
-    _remove_abandoned(path)
-    temporary = _temporary_beside(path)
-    lock = None
-    try:
-        with _errors_name(path, temporary):
-            temporary.mkdir()
-            lock = _lock(temporary)
+    with _temporary(path, Path.mkdir) as temporary:
+        try:
             yield temporary
             _write_manifest(temporary, _files(temporary))
-        check_output_folder(path, force)
-        with uninterrupted():
-            _replace_folder(temporary, path)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        if lock is not None:
-            os.close(lock)
+            check_output_folder(path, force)
+            with uninterrupted():
+                _replace_folder(temporary, path)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
 
 
 class KeptErrorFile(io.FileIO):
     """A file to write that keeps its first error, for the writer to raise.
 
     HDF5 loses the errors of what it writes late, and a process that closes an HDF5 file on a full
-    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`. The file is
-    held until it is closed, so that others see that it is being written.
+    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         super().__init__(path, "w+")
         self._error: OSError | None = None
-        hold(self.fileno())
 
     def write(self, data: Any) -> int:
         """Write all the data, or keep the error; after an error write nothing more."""
@@ -141,19 +100,7 @@ class KeptErrorFile(io.FileIO):
 
 
 def check_output(path: Path) -> Path:
-    """Check that a file can be written; return it or, if it is a symbolic link, its target.
-
-    Raises
-    ------
-    FileNotFoundError
-        If its folder does not exist.
-    IsADirectoryError
-        If it is a folder.
-    PermissionError
-        If its folder is not writable.
-    OSError
-        If it is a device or another special file.
-    """
+    """Check that a file can be written; return it or, if it is a symbolic link, its target."""
     target = _checked_target(path)
     if target.is_dir():
         raise IsADirectoryError(f"{path}: is a folder, expected the name of a file")
@@ -163,19 +110,7 @@ def check_output(path: Path) -> Path:
 
 
 def check_output_folder(path: Path, force: bool = False) -> Path:
-    """Check that a folder of results can be written; return it or, of a link, its target.
-
-    Raises
-    ------
-    FileNotFoundError
-        If the folder in which it would be does not exist.
-    NotADirectoryError
-        If it exists and is not a folder.
-    FileExistsError
-        If it holds a file that chipglow did not write, unless `force`.
-    PermissionError
-        If it is not writable.
-    """
+    """Check that a folder of results can be written; return it or, of a link, its target."""
     target = _checked_target(path)
     if not target.exists():
         return target
@@ -229,27 +164,43 @@ def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
         raise
 
 
-def _temporary_beside(path: Path) -> Path:
+@contextmanager
+def _temporary(path: Path, create: Callable[[Path], None]) -> Iterator[Path]:
+    """Create a file or folder beside `path` and hold it; others whose process ended are removed."""
     path = path.absolute()  # "." has no name
-    return path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-
-
-def _remove_abandoned(path: Path) -> None:
-    """Remove temporary folders of `path` that no process holds any more."""
-    path = path.absolute()
-    name = f".{escape(path.stem)}.{'[0-9a-f]' * 8}.part{escape(path.suffix)}"
-    for folder in path.parent.glob(name):
-        lock = _lock(folder)
+    _remove_abandoned(path)
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    lock = None
+    try:
+        with _errors_name(path, temporary):
+            create(temporary)
+            lock = _lock(temporary)
+            yield temporary
+    finally:
         if lock is not None:
-            shutil.rmtree(folder, ignore_errors=True)
             os.close(lock)
 
 
-def _lock(folder: Path) -> int | None:
-    """Hold a folder until the descriptor is closed; None if that is not possible."""
+def _remove_abandoned(path: Path) -> None:
+    """Remove temporary files and folders of `path` that no process holds, but no checkpoint's."""
+    name = f".{escape(path.stem)}.{'[0-9a-f]' * 8}.part{escape(path.suffix)}"
+    for part in path.parent.glob(name):
+        lock = None if has_checkpoint(part) else _lock(part)
+        if lock is not None:
+            if part.is_dir():
+                shutil.rmtree(part, ignore_errors=True)
+            else:
+                part.unlink(missing_ok=True)
+            os.close(lock)
+
+
+def _lock(part: Path) -> int | None:
+    """Hold a file or folder until the descriptor is closed; None if that is not possible."""
+    if sys.platform == "win32":  # where an open file cannot be moved
+        return None
     try:
-        descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:  # Windows opens no folders
+        descriptor = os.open(part, os.O_RDONLY)
+    except OSError:
         return None
     if hold(descriptor):
         return descriptor

@@ -18,30 +18,14 @@ from chipglow.text import read_small_text
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
-
-    Parameters
-    ----------
-    name : str
-        Its name; in the table's first line the unit follows: ``temperature_degC``.
-    example : str
-        A unit that it may have; empty for a plain number.
-    base : str
-        The SI unit of the same quantity; empty for a plain number.
-    difference : bool
-        Whether it is a difference, of which the zero of the unit does not count.
-    required : bool
-        Whether it must be there.
-    number_of : callable, optional
-        What makes a number of a cell's text, if the text is none, such as a file's name.
-    """
+    """A column of a table."""
 
     name: str
-    example: str = ""
-    base: str = ""
-    difference: bool = False
+    example: str = ""  # of a unit; without one it is a plain number
+    base: str = ""  # SI unit of the quantity
+    difference: bool = False  # the zero of the unit does not count
     required: bool = True
-    number_of: Callable[[str], float] | None = None
+    number_of: Callable[[str], float] | None = None  # of cells of text, such as file names
 
     @property
     def title(self) -> str:
@@ -65,27 +49,9 @@ _PIXEL_COLUMNS: Final = (Column("column"), Column("row"))
 def read_columns(
     path: str | os.PathLike[str], columns: Sequence[Column]
 ) -> dict[str, NDArray[np.float64]]:
-    """Read a table of numbers from a CSV file.
+    """Read a table of numbers from a CSV file: columns in SI by name, each of shape (rows,).
 
-    Parameters
-    ----------
-    path : path-like
-        First line the names of the columns with their units, such as ``temperature_degC,counts``;
-        then a line for each row, its numbers separated by commas.
-    columns : sequence of Column
-        What there may be.
-
-    Returns
-    -------
-    dict
-        Numbers in SI by the names of the columns that are there, each of shape (rows,).
-
-    Raises
-    ------
-    ValueError
-        If it is no such table; the message names the file and the line.
-    OSError
-        If it cannot be read.
+    In the first line the unit follows the name: ``temperature_degC,counts``.
     """
     return _table(Path(path), columns)[0]
 
@@ -122,26 +88,9 @@ def _table(
 def read_calibration_points(
     path: str | os.PathLike[str], counts_of: Callable[[str], float]
 ) -> dict[str, NDArray[np.float64]]:
-    """Read points of a calibration from a CSV file.
+    """Read a table of `POINT_COLUMNS` from a CSV file.
 
-    Parameters
-    ----------
-    path : path-like
-        A table of `POINT_COLUMNS`; the column ``file`` may take the place of ``counts``.
-    counts_of : callable
-        Counts of a recording by its name in that column.
-
-    Returns
-    -------
-    dict
-        As `read_columns`.
-
-    Raises
-    ------
-    ValueError
-        If it is no such table; the message names the file and the line.
-    OSError
-        If it, or a recording, cannot be read.
+    A column ``file`` may replace ``counts``: `counts_of` gives the counts of that recording.
     """
     first = read_small_text(Path(path)).partition("\n")[0]
     if "file" not in (cell.strip() for cell in first.split(",")):
@@ -193,36 +142,13 @@ def _is_number(text: str) -> bool:
 
 
 def read_polyline(path: Path) -> tuple[NDArray[np.float64], list[int]]:
-    """Read the corners of a polyline from a CSV file: ``x_um,y_um``, in any unit of length.
-
-    Returns
-    -------
-    corners : ndarray
-        x and y in m, shape (n, 2).
-    lines : list of int
-        Which line of the file each is.
-
-    Raises
-    ------
-    ValueError
-        If the file is no such table; the message names the file and the line.
-    OSError
-        If it cannot be read.
-    """
+    """Read corners in m, shape (n, 2), and the line of the file of each: ``x_um,y_um``."""
     table, lines = _table(path, _CORNER_COLUMNS)
     return np.stack([table["x"], table["y"]], axis=1), lines
 
 
 def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:
-    """Read a camera's spectral response from a CSV file: ``wavelength_um,response``.
-
-    Raises
-    ------
-    ValueError
-        If it is no such table; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """Read a camera's spectral response from a CSV file: ``wavelength_um,response``."""
     table = read_columns(path, _RESPONSE_COLUMNS)
     order = np.argsort(table["wavelength"])
     try:
@@ -234,27 +160,7 @@ def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:
 
 
 def read_bad_pixels(path: str | os.PathLike[str], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Read which pixels are bad from a CSV file: ``column,row``, counted from 0 at the upper left.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-    shape : tuple of int
-        Rows and columns of the image as the camera wrote it.
-
-    Returns
-    -------
-    ndarray
-        Which are bad, of this shape.
-
-    Raises
-    ------
-    ValueError
-        If it is no such table or a pixel is not in the image; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """Read which pixels of an image are bad: ``column,row``, counted from 0 at the upper left."""
     table = read_columns(path, _PIXEL_COLUMNS)
     mask = np.zeros(shape, np.bool_)
     for column, row in zip(table["column"], table["row"], strict=True):

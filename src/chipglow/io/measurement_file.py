@@ -12,8 +12,8 @@ import xarray as xr
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.chunks import COMPRESSION
 from chipglow.io.digest import append_digest, check_file, is_intact
-from chipglow.io.packing import COMPRESSION
 
 Made = TypeVar("Made")
 
@@ -32,20 +32,7 @@ def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) ->
 
 
 def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a dataset of moderate size to a NetCDF-4 file, compressed without loss.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        What to write.
-    path : path-like
-        The file to write; one that is there is replaced at the end.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written, as on a full disk.
-    """
+    """Write a dataset of moderate size to a NetCDF-4 file, compressed without loss."""
     encoding = {
         str(name): COMPRESSION
         for name, variable in data.variables.items()
@@ -79,23 +66,9 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
 
 
 def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str) -> Made:
-    """What is made of a NetCDF-4 file, which is no such thing if that fails.
+    """Return what `made_of` makes of the data of a NetCDF-4 file.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    made_of : callable
-        Makes it of the file's data; may raise ValueError or KeyError.
-    what, kind : str
-        What it should be, and of what kind the file, for errors.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is cut short or something else; the message names the file.
+    If that fails, the error says that the file is not `what`, and `kind` was expected.
     """
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
@@ -109,18 +82,15 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
 
 
 def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
-    """Whether a file is HDF5, whole enough to be opened, and has all these at its root.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged.
-    """
+    """Whether a file is HDF5, whole enough to be opened, and has all these at its root."""
     path = Path(path)
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     if is_intact(path) is False:
-        check_file(path)
+        try:
+            check_file(path)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
     try:
         with h5py.File(path, "r") as file:
             return set(names) <= set(file)

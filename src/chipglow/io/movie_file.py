@@ -21,13 +21,7 @@ _SAME: Final = 255
 
 
 def check_movie_path(path: str | os.PathLike[str]) -> None:
-    """Find out whether a movie of this name can be written, before anything is computed.
-
-    Raises
-    ------
-    ValueError
-        If the name does not end in .mp4 or .gif, or PyAV is missing for .mp4.
-    """
+    """Find out whether a movie of this name can be written, before anything is computed."""
     suffix = Path(path).suffix.lower()
     if suffix not in (".mp4", ".gif"):
         raise ValueError(f"{path}: expected the name of a movie, ending in .mp4 or .gif")
@@ -42,29 +36,10 @@ def check_movie_path(path: str | os.PathLike[str]) -> None:
 def movie_writer(
     path: str | os.PathLike[str], shape: tuple[int, int], palette: NDArray[np.uint8]
 ) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
-    """Write a movie of 20 pictures a second; no more than the last picture is kept in memory.
+    """Write a movie, .mp4 (H.264) or .gif, of 20 pictures per second as they come.
 
-    Parameters
-    ----------
-    path : path-like
-        The file to write, .mp4 (H.264) or .gif. It has a temporary name until the end; if the
-        block raises, nothing is left of it.
-    shape : tuple
-        Rows and columns of the pictures, both even.
-    palette : ndarray
-        Colours of a GIF, shape (up to `PALETTE_SIZE`, 3).
-
-    Yields
-    ------
-    callable
-        Takes the next picture: red, green and blue, shape (rows, columns, 3).
-
-    Raises
-    ------
-    ValueError
-        As `check_movie_path`, or if there was no picture.
-    OSError
-        If the file cannot be written; the message names it.
+    Yields a function that takes the next picture: red, green and blue, shape (rows, columns, 3),
+    both even. `palette` are the colours of a GIF, shape (up to `PALETTE_SIZE`, 3).
     """
     path = Path(path)
     check_movie_path(path)

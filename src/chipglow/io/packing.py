@@ -1,6 +1,5 @@
 """Resolution of a scene's fields in a file: what is rounded away so that it packs well."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -8,71 +7,44 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-COMPRESSION: Final[Mapping[str, Any]] = {
-    "compression": "gzip",
-    "compression_opts": 1,
-    "shuffle": True,
-}
-"""Compression of all that is written: every reader of NetCDF-4 knows it, and it has a checksum."""
 
+@dataclass(frozen=True)
+class Packing:
+    """How a field's values are stored.
 
-class Packing(ABC):
-    """How a field's float32 values are kept in a file."""
+    With a step as integers, the number of steps from the offset; with bits as floats that keep so
+    many bits after the leading one; else as they are.
+    """
 
-    dtype: type[np.generic]
+    dtype: type[np.generic] = np.float32
+    step: float = 0.0
+    offset: float = 0.0
+    bits: int = 0
 
     @property
-    def attributes(self) -> Mapping[str, Any]:
+    def attributes(self) -> dict[str, Any]:
         """Attributes of the CF conventions by which any reader unpacks the field."""
-        return {}
-
-    @abstractmethod
-    def pack(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Values as the file keeps them, shape (y, x).
-
-        Raises
-        ------
-        ValueError
-            If a value is beyond the range.
-        """
-
-    def unpack(self, packed: NDArray[Any]) -> NDArray[Any]:
-        """Values again, shape (y, x)."""
-        return packed
-
-
-@dataclass(frozen=True)
-class Whole(Packing):
-    """Bytes, as they are."""
-
-    dtype: type[np.generic] = np.uint8
-
-    def pack(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the values themselves."""
-        return values
-
-
-@dataclass(frozen=True)
-class Steps(Packing):
-    """Integers that count steps from an offset: the same resolution everywhere."""
-
-    dtype: type[np.integer[Any]]
-    step: float
-    offset: float = 0.0
+        if not self.step:
+            return {}
+        return {"scale_factor": np.float32(self.step), "add_offset": np.float32(self.offset)}
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest value."""
-        limits = np.iinfo(self.dtype)
+        """Smallest and largest value that integers reach."""
+        limits = np.iinfo(np.dtype(self.dtype))
         return self.offset + self.step * limits.min, self.offset + self.step * limits.max
 
-    @property
-    def attributes(self) -> Mapping[str, Any]:
-        """Step and offset."""
-        return {"scale_factor": np.float32(self.step), "add_offset": np.float32(self.offset)}
-
     def pack(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Round to the nearest step."""
+        """Return the values as they are stored; raise ValueError if one is beyond the range."""
+        if self.step:
+            return self._counts(values)
+        if self.bits:
+            # Veltkamp's splitting: the large product pushes the lower bits out.
+            product = values * np.float32(2 ** (23 - self.bits) + 1)
+            return np.asarray(product - (product - values))
+        return values
+
+    def _counts(self, values: NDArray[Any]) -> NDArray[Any]:
         lowest, highest = self.range
         least, greatest = float(values.min()), float(values.max())
         if not (lowest <= least and greatest <= highest):
@@ -83,25 +55,13 @@ class Steps(Packing):
         return np.rint(counts, out=counts).astype(self.dtype)
 
     def unpack(self, packed: NDArray[Any]) -> NDArray[Any]:
-        """Multiply and add."""
+        """Return the values of what `pack` returned."""
+        if not self.step:
+            return packed
         values = np.multiply(packed, np.float32(self.step), dtype=np.float32, casting="same_kind")
         if self.offset:
             values += np.float32(self.offset)
         return np.asarray(values)
-
-
-@dataclass(frozen=True)
-class Mantissa(Packing):
-    """Floats of which some bits after the leading one are kept: the same relative resolution."""
-
-    bits: int
-    dtype: type[np.generic] = np.float32
-
-    def pack(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Round to the nearest value with that many bits."""
-        # Veltkamp's splitting: the large product pushes the lower bits out.
-        product = values * np.float32(2 ** (23 - self.bits) + 1)
-        return np.asarray(product - (product - values))
 
 
 # Half a step of temperature changes the radiance temperature of one sample by 12.5 mK, and of a
@@ -109,25 +69,25 @@ class Mantissa(Packing):
 # their blends the rounding of strain and strain rate changes the emissivity by under 6e-5. Half a
 # step of the material coordinates is 1.5 % of a sample: 5e-5 on a typical slope of a texture.
 PACKING: Final[Mapping[str, Packing]] = {
-    "temperature": Steps(np.uint16, 0.025, 200.0),
-    "plastic_strain": Mantissa(13),
-    "plastic_strain_rate": Mantissa(11),
-    "velocity_x": Mantissa(10),
-    "velocity_y": Mantissa(10),
-    "material": Whole(),
-    "material_x": Steps(np.int32, 20e-9),
-    "material_y": Steps(np.int32, 20e-9),
-    "quality": Whole(),
+    "temperature": Packing(np.uint16, step=0.025, offset=200.0),
+    "plastic_strain": Packing(bits=13),
+    "plastic_strain_rate": Packing(bits=11),
+    "velocity_x": Packing(bits=10),
+    "velocity_y": Packing(bits=10),
+    "material": Packing(np.uint8),
+    "material_x": Packing(np.int32, step=20e-9),
+    "material_y": Packing(np.int32, step=20e-9),
+    "quality": Packing(np.uint8),
 }
 """Resolution of each field of a scene."""
 
 HOTTEST_PACKED: Final = 1838.375
 """Greatest temperature in K that 16 bits of its steps reach."""
 
-HOT: Final = Steps(np.int32, 0.025, 200.0)
+HOT: Final = Packing(np.int32, step=0.025, offset=200.0)
 """The temperature of a scene that may be hotter."""
 
 
-def packing_for(hottest: float, packing: Mapping[str, Packing] = PACKING) -> Mapping[str, Packing]:
-    """Resolution of each field of a scene whose temperature in K may be as high as `hottest`."""
-    return packing if hottest <= HOTTEST_PACKED else {**packing, "temperature": HOT}
+def packing_for(hottest: float) -> Mapping[str, Packing]:
+    """Packing of each field of a scene whose temperature in K may be as high as `hottest`."""
+    return PACKING if hottest <= HOTTEST_PACKED else {**PACKING, "temperature": HOT}

@@ -3,7 +3,9 @@
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import lru_cache, partial
 from importlib.metadata import version
+from math import prod
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -16,16 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io import spline_file
 from chipglow.io.atomic import KeptErrorFile, atomic_path
-from chipglow.io.decoded import CACHED_BYTES, Decoded
+from chipglow.io.chunks import COMPRESSION, read_chunk, write_chunk
 from chipglow.io.digest import append_digest, check_file
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import COMPRESSION, HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
+from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
     has_checkpoint,
-    keep_hold,
     write_checkpoint,
 )
 from chipglow.scene import (
@@ -78,6 +79,8 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
 # program reads yet.
 _VERSION: Final = "v110"
 
+CACHED_BYTES: Final = 512 * 1024**2
+"""Size of the part of a scene that stays decompressed in memory: of a cut's splines all of it."""
 
 CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 """The fields that the cutting simulation knows."""
@@ -104,8 +107,6 @@ class SceneWriter:
     hottest : float
         Greatest temperature in K that the frames may have. Over the default, 1838.375 K,
         temperature takes 32 bits instead of 16 and reaches all that a scene may have.
-    packing : mapping
-        Resolution of each field; by default one that suits any scene.
     lattice : Lattice, optional
         Keep the splines of the frames instead of their samples; for frames that have them.
     resume : UnfinishedScene, optional
@@ -127,7 +128,6 @@ class SceneWriter:
         fields: Sequence[str] = CUT_FIELDS,
         *,
         hottest: float = HOTTEST_PACKED,
-        packing: Mapping[str, Packing] = PACKING,
         lattice: Lattice | None = None,
         resume: UnfinishedScene | None = None,
     ) -> None:
@@ -138,7 +138,7 @@ class SceneWriter:
         self._units = {name: units[name] for name in fields}
         self._lattice = lattice
         self._chunked = spline_file.CHUNKED if lattice else tuple(self._units)
-        self._packing = packing_for(hottest, packing)
+        self._packing = packing_for(hottest)
         self._stack = ExitStack()
         self._times: list[float] = []
         self._chunks: list[tuple[int, int, int]] = []
@@ -166,16 +166,7 @@ class SceneWriter:
 
     @uninterrupted()
     def append(self, frame: Frame) -> None:
-        """Write the next frame.
-
-        Raises
-        ------
-        SceneError
-            If the frame breaks the contract of a scene, is not later than the one before, lacks a
-            field, or has a value beyond the file's range.
-        OSError
-            If the file cannot be written, as on a full disk.
-        """
+        """Write the next frame."""
         if self._times and frame.time <= self._times[-1]:
             raise SceneError(
                 f"scene: frame at {frame.time:.9g} s, expected later than {self._times[-1]:.9g} s"
@@ -186,31 +177,13 @@ class SceneWriter:
         self._file.resize_dimension("time", count + 1)
         self._file.variables["time"][count] = frame.time
         for name, values in packed.items():
-            self._file.variables[name][count] = values
+            write_chunk(self._hdf[name], count, values)
         self._sink.check(self.path)
         self._times.append(frame.time)
 
     @uninterrupted()
     def checkpoint(self, state: Mapping[str, NDArray[Any]], progress: float) -> Path:
-        """Keep the frames so far, with a state to go on from, even if the process is killed.
-
-        Parameters
-        ----------
-        state : mapping
-            Arrays by name.
-        progress : float
-            Fraction of the work that is done, 0 to 1.
-
-        Returns
-        -------
-        pathlib.Path
-            The checkpoint's file; it is removed when the scene is complete.
-
-        Raises
-        ------
-        OSError
-            If it cannot be written; the checkpoint before it stays.
-        """
+        """Keep the frames so far, with a state to go on from, even if the process is killed."""
         self._hdf.flush()
         self._sink.check(self.path)
         os.fsync(self._sink.fileno())
@@ -230,23 +203,7 @@ class SceneWriter:
         thrust: ArrayLike,
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
-        """Write the force history, once, and the energy balance with it.
-
-        Parameters
-        ----------
-        times : array_like
-            Times in s, ascending, shape (n,).
-        cutting, thrust : array_like
-            Forces per width of cut in N/m, shape (n,).
-        energies : mapping, optional
-            Energies per width of cut in J/m by the names of `ENERGY_UNITS`, each of shape (n,).
-
-        Raises
-        ------
-        SceneError
-            If an energy is missing or unknown, the shapes differ, a value is not finite or the
-            times do not ascend.
-        """
+        """Write the force history, once, and the energy balance with it."""
         time = np.asarray(times, dtype=np.float64)
         units = {**FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
         given = {"cutting_force": cutting, "thrust_force": thrust, **(energies or {})}
@@ -269,11 +226,8 @@ class SceneWriter:
 
     def _open(self, stack: ExitStack) -> None:
         stack.push(self._drop_checkpoint)
-        # A part that nobody holds is taken for abandoned: it is held until it is in its place.
-        moved = stack.enter_context(ExitStack())
         self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
         self._sink = stack.enter_context(KeptErrorFile(self._part))
-        keep_hold(self._sink, moved)
         stack.callback(self._sink.check, self.path)
         stack.callback(append_digest, self._sink)
         self._hdf = stack.enter_context(
@@ -388,8 +342,9 @@ class StoredScene(Scene):
         self.lattice = spline_file.stored_lattice(self._file, data)
         if self.lattice is not None:
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
-        self._near_splines: Decoded[SplineFrame] = Decoded(CACHED_BYTES)
-        self._near: Decoded[NDArray[Any]] = Decoded(CACHED_BYTES)
+        shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
+        chunks = CACHED_BYTES // max(prod(shape) * np.dtype(np.float32).itemsize, 1)
+        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, self._datasets))
         super().__init__(data)
 
     def coarser(self, step: int, every: int = 1) -> Scene:
@@ -419,11 +374,6 @@ class StoredScene(Scene):
         return HOTTEST_PACKED if narrow else HOTTEST_PLAUSIBLE
 
     @property
-    def packing(self) -> Mapping[str, Packing]:
-        """Resolution of each field."""
-        return {**PACKING, **self._direct}
-
-    @property
     def compression(self) -> str:
         """HDF5 filters of temperature or splines: ``shuffle, deflate``; ``none``."""
         kept = "temperature" if self.lattice is None else spline_file.SPLINES
@@ -449,41 +399,41 @@ class StoredScene(Scene):
         if self.lattice is None:
             return None
         index = range(len(self.times))[index]
-        found = self._near_splines.get(index)
-        if found is None:
-            with self._telling(spline_file.SPLINES, index):
-                nodes, limits = (self._datasets[name][index] for name in spline_file.CHUNKED)
-            found = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
-            spline_file.check(found)
-            self._near_splines.keep(index, found, nodes.nbytes)
-        return found
+        nodes, limits = (self._chunk(name, index) for name in spline_file.CHUNKED)
+        frame = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
+        spline_file.check(frame)
+        return frame
 
     def _read(self, name: str, index: int) -> NDArray[Any]:
         splines = self.splines(index)
         if splines is not None:
             material = splines.material()
             return material if name == "material" else splines.values(name, material)
-        if name not in self._direct:
-            with self._telling(name, index):
-                return super()._read(name, index)
         index = range(len(self.times))[index]
-        packed = self._near.get((name, index))
-        if packed is None:
-            with self._telling(name, index):
-                packed = self._datasets[name][index]
-            self._near.keep((name, index), packed, packed.nbytes)
+        if name not in self._direct:
+            with _telling(self.path, name, index):
+                return super()._read(name, index)
+        packed = self._chunk(name, index)
         values = self._direct[name].unpack(packed)
         return values.copy() if values is packed else values
 
-    @contextmanager
-    def _telling(self, name: str, index: int) -> Iterator[None]:
-        """Say of what cannot be read where it is."""
-        try:
-            yield
-        except OSError as error:
-            raise SceneError(
-                f"{self.path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
-            ) from error
+
+def _read_chunk(
+    path: Path, datasets: Mapping[str, h5py.Dataset], name: str, index: int
+) -> NDArray[Any]:
+    with _telling(path, name, index):
+        return read_chunk(datasets[name], index)
+
+
+@contextmanager
+def _telling(path: Path, name: str, index: int) -> Iterator[None]:
+    """Say of what cannot be read where it is."""
+    try:
+        yield
+    except OSError as error:
+        raise SceneError(
+            f"{path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
+        ) from error
 
 
 class _CoarserScene(Scene):
@@ -564,7 +514,6 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
         attributes=scene.data.attrs,
         fields=scene.fields,
         hottest=stored.hottest if stored is not None else HOTTEST_PLAUSIBLE,
-        packing=stored.packing if stored is not None else PACKING,
         lattice=stored.lattice if stored is not None and not samples else None,
     ) as writer:
         for frame in scene.frames():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from chipglow.io.packing import COMPRESSION
+from chipglow.io.chunks import COMPRESSION
 from chipglow.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS, SceneError
 from chipglow.scene.scene import raster_of
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
@@ -78,37 +78,19 @@ def create(file: h5netcdf.File, lattice: Lattice) -> None:
 
 
 def rounded(frame: SplineFrame) -> dict[str, NDArray[np.float32]]:
-    """What the file keeps of a frame, by variable.
-
-    Raises
-    ------
-    SceneError
-        If a coefficient is not finite.
-    """
+    """What the file keeps of a frame, by variable."""
     check(frame)
     return {SPLINES: np.rint(frame.nodes / _STEP) * _STEP, LIMITS: frame.limits}
 
 
 def check(frame: SplineFrame) -> None:
-    """Refuse splines that are not numbers.
-
-    Raises
-    ------
-    SceneError
-        If a coefficient or a limit is not finite.
-    """
+    """Refuse splines that are not numbers."""
     if not (np.isfinite(frame.nodes).all() and np.isfinite(frame.limits).all()):
         raise SceneError(f"scene: a spline at {frame.time:.9g} s is not finite everywhere")
 
 
 def stored_lattice(file: h5py.File, data: xr.Dataset) -> Lattice | None:
-    """Where the nodes of a file's splines are; None if it has none.
-
-    Raises
-    ------
-    SceneError
-        If they are not as `create` makes them.
-    """
+    """Where the nodes of a file's splines are; None if it has none."""
     if SPLINES not in file:
         return None
     x, y, splines = file["node_x"][:], file["node_y"][:], file[SPLINES]

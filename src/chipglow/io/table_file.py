@@ -14,15 +14,7 @@ _KINDS: Final = (".csv", ".nc")
 
 
 def check_table_path(path: Path) -> None:
-    """Check the name of a file for results before anything is computed.
-
-    Raises
-    ------
-    ValueError
-        If it ends in something else than .csv or .nc.
-    OSError
-        As `check_output`.
-    """
+    """Check that a file for results can be written, .csv or .nc, before anything is computed."""
     if path.suffix.lower() not in _KINDS:
         raise ValueError(f"{path}: expected a file that ends in {' or '.join(_KINDS)}")
     check_output(path)
@@ -34,26 +26,7 @@ def write_table_or_dataset(
     rows: Iterable[Sequence[Any]],
     dataset: Callable[[], xr.Dataset],
 ) -> None:
-    """Write results as what the file's name says.
-
-    Parameters
-    ----------
-    path : Path
-        The file to write, .csv or .nc; one that is there is replaced at the end.
-    columns : sequence of str
-        Names of the table's columns, with their units.
-    rows : iterable of sequence
-        The table.
-    dataset : callable
-        Makes the arrays.
-
-    Raises
-    ------
-    ValueError
-        If the name ends in something else.
-    OSError
-        If the file cannot be written.
-    """
+    """Write rows as CSV or the dataset as NetCDF, by the suffix of the file."""
     check_table_path(path)
     if path.suffix.lower() == ".nc":
         write_dataset(dataset(), path)

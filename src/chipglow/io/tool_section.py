@@ -65,22 +65,10 @@ class ToolSection(Settings[Tool]):
 
 
 def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
-    """Read a tool's outline from a CSV file and place it.
+    """Read a tool's outline from a CSV file and place it: see `ToolOutline.placed`.
 
-    Parameters
-    ----------
-    path : path-like
-        First line ``x_um,y_um``, or another unit of length, then a point a line, separated by a
-        comma: from the rake face round the edge to the flank face, x with the workpiece's motion,
-        y upward. Where the origin is does not matter: see `ToolOutline.placed`.
-
-    Raises
-    ------
-    ValueError
-        If the file is no such table, or no tool can have this outline; the message names the file
-        and the line.
-    OSError
-        If it cannot be read.
+    First line ``x_um,y_um``, or another unit of length; then one point per line from the rake face
+    round the edge to the flank face, x along the workpiece's motion, y upward.
     """
     path = Path(path)
     points, lines = read_polyline(path)

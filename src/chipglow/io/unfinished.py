@@ -4,7 +4,7 @@ import os
 import sys
 import zlib
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
@@ -22,15 +22,7 @@ _OWN: Final = (_PROGRESS, _TIMES, _CHUNKS)
 
 @dataclass(frozen=True)
 class UnfinishedScene:
-    """Frames that a writer left, and its last checkpoint.
-
-    Parameters
-    ----------
-    part : Path
-        File under a temporary name in which the writer wrote.
-    progress : float
-        Fraction of the work that was done at the last checkpoint; 0 if there is none.
-    """
+    """Frames that a writer left in `part`, and its last checkpoint; without one `progress` is 0."""
 
     part: Path
     progress: float
@@ -84,19 +76,7 @@ def write_checkpoint(
 ) -> None:
     """Replace the checkpoint of a part whose frames are on the disk.
 
-    Parameters
-    ----------
-    part : Path
-        The part.
-    state : mapping
-        Arrays by name.
-    progress : float
-        Fraction of the work that is done.
-    times : sequence of float
-        Times of the frames in s.
-    chunks : sequence
-        Of every frame one chunk for each field: offset in the file, size in bytes, HDF5 filter
-        mask.
+    Of each frame `chunks` has one for each field: offset in the file, size in bytes, filter mask.
     """
     own = {
         _PROGRESS: np.float64(progress),
@@ -115,13 +95,7 @@ def write_checkpoint(
 
 
 def unfinished_scenes(path: Path) -> list[UnfinishedScene]:
-    """What ended writers of a scene left, the furthest first.
-
-    Parameters
-    ----------
-    path : Path
-        Where the scene would be; its name may be a pattern for several scenes.
-    """
+    """What ended writers of a scene, or of several by a pattern, left; the furthest first."""
     left = path.parent.glob(f".{path.stem}.*.part.*")
     parts = {name.with_suffix(path.suffix) for name in left}
     scenes = [UnfinishedScene(part, _progress(part)) for part in parts if _is_abandoned(part)]
@@ -150,12 +124,6 @@ def hold(descriptor: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def keep_hold(file: FileIO, until: ExitStack) -> None:
-    """Keep a file locked until a stack ends, though it be closed before."""
-    if sys.platform != "win32":  # where nothing locks it, and an open file could not be moved
-        until.callback(os.close, os.dup(file.fileno()))
 
 
 def _draft(part: Path) -> Path:

@@ -1,25 +1,14 @@
 """Recordings of real cameras, whatever their files are."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
 
-from chipglow.camera import PlanckConversion, Recording
+from chipglow.camera import Recording
 from chipglow.io.cameras.formats import camera_formats, find_format, read_here
 from chipglow.io.cameras.stacks import Stated
-from chipglow.io.sandbox import Message, Sandbox, patience_for
+from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.io.sources import SourceError
-from chipglow.radiometry import ObjectParameters
-from chipglow.text import Notes
-
-_ARRAYS: Final = ("signal", "times")
-_PARTS: Final = {
-    "conversion": PlanckConversion,
-    "object_parameters": ObjectParameters,
-    "notes": Notes,
-}
 
 
 def read_recording(
@@ -81,30 +70,15 @@ def read_recording(
     if one.in_subprocess(path):
         sandbox = Sandbox(str(path), patience_for((str(path),)))
         with sandbox.answers(partial(_read, path, kind, frames, stated)) as answers:
-            return _recording(next(answers))
+            recording: Recording = next(answers)
+            return recording
     return read_here(path, kind, frames, stated)
 
 
-def _read(path: Path, kind: str, frames: slice | None, stated: Stated) -> Iterator[Message]:
+def _read(path: Path, kind: str, frames: slice | None, stated: Stated) -> Iterator[Recording]:
     try:
-        recording = read_here(path, kind, frames, stated)
+        yield read_here(path, kind, frames, stated)
     except FileNotFoundError:
         raise
     except (ValueError, OSError) as error:
         raise SourceError(str(error)) from None
-    yield _message(recording)
-
-
-def _message(recording: Recording) -> Message:
-    """A recording as JSON and arrays, without a band: none that is read in a subprocess says it."""
-    header = {one.name: getattr(recording, one.name) for one in fields(Recording)}
-    del header["band"]
-    arrays = {name: header.pop(name) for name in _ARRAYS}
-    parts = {name: header[name] and asdict(header[name]) for name in _PARTS}
-    return Message({**header, **parts}, arrays)
-
-
-def _recording(message: Message) -> Recording:
-    header: dict[str, Any] = message.header
-    parts = {name: header[name] and kind(**header[name]) for name, kind in _PARTS.items()}
-    return Recording(**{**header, **parts, **message.arrays})
