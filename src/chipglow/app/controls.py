@@ -462,12 +462,14 @@ def _surfaces(study: Study) -> dict[str, Option]:
     }
     surfaces[OWN] = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
     return {
-        name: Option(
-            name.capitalize(),
-            {"surface": surface, "analysis.rake_chip": name, "analysis.band_chip": name},
-        )
+        name: Option(name.capitalize(), {"surface": surface, "analysis": _reading(study, name)})
         for name, surface in surfaces.items()
     } | uniform
+
+
+def _reading(study: Study, chip: str) -> object:
+    """Return the section of the analysis that reads one chip everywhere."""
+    return changed(study.analysis, {"rake_chip": chip, "band_chip": chip})
 
 
 def _starts(scene: Scene, duration: float) -> Iterator[float]:
