@@ -505,7 +505,7 @@ def test_metre_per_pixel():
         ({"tool_colour": (300, 0, 0)}, "colour: .* of 0 to 255"),
         ({"tool_polygon": ((1, 2),)}, "tool_polygon: 1 corner"),
         ({"placement": Placement("x", "z")}, "placement: .* expected x and y"),
-        ({"origin": (float("nan"), 0)}, "origin: .* expected 2 finite numbers"),
+        ({"origin": (float("nan"), 0)}, "origin.0: nan, expected a finite number"),
     ],
 )
 def test_wrong_values_are_refused(change, message):
