@@ -371,7 +371,7 @@ def test_command_lists_and_shows() -> None:
     listed = CliRunner().invoke(app, ["materials"])
     assert listed.exit_code == 0
     assert all(name in listed.output for name in material_names())
-    shown = CliRunner().invoke(app, ["materials", "aisi-1045"])
+    shown = CliRunner().invoke(app, ["materials", "aisi-1045"], env={"COLUMNS": "120"})
     assert shown.exit_code == 0
     for text in ("flow_stress.ozel.hardening", "553.1 MPa", "27.32 W/(m K) at 900 degC", "Oxley"):
         assert text in shown.output

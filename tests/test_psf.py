@@ -278,8 +278,8 @@ def test_pickles_are_not_opened(tmp_path):
     [
         lambda: GaussianPSF(0.0),
         lambda: GaussianPSF(8.0),
-        lambda: GaussianPSF("8 um"),
-        lambda: AnnularAperturePSF("4.5 um"),
+        lambda: GaussianPSF("8 K"),
+        lambda: AnnularAperturePSF("4.5 kg"),
         lambda: AnnularAperturePSF(numerical_aperture="0.3"),
         lambda: AnnularAperturePSF(obscuration=None),
         lambda: MeasuredPSF(LOPSIDED, "1 um"),

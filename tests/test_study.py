@@ -12,8 +12,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from chipglow.analysis import Plan
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Friction, Numerics, OutputWindow
-from chipglow.io import open_scene, read_tool_outline
-from chipglow.io.atomic import KeptErrorFile
+from chipglow.io import atomic_path, open_scene, read_tool_outline
 from chipglow.quantities import Part, own_settings, units
 from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Raster, Scene, ToolGeometry
 from chipglow.study import (
@@ -609,11 +608,11 @@ def test_what_ended_runs_left_is_cleared_and_what_runs_stays(cache):
     part = cache / ".scene-ended.0123abcd.part.nc"
     for path in (part, part.with_suffix(".npz"), cache / ".scene-other.89ab4567.part.npz"):
         path.write_bytes(b"x" * 10)
-    with KeptErrorFile(cache / ".scene-running.0123abcd.part.nc") as running:
-        running.write(b"x" * 10)
+    with atomic_path(cache / "scene-running.nc") as running:
+        running.write_bytes(b"x" * 10)
         assert [scene.path for scene in cached_scenes()] == [part]
         assert clear_cache() == 20
-        assert [path.name for path in cache.iterdir()] == [".scene-running.0123abcd.part.nc"]
+        assert list(cache.iterdir()) == [running]
     assert clear_cache() == 10
 
 

@@ -167,9 +167,9 @@ def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
 @contextmanager
 def _temporary(path: Path, create: Callable[[Path], None]) -> Iterator[Path]:
     """Create a file or folder beside `path` and hold it; others whose process ended are removed."""
-    path = path.absolute()  # "." has no name
-    _remove_abandoned(path)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    place = path.absolute()  # "." has no name
+    _remove_abandoned(place)
+    temporary = place.with_name(f".{place.stem}.{secrets.token_hex(4)}.part{place.suffix}")
     lock = None
     try:
         with _errors_name(path, temporary):
