@@ -14,7 +14,9 @@ from chipglow.io import (
     prospect,
     read_measurement,
 )
+from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import Legend, MovieSource, NamedMap
 from chipglow.scene import Material, ToolGeometry
 from chipglow.text import DescriptionError
@@ -171,12 +173,31 @@ def test_the_kind_is_told_by_the_name():
     assert isinstance(ImportDescription(source="a.mat").build().source.source, GridSource)
 
 
+def test_the_kind_that_is_said_comes_before_the_name(arrays, tmp_path):
+    path = tmp_path / "import.yaml"
+    path.write_text("source: cut.npz\nkind: points\nfields: {temperature: NT11}\n")
+    assert isinstance(load_import(path).build().source.source, CloudSource)
+    assert isinstance(load_import(path, ["kind=mesh"]).build().source.source, MeshSource)
+    assert "kind: points" in import_text(load_import(path)).splitlines()
+
+
+def test_a_movie_needs_no_source_beside_its_section(tmp_path):
+    path = tmp_path / "import.yaml"
+    path.write_text(
+        "kind: movie\n"
+        "movie: {temperature: {file: disc.avi, first: 80 degC, last: 600 degC}, pixel: 1 mm}\n"
+    )
+    source = load_import(path).build().source.source
+    assert source.inputs == (str(tmp_path / "disc.avi"),)
+
+
 def test_the_description_that_init_writes_says_every_field_and_is_read_back(arrays, tmp_path):
     path = tmp_path / "import.yaml"
     result = RUNNER.invoke(app, ["init", str(path), "--import"])
     assert result.exit_code == 0, result.output
     assert load_import(path) == ImportDescription()
     assert "# Units of the source" in path.read_text()
+    assert "# What the source is" in path.read_text()
     path.write_text(path.read_text().replace("source: none", "source: cut.npz", 1))
     assert load_import(path).file == str(arrays)
 

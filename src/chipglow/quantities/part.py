@@ -112,7 +112,7 @@ class Part:
             read = _section(type(self)).validate_python({**values, **completed})
         except ValidationError as error:
             raise ValueError(f"{type(self).__name__}.{problem(error)}") from None
-        for name in read.keys() - {"kind"}:
+        for name in read.keys() & self._annotations.keys():
             object.__setattr__(self, name, read[name])
         object.__setattr__(self, "given", self.given | completed.keys())
 
@@ -155,7 +155,8 @@ class Part:
             from_file = bool(info.context)
             data = _known_keys(cls.completed({} if data is None else data, from_file), _keys(cls))
             values = _section(cls).validate_python(data, context=info.context)
-            values.pop("kind", None)
+            if cls.kind:
+                values.pop("kind", None)
             try:
                 return cls(**values)
             except OSError as error:  # name the field of a file that cannot be read

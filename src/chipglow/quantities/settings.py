@@ -69,7 +69,7 @@ def own_settings(part: Part) -> Iterator[Setting]:
     plain, defaults = adapter(type(part)).dump_python(part, mode="json"), part.defaults()
     for name in plain:
         value = getattr(part, name)
-        if name == "kind":
+        if name not in part._annotations:
             kind = Parameter(first_sentence(type(part)))
             yield Setting(name, kind, str, value, value, value)
             continue
