@@ -31,7 +31,7 @@ def study_with(cell):
 
 def row(cell):
     """Cut and look, and return the cell's row of the table."""
-    found = {each.key: each.here_text for each in result_rows(run(study_with(cell)))}
+    found = {each.key: each.cells["mean"] for each in result_rows(run(study_with(cell)))}
     return [f"{cell:g}", *(found[key] for key in SHOWN)]
 
 

@@ -103,3 +103,23 @@ GENERATED.mkdir(exist_ok=True)
 # Pages offer the files with which their commands can be tried.
 for page in SAMPLES:
     write_archive(page, GENERATED / f"{page}.zip")
+
+
+PLAIN: dict[str, list[str]] = {}
+
+
+def keep_plain(app, what, name, obj, options, lines):
+    """Keep the docstring of an attribute: Napoleon takes what is before a colon for its type."""
+    if what in ("attribute", "data", "property"):
+        PLAIN[name] = list(lines)
+
+
+def restore_plain(app, what, name, obj, options, lines):
+    """Restore the docstring of an attribute after Napoleon."""
+    lines[:] = PLAIN.pop(name, lines)
+
+
+def setup(app):
+    """Surround Napoleon, whose priority is 500."""
+    app.connect("autodoc-process-docstring", keep_plain, priority=400)
+    app.connect("autodoc-process-docstring", restore_plain, priority=600)

@@ -117,7 +117,6 @@ OWN_PROCESS = ("app_latency.py", "fuzz/fuzz.py", "registration_libraries.py", "s
 def run(tmp_path, monkeypatch, capsys, shared_folder):
     """Function that runs a program in an empty folder and returns its output; one cache for all."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
     monkeypatch.setenv("CHIPGLOW_CACHE", str(shared_folder("benchmarks", lambda folder: None)))
     threads = numba.get_num_threads()
     numba.set_num_threads(1)  # threads that wait cost time
@@ -126,7 +125,8 @@ def run(tmp_path, monkeypatch, capsys, shared_folder):
         path = str(FOLDER / program)
         if program in OWN_PROCESS:
             command = [sys.executable, path, *arguments]
-            done = subprocess.run(command, capture_output=True, encoding="utf-8")
+            alone = {**os.environ, "NUMBA_NUM_THREADS": "1"}
+            done = subprocess.run(command, capture_output=True, encoding="utf-8", env=alone)
             assert done.returncode == 0, done.stderr
             return done.stdout
         monkeypatch.setattr(sys, "argv", [path, *arguments])
