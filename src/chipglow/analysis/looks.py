@@ -107,9 +107,11 @@ class Looked:
         exposure: int,
         exposures: Mapping[tuple[str, int], Exposure],
         cameras: Sequence[Camera],
+        progress: Callable[[float], None],
     ) -> None:
         """Read every view of one exposure, for all textures, pixel phases and other cameras."""
-        schedule = self.schedule
+        schedule, finished = self.schedule, 0
+        textures = sum(view.textures for view in schedule.views)
         for number, view in enumerate(schedule.views):
             places = view.places[exposure]
             for texture in range(view.textures):
@@ -120,12 +122,15 @@ class Looked:
                     index = exposure, texture
                     self._read_scene((number, i), place, index, images.exposure, noisy[0])
                 cases = (None, *schedule.vary) if texture == 0 else (None,)
-                for (case, change), (phase, camera) in product(enumerate(cases), enumerate(noisy)):
+                looks = list(product(enumerate(cases), enumerate(noisy)))
+                for step, ((case, change), (phase, camera)) in enumerate(looks):
+                    progress((finished + step / len(looks)) / textures)
                     stack = images.stack(change(camera) if change else camera, schedule.effects)
                     pixels = camera.pixels(images.exposure.raster)
                     for i, place in enumerate(places):
                         indices = case, exposure, texture, phase
                         self._read((number, i), place, indices, stack, pixels)
+                finished += 1
 
     def _read(
         self,
@@ -246,8 +251,13 @@ def look(
     looked = Looked(schedule, fields, camera.pitch)
     cameras = pixel_phases(camera, schedule.phases)
     share = 1 / (len(schedule.starts) + len(schedule.drawn))
+
+    def share_from(begun: float) -> Callable[[float], None]:
+        return lambda part: progress(begun + share * part)
+
     for i, start in enumerate(schedule.starts):
-        progress(share * (i + sum(number < i for number in schedule.drawn)))
+        begun = share * (i + sum(number < i for number in schedule.drawn))
+        progress(begun)
         laid = first | others if i in schedule.drawn else first
         exposed = camera.expose_fields(scene, list(laid.values()), float(start))
         exposures = dict(zip(laid, exposed, strict=True))
@@ -259,6 +269,7 @@ def look(
                 stack = images.stack(camera.redrawn(number), schedule.effects)
                 looked.shown[name] = images.exposure, stack[1:]
         if i in schedule.drawn:
-            looked.draw(schedule.drawn.index(i), exposures, cameras)
+            drawn = schedule.drawn.index(i)
+            looked.draw(drawn, exposures, cameras, share_from(begun + share))
     progress(1.0)
     return looked

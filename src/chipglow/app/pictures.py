@@ -227,29 +227,24 @@ class SceneModel:
         cursor = PointPlace(CURSOR, state.cursor)
         places = cursor, *map(state.line, LINES)
         count = textures if surface.redrawn(1) is not surface else 1
-        noise = np.arange(count * phases**2).reshape(count, 1, phases**2)
-        draws = []
-        for number in range(count):
-            progress(number / count)
-            one = {CURSOR: surface.redrawn(number)}
-            schedule = Schedule(
-                starts=np.array([state.start]),
-                drawn=(0,),
-                shown=0,
-                views=(View(CURSOR, [places], noise[number][None]),),
-                phases=phases,
-                reference=state.study.analysis.reference,
-                effects={ALL: CASES[ALL]},
-            )
-            laid = {CURSOR: camera.lay(one[CURSOR], scene)}
-            draws.append(look(scene, one, laid, camera, schedule, lambda _: None))
-        progress(1.0)
-        pixel = np.stack([looked.read[0, 0, 0] for looked in draws])
-        error = pixel[..., 1] - pixel[..., 0]
+        noise = np.arange(count * phases**2).reshape(1, count, phases**2)
+        schedule = Schedule(
+            starts=np.array([state.start]),
+            drawn=(0,),
+            shown=0,
+            views=(View(CURSOR, [places], noise),),
+            phases=phases,
+            reference=state.study.analysis.reference,
+            effects={ALL: CASES[ALL]},
+        )
+        laid = {CURSOR: camera.lay(surface.redrawn(0), scene)}
+        looked = look(scene, {CURSOR: surface}, laid, camera, schedule, progress)
+        reference, measured = np.moveaxis(looked.read[0, 0], -1, 0)
+        error = measured - reference
         return Drawn(
             state,
             {
-                name: np.concatenate([looked.along[row, 0, 0, :, 1] for looked in draws]) - KELVIN
+                name: np.concatenate(looked.along[row, 0, :, :, 1]) - KELVIN
                 for row, name in enumerate(LINES)
             },
             Distribution(error, ("texture", "pixel phase")) if np.isfinite(error).all() else None,
