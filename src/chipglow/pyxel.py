@@ -19,7 +19,6 @@ from scipy.constants import c, h
 
 from chipglow.camera import Camera
 from chipglow.io import open_scene
-from chipglow.quantities.option import parse
 from chipglow.quantities.units import INSTANT
 from chipglow.radiometry import Band
 from chipglow.scene import Scene
@@ -80,7 +79,10 @@ def photons(
     if not 0 < transmittance <= 1:
         raise ValueError(f"transmittance: {transmittance!r}, expected over 0, at most 1")
     scene, surface, camera = _setup(study, chip)
-    first = float(scene.times[0]) if start is None else parse("start", INSTANT, start)
+    try:
+        first = float(scene.times[0]) if start is None else INSTANT.parse(start)
+    except ValueError as error:
+        raise ValueError(f"start: {error}") from None
     shape = (detector.geometry.row, detector.geometry.col)
     expected = camera.pixels(scene.raster).shape
     if shape != expected:

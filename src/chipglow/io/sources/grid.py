@@ -77,7 +77,7 @@ class GridSource(Source, Part):
     title: ClassVar[str] = "a grid"
     endings: ClassVar[tuple[str, ...]] = tuple(ARRAY_READERS)
     files: Annotated[
-        str | dict[str, FileBeside] | None,
+        FileBeside | dict[str, FileBeside] | None,
         Parameter(
             "Files by the names of fields, in the place of source.",
             allowed="none, or {temperature: T.npy, plastic_strain: strain.npy}",
