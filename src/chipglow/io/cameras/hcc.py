@@ -115,8 +115,8 @@ def _frame(header_length: int, height: int, width: int) -> np.dtype[Any]:
 def _header_length(binary: Binary, first: dict[str, Any]) -> int:
     """Return the length of a frame's header: two lines of the picture, or what the header says."""
     pixels = 2 * first["width"] * first["height"]
-    lengths = [4 * first["width"], first["header_length"]]
-    lengths = [length for length in lengths if length >= _HEADER.itemsize]
+    said: list[int] = [4 * first["width"], first["header_length"]]
+    lengths = [length for length in said if length >= _HEADER.itemsize]
     # A file without a frame that is cut tells it by its size, else the second header does.
     lengths.sort(key=lambda length: binary.size % (length + pixels) != 0)
     for length in lengths:
