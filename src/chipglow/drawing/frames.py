@@ -5,11 +5,7 @@ from numpy.typing import NDArray
 
 
 def shown_frame(times: NDArray[np.float64], time: float | None, whose: str) -> int:
-    """Return the index of the frame nearest to a time in s; without a time, of the middle frame.
-
-    Raises ValueError, naming `whose` frames they are, if the time is more than half a frame before
-    the first or after the last.
-    """
+    """Return the index of the frame nearest to a time, by default the middle one."""
     if time is None:
         return (len(times) - 1) // 2
     slack = 1e-9 + (float(np.diff(times).min()) / 2 if len(times) > 1 else 0.0)
