@@ -9,8 +9,8 @@ first time and again. Beside them the bound, which is to read once what the pass
 paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table, and with a quadrature over
 64 wavelengths instead of the table. The study is the paper's: nine instants, two chips, on the
 same file, or on that of a cut (`chipglow cache list` says where). An image is what a camera makes
-of a kept mean radiance: GalSim, pyBSM, Pyxel and SciPy make it too, if they are there
-(``pip install galsim pybsm pyxel-sim``), and Pyxel counts.
+of a kept mean radiance: GalSim, Pyxel and SciPy make it too, if they are there
+(``pip install galsim pyxel-sim``), and Pyxel counts.
 
 All are timed in one run, frames and studies in turn, each after a call that is not timed; the best
 of the rounds counts. Processor time is that of all threads: it is what can be compared on a machine
@@ -57,7 +57,6 @@ NEEDED = (
 )  # fmt: skip
 PEERS = {
     "GalSim": ("galsim", "peers.image_galsim"),
-    "pyBSM": ("pybsm", "peers.image_pybsm"),
     "Pyxel": ("pyxel", "peers.image_pyxel"),
 }
 READ_NOISE = 500.0  # electrons
