@@ -26,6 +26,7 @@ import numpy as np
 import tifffile
 import yaml
 from numpy.typing import NDArray
+from scipy.integrate import trapezoid
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 
@@ -47,7 +48,6 @@ from chipglow.camera import (
     ShotNoise,
     fit_linear,
 )
-from chipglow.camera.optics.pupil import annular_transfer
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
@@ -76,6 +76,7 @@ from synthetic_edge import (
     PITCH,
     WAVELENGTH,
     annular_edge,
+    annular_line,
     edge_radiance,
     gaussian_edge,
     tailed_edge,
@@ -176,14 +177,14 @@ def tailed_optics(core: float, fraction: float, length: float) -> Optics:
 def mirror_optics(aperture: float, obscuration: float) -> Optics:
     """Return the diffraction of an annular pupil."""
     psf = AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
-    cutoff = 2 * aperture / WAVELENGTH
-    return Optics(
-        "mirror",
-        psf,
-        psf.fwhm,
-        annular_edge(WAVELENGTH, aperture, obscuration),
-        lambda f: float(annular_transfer(np.array(f / cutoff), obscuration)),
-    )
+    unit = WAVELENGTH / (2 * pi * aperture)
+    far, line, energy = annular_line(obscuration)
+
+    def transfer(f: float) -> float:
+        return 2 * float(trapezoid(np.cos(2 * pi * f * unit * far) * line, far)) / energy
+
+    edge = annular_edge(WAVELENGTH, aperture, obscuration)
+    return Optics("mirror", psf, psf.fwhm, edge, transfer)
 
 
 def hidden_optics(generator: np.random.Generator) -> Optics:
