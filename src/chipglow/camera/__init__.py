@@ -1,4 +1,4 @@
-"""Cameras, virtual and real: optics, exposure, calibration, and the measurement that comes out."""
+"""Virtual and real cameras: optics, exposure, detector, calibration and measurement."""
 
 from chipglow.camera.calibration.blackbody import Blackbody
 from chipglow.camera.calibration.calibration import (

@@ -18,13 +18,7 @@ from chipglow.camera.detector import (
 from chipglow.camera.detector.terms import follows
 from chipglow.camera.exposure import Exposure, expose_all
 from chipglow.camera.measurement import Measurement
-from chipglow.camera.optics import (
-    BLURS,
-    AnnularAperturePSF,
-    OpticsTerm,
-    PointSpreadFunction,
-    blur,
-)
+from chipglow.camera.optics import BLURS, AnnularAperturePSF, OpticsTerm, PointSpreadFunction, blur
 from chipglow.camera.optics.convolution import (
     blur_of_like,
     both_borders,
@@ -36,7 +30,7 @@ from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_rast
 from chipglow.camera.optics.terms import Blur
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
@@ -195,94 +189,43 @@ class Camera(Part):
 
     @classmethod
     def paper(cls) -> "Camera":
-        """The camera of the paper's simulation, as far as the paper states it.
+        """Return the camera of the paper's simulation, as far as the paper states it.
 
-        The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6:
-        that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
-        the paper prints as a picture only, is an assumption: see `AnnularAperturePSF`. A study's
-        camera is this one, unless it says otherwise.
+        The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6;
+        that changes temperatures by up to 7 K. The point spread function, which the paper prints as
+        a picture only, is an assumption: see `AnnularAperturePSF`.
         """
         return cls(psf_order="detector")
 
     def pixels(self, scene: Raster) -> Raster:
-        """Where the pixels lie on a scene.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-
-        Raises
-        ------
-        ValueError
-            If not one pixel fits, or `shape` reaches beyond the scene.
-        """
+        """Return the raster of the pixels on a scene."""
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
 
     def in_band(self, band: Band) -> "Camera":
-        """The camera with another band: its diffraction is that of the band.
-
-        Parameters
-        ----------
-        band : Band
-            The other band. There is no lower range limit in it: the camera's is of its own band.
-        """
+        """Return the camera with another band and its diffraction, without a lower range limit."""
         psf = None if self.psf is None else self.psf.in_band(band)
         return replace(self, band=band, psf=psf, lower_limit=None)
 
     def redrawn(self, number: int) -> "Camera":
-        """The camera with other noise of its detector: the seed `number` further on."""
+        """Return the camera with other detector noise: its seed increased by `number`."""
         return replace(self, seed=self.seed + number) if number and self.detector else self
 
     def calibration(self, shape: tuple[int, int]) -> FlatFieldCalibration | None:
-        """The calibration of the detector at this camera's exposure; None without a detector.
-
-        Parameters
-        ----------
-        shape : tuple of int
-            Rows and columns of the pixels.
-        """
+        """Return the detector's calibration for pixels of this shape; None without a detector."""
         if self.detector is None:
             return None
         point = OperationPoint(self.band, self.integration_time, self.frame_rate, self.fill_factor)
         return flat_field_calibration(self.detector, point, shape)
 
-    def frame_times(self, start: float, count: int) -> NDArray[np.float64]:
-        """When the frames of a sequence begin.
-
-        Parameters
-        ----------
-        start : float
-            When the first frame begins in s.
-        count : int
-            Number of frames.
-
-        Returns
-        -------
-        ndarray
-            Times in s, shape (count,).
-        """
+    def frame_times(self, start: float, count: int) -> Array:
+        """Return the start times of a sequence of frames in s, shape (count,)."""
         return start + np.arange(count) / self.frame_rate
 
-    def row_delays(self, scene: Raster) -> NDArray[np.float64]:
-        """How much later than the first row's each sample's integration begins.
+    def row_delays(self, scene: Raster) -> Array:
+        """Return how much later than the first row each row of samples begins to integrate.
 
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-
-        Returns
-        -------
-        ndarray
-            For each row of samples that of the pixels in which its middle lies, or of the nearest
-            ones, in s, shape (y,); 0 with a global shutter.
-
-        Raises
-        ------
-        ValueError
-            If the pixels do not fit the scene, or all their rows take longer than there is between
-            frames.
+        In s, shape (y,): that of the pixels in which the row's middle lies, or of the nearest ones;
+        0 with a global shutter.
         """
         sensors = self.pixels(scene)
         if self.line_time is None:
@@ -297,30 +240,11 @@ class Camera(Part):
         return np.asarray(self.line_time * np.clip(rows, 0, sensors.rows - 1), np.float64)
 
     def frame_duration(self, scene: Raster) -> float:
-        """Time in s from the beginning of the first row's integration to the end of the last's.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-        """
+        """Return the time in s from the first row's start of integration to the last's end."""
         return self.integration_time + float(self.row_delays(scene).max())
 
     def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
-        """Lay a surface on a scene as this camera sees it, in its band and its surroundings.
-
-        Parameters
-        ----------
-        surface : Surface
-            The surface.
-        scene : Scene
-            What it is laid on.
-
-        Raises
-        ------
-        ValueError
-            If the surface is none, or the scene lacks what it needs.
-        """
+        """Return a surface laid on a scene, in this camera's band and surroundings."""
         if not isinstance(surface, Surface):
             raise ValueError(
                 f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
@@ -379,35 +303,32 @@ class Camera(Part):
         return expose_all(scene, fields, self.band, *when, self.reflected, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
-        """Make the frames that the camera reads from exposures.
+        """Return the frames that the camera reads from exposures.
 
-        Size of source, blur and mean over time are linear and change places: the mean, which an
-        exposure holds, is blurred and integrated once. That is equal to the loop of Figure 6, and
-        any number of cameras with the same band, integration time and surroundings may develop
-        the same exposures.
+        Size of source, blur and mean over time are linear and commute: the mean, which an exposure
+        holds, is blurred and integrated once. That equals the loop of Figure 6, and any number of
+        cameras with the same band, integration time and surroundings may use the same exposures.
 
         Parameters
         ----------
         exposures : Exposure or iterable of Exposure
-            What the scene sent, one for each frame.
+            One for each frame.
 
         Returns
         -------
         Measurement
-            As many frames as exposures. Its attribute ``warnings`` says how far the border of the
+            As many frames as exposures. Its attribute ``warnings`` states how far the border of the
             scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
 
         Raises
         ------
         ValueError
-            If there is no exposure, they are of different grids, or the pixels do not fit.
+            If there is no exposure, their grids differ, or the pixels do not fit.
 
         Notes
         -----
-        What is beyond the scene is not known. It is taken to be as at the scene's edge, and the
-        light that comes from there (`light_from_beyond`) is what a warning is about: it compares
-        with a second assumption, by which each pixel sees beyond the scene the like of what it
-        sees within.
+        Beyond the scene radiance is taken to be as at the scene's edge. The warning compares with a
+        second assumption: that beyond the scene each pixel sees the like of what it sees within.
         """
         if isinstance(exposures, Exposure):
             exposures = (exposures,)
@@ -443,25 +364,24 @@ class Camera(Part):
         return measured
 
     def measure(
-        self, scene: Scene, surface: Surface, start: float | Sequence[float] | NDArray[np.float64]
+        self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
         """Measure a scene.
 
         Parameters
         ----------
         scene : Scene
-            What is truly there.
+            The true temperatures.
         surface : Surface
             Its emissivity.
         start : float or sequence of float
-            When the integration of each frame begins in s; see `frame_times` for a sequence at
-            the frame rate.
+            Start of each frame's integration in s; see `frame_times` for a sequence at the frame
+            rate.
 
         Returns
         -------
         Measurement
-            As many frames as starts. It states the scene's tool, and in its attributes camera and
-            surface: every effect that made it.
+            As many frames as starts, with the scene's tool, and attributes of camera and surface.
 
         Raises
         ------
@@ -476,24 +396,8 @@ class Camera(Part):
         )
         return measured.with_tool(scene.tool) if scene.tool else measured
 
-    def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
-        """Fraction of the light of every pixel that comes from beyond a scene, where none is known.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-
-        Returns
-        -------
-        ndarray
-            From 0 to under 1, of the shape of `sensors`; 0 without a point spread function.
-
-        Raises
-        ------
-        ValueError
-            If the pixels do not fit the scene.
-        """
+    def light_from_beyond(self, scene: Raster) -> Array:
+        """Return the fraction of each pixel's light that comes from beyond a scene, (y, x)."""
         sensors = self.pixels(scene)
         if self.psf is None:
             return np.zeros(sensors.shape)
@@ -503,8 +407,8 @@ class Camera(Part):
         whole, own = whole_raster(scene, sensors)
         return light_from_beyond(self.psf, self.pitch, whole.shape)[own].copy()
 
-    def form_image(self, radiance: NDArray[np.float64], scene: Raster) -> NDArray[np.float64]:
-        """Image of a map of radiance on the pixels: optics, point spread function and footprint.
+    def form_image(self, radiance: Array, scene: Raster) -> Array:
+        """Return the image of a radiance map on the pixels: optics, PSF and footprint.
 
         Parameters
         ----------
@@ -522,7 +426,7 @@ class Camera(Part):
         Raises
         ------
         ValueError
-            If the map is not of the raster's shape, holds what is no radiance, or the pixels do
+            If the map is not of the raster's shape or not finite and 0 or more, or the pixels do
             not fit the scene.
         """
         image = np.asarray(radiance, np.float64)
@@ -538,9 +442,9 @@ class Camera(Part):
         return self._read_out(image, scene, sensors, blur)
 
     def _both_images(
-        self, radiance: NDArray[np.float64], scene: Raster, sensors: Raster
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Image on the pixels by either rule of what is beyond the scene, if that matters."""
+        self, radiance: Array, scene: Raster, sensors: Raster
+    ) -> tuple[Array, Array | None]:
+        """Return the image on the pixels by either assumption beyond the scene, if that matters."""
         image = like = radiance
         if self.psf is None and not self.optics:
             return self._read_out(image, scene, sensors, blur), None
@@ -554,10 +458,8 @@ class Camera(Part):
             self._read_out(like, scene, sensors, blur_of_like),
         )
 
-    def _read_out(
-        self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """Radiance of every pixel, `sensors.shape`, from an image behind the optics' own PSF."""
+    def _read_out(self, image: Array, scene: Raster, sensors: Raster, blurred: Blur) -> Array:
+        """Return the radiance of every pixel from an image behind the optics' own PSF."""
         for term in self.optics:
             image = term.on_samples(image, scene, sensors, blurred)
         image = self._on_pixels(image, scene, sensors, blurred)
@@ -565,10 +467,8 @@ class Camera(Part):
             image = term.on_pixels(image, sensors, self.band)
         return image
 
-    def _on_pixels(
-        self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """What pixels integrate, in the detector's order with the point spread function."""
+    def _on_pixels(self, image: Array, scene: Raster, sensors: Raster, blurred: Blur) -> Array:
+        """Return what pixels integrate, and the PSF if it is of the detector's order."""
         if self.psf is None or self.psf_order == "optics":
             return integrate(image, scene, sensors, self._sensitive(scene))
         # Pixels that are not read out tell what is beyond those that are.
@@ -576,7 +476,7 @@ class Camera(Part):
         return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
     def _sensitive(self, scene: Raster) -> float:
-        """Fraction of a pixel's square that it integrates: a sample, if the blur did the rest."""
+        """Return the fraction of a pixel's square that it integrates, less after a footprint."""
         if not self._blur_has_footprint:
             return self.fill_factor
         return min((scene.spacing / self.pitch) ** 2, 1.0)
@@ -585,40 +485,14 @@ class Camera(Part):
     def _blur_has_footprint(self) -> bool:
         return self.psf is not None and "footprint" in self.psf.includes
 
-    def measurement(
-        self, images: NDArray[np.float64], starts: NDArray[np.float64], scene: Raster
-    ) -> Measurement:
-        """The frames that the camera reads from images that it formed.
-
-        Parameters
-        ----------
-        images : ndarray
-            Radiance in W/(m² sr) as `form_image` gives it, shape (time, y, x).
-        starts : ndarray
-            When the integration of each began in s, shape (time,).
-        scene : Raster
-            The samples of the scene that they are images of.
-        """
+    def measurement(self, images: Array, starts: Array, scene: Raster) -> Measurement:
+        """Return the frames read from images of `form_image` of a scene, shape (time, y, x)."""
         return self._measurement(images, starts, self.pixels(scene))
 
-    def read(
-        self, images: NDArray[np.float64], starts: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint8] | None]:
-        """What the detector and its calibration make of images.
+    def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
+        """Return radiance and flags that detector and calibration make of images (time, y, x).
 
-        Parameters
-        ----------
-        images : ndarray
-            Radiance in W/(m² sr) as `form_image` gives it, shape (time, y, x).
-        starts : ndarray
-            When the integration of each began in s, shape (time,).
-
-        Returns
-        -------
-        radiance : ndarray
-            As the camera reads it; without a detector the images themselves.
-        flags : ndarray or None
-            Sums of `Flag`, uint8, of the same shape; None without a detector.
+        Without a detector the images themselves, and None.
         """
         calibration = self.calibration(images.shape[1:])
         if self.detector is None or calibration is None:
@@ -628,12 +502,10 @@ class Camera(Part):
         return calibration.radiance(counts)
 
     def _generator(self, start: float) -> np.random.Generator:
-        """Noise of the frame that begins then, however many others are read with it."""
+        """Return the noise of the frame that begins then, however many others are read with it."""
         return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
 
-    def _measurement(
-        self, images: NDArray[np.float64], starts: NDArray[np.float64], sensors: Raster
-    ) -> Measurement:
+    def _measurement(self, images: Array, starts: Array, sensors: Raster) -> Measurement:
         radiance, flags = self.read(images, starts)
         return Measurement.from_radiance(
             radiance,
@@ -645,8 +517,8 @@ class Camera(Part):
             attributes=self._attributes(sensors.shape),
         )
 
-    def _warnings(self, starts: NDArray[np.float64]) -> Iterator[str]:
-        """What to know of frames by when they begin, a sentence each."""
+    def _warnings(self, starts: Array) -> Iterator[str]:
+        """Yield warnings about frames by their starts."""
         lags = self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms)
         if lags and not follows(starts, 1 / self.frame_rate).any():
             yield (
@@ -655,7 +527,7 @@ class Camera(Part):
             )
 
     def _attributes(self, shape: tuple[int, int]) -> dict[str, float | str]:
-        """What a measurement does not state of the camera by itself; SI, without what is None."""
+        """Return the camera's attributes of a measurement, in SI, without those that are None."""
         attributes: dict[str, float | str | None] = {
             "offset_right": self.offset[0],
             "offset_down": self.offset[1],
@@ -680,10 +552,8 @@ class Camera(Part):
         return {name: value for name, value in attributes.items() if value is not None}
 
 
-def _border_warning(
-    measured: Measurement, other: NDArray[np.float64], scene: Raster
-) -> Iterator[str]:
-    """What the border of the scene may change, beside temperatures under another assumption."""
+def _border_warning(measured: Measurement, other: Array, scene: Raster) -> Iterator[str]:
+    """Warn how far another assumption about what is beyond the scene changes temperatures."""
     change = np.abs(measured.radiance_temperature() - other)
     changed = change > BORDER_TOLERANCE
     if not changed.any():

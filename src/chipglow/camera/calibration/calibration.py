@@ -1,4 +1,4 @@
-"""From a camera's counts to radiance: calibrations, and how far they can be trusted."""
+"""Calibrations from a camera's counts to radiance, with their uncertainty."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
 from chipglow.camera.recording import PlanckConversion
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
@@ -22,33 +23,19 @@ _NODES: Final = 513
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Calibration(ABC):
-    """What a camera's counts mean.
-
-    Parameters
-    ----------
-    band : Band
-        The camera's band.
-    lowest, highest : float
-        Radiance temperatures in K between which it holds; unlimited by default.
-    integration_time : float, optional
-        Integration time in s for which it holds.
-    range_name : str, optional
-        The camera's measuring range for which it holds, as its maker calls it.
-    warnings : tuple of str
-        Why it may not be relied on, a sentence each.
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
-    """
+    """Meaning of a camera's counts."""
 
     band: Band
     lowest: float = 0.0
+    """Radiance temperature in K from which on it holds."""
     highest: float = inf
+    """Radiance temperature in K up to which it holds."""
     integration_time: float | None = None
+    """Integration time in s for which it holds."""
     range_name: str | None = None
+    """The camera's measuring range for which it holds, as its maker calls it."""
     warnings: tuple[str, ...] = ()
+    """Why it may not be relied on, a sentence each."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.lowest < self.highest:
@@ -62,13 +49,13 @@ class Calibration(ABC):
             )
 
     @abstractmethod
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+    def radiance(self, counts: ArrayLike) -> Array:
+        """Return the in-band radiance in W/(m² sr) of counts; NaN where there is none."""
 
     @property
     @abstractmethod
     def errors(self) -> CalibrationErrors | None:
-        """What its errors change in the radiance; None if that is not known."""
+        """Effects of its errors on the radiance; None if they are not known."""
 
     @property
     @abstractmethod
@@ -78,34 +65,16 @@ class Calibration(ABC):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedCalibration(Calibration):
-    """A calibration whose parameters were fitted to blackbodies.
-
-    Parameters
-    ----------
-    parameters : ndarray
-        As `NAMES` says, shape (n,).
-    covariance : ndarray
-        Their covariance, shape (n, n): of the fit, and of what the blackbodies have in common.
-    **others
-        As `Calibration` has them.
-
-    Attributes
-    ----------
-    kind : str
-        Name of the model, in files and commands.
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit or a value is impossible.
-    """
+    """A calibration whose parameters were fitted to blackbodies; `kind` is its name in files."""
 
     kind: ClassVar[str] = ""
     NAMES: ClassVar[tuple[str, ...]] = ()
     UNITS: ClassVar[tuple[str, ...]] = ()
 
-    parameters: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    parameters: Array
+    """As `NAMES` says, shape (n,)."""
+    covariance: Array
+    """Of the fit and of what the blackbodies have in common, shape (n, n)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -127,20 +96,20 @@ class FittedCalibration(Calibration):
             raise ValueError("calibration: a variance is negative, expected 0 or more")
 
     @abstractmethod
-    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a blackbody of this temperature in K."""
+    def counts(self, temperature: ArrayLike) -> Array:
+        """Return the counts of a blackbody of this temperature in K."""
 
     @abstractmethod
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with the temperature, in 1/K."""
+    def slope(self, temperature: ArrayLike) -> Array:
+        """Return the change of the counts with the temperature, in 1/K."""
 
     @abstractmethod
-    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with each parameter, shape (n, ...) for temperatures (...)."""
+    def gradient(self, temperature: ArrayLike) -> Array:
+        """Return the change of the counts with each parameter, shape (n, ...)."""
 
     @abstractmethod
-    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def temperature(self, counts: ArrayLike) -> Array:
+        """Return the temperature in K of the blackbody that gives these counts, or NaN."""
 
     @property
     def rises(self) -> bool:
@@ -149,28 +118,27 @@ class FittedCalibration(Calibration):
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return bool((self.slope(kelvins) > 0).all())
 
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+    def radiance(self, counts: ArrayLike) -> Array:
         return np.asarray(self.band.radiance(self.temperature(counts)), np.float64)
 
-    def uncertainty(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Standard uncertainty of `radiance` in W/(m² sr), of the same shape."""
+    def uncertainty(self, counts: ArrayLike) -> Array:
+        """Return the standard uncertainty of `radiance` in W/(m² sr)."""
         return np.asarray(np.sqrt((self._effects(self.temperature(counts)) ** 2).sum(axis=0)))
 
     @cached_property
     def errors(self) -> CalibrationErrors:
-        """What its errors change in the radiance, from the coldest to the hottest blackbody.
+        """Effects of its errors on the radiance, from the coldest to the hottest blackbody.
 
-        What the calibration makes wrong at one radiance it makes wrong at others, too: ratios and
-        differences are known better, or worse, than that.
+        An error at one radiance is one at others, too: ratios and differences are known better, or
+        worse, than that.
         """
         coldest, hottest = self.counts([self.lowest, self.highest]).tolist()
         kelvins = self.temperature(np.linspace(coldest, hottest, _NODES))
         radiance = np.asarray(self.band.radiance(kelvins), np.float64)
         return CalibrationErrors(radiance, self._effects(kelvins))
 
-    def _effects(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Changes of the radiance by independent errors of the parameters, shape (n, ...).
+    def _effects(self, temperature: Array) -> Array:
+        """Return changes of the radiance by independent errors of the parameters, shape (n, ...).
 
         Each is of one standard uncertainty; together they have the covariance of the parameters
         (JCGM 100, Equation 13): at given counts S a change of the parameters moves the radiance by
@@ -179,8 +147,8 @@ class FittedCalibration(Calibration):
         errors = factor(self.covariance, CALIBRATION)
         return np.tensordot(errors.T, self._sensitivity(temperature), 1)
 
-    def _sensitivity(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Change of the radiance with each parameter at given counts, shape (n, ...)."""
+    def _sensitivity(self, temperature: Array) -> Array:
+        """Return the change of the radiance with each parameter at given counts, shape (n, ...)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = self.band.slope(temperature) / self.slope(temperature)
             return np.asarray(-self.gradient(temperature) * slope)
@@ -189,13 +157,7 @@ class FittedCalibration(Calibration):
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearCalibration(FittedCalibration):
-    """Counts that are a straight line over the in-band radiance: S = offset + gain L(T).
-
-    Parameters
-    ----------
-    **all
-        As `FittedCalibration` has them; offset in counts, gain in counts per W/(m² sr).
-    """
+    """Counts that are a straight line over the in-band radiance: S = offset + gain L(T)."""
 
     kind: ClassVar[str] = "linear"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "gain")
@@ -208,29 +170,23 @@ class LinearCalibration(FittedCalibration):
 
     @property
     def description(self) -> str:
-        """What it is, for people."""
         return "straight line over the in-band radiance"
 
-    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a blackbody of this temperature in K."""
+    def counts(self, temperature: ArrayLike) -> Array:
         offset, gain = self.parameters
         return np.asarray(offset + gain * self.band.radiance(_floats(temperature)))
 
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with the temperature, in 1/K."""
+    def slope(self, temperature: ArrayLike) -> Array:
         return np.asarray(self.parameters[1] * self.band.slope(temperature))
 
-    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with offset and gain, shape (2, ...)."""
+    def gradient(self, temperature: ArrayLike) -> Array:
         radiance = self.band.radiance(_floats(temperature))
         return np.stack([np.ones_like(radiance), radiance])
 
-    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def temperature(self, counts: ArrayLike) -> Array:
         return np.asarray(self.band.temperature(self.radiance(counts)), np.float64)
 
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape."""
+    def radiance(self, counts: ArrayLike) -> Array:
         offset, gain = self.parameters
         return np.asarray((_floats(counts) - offset) / gain)
 
@@ -240,13 +196,6 @@ class LinearCalibration(FittedCalibration):
 class SakumaHattori(FittedCalibration):
     """Counts by the Planckian form of Sakuma and Hattori: S = offset + C / (exp(c2/(A T + B)) − 1).
 
-    Parameters
-    ----------
-    **all
-        As `FittedCalibration` has them; offset and C in counts, A in m, B in m K.
-
-    Notes
-    -----
     F. Sakuma and S. Hattori, Temperature: Its Measurement and Control in Science and Industry 5
     (1982) 421; recommended by the CIPM's consultative committee for thermometry (CCT-WG5, 2008).
     Their signal has no offset; the counts of a camera have one.
@@ -258,38 +207,33 @@ class SakumaHattori(FittedCalibration):
 
     @property
     def description(self) -> str:
-        """What it is, for people."""
         return "Planckian form of Sakuma and Hattori"
 
-    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a blackbody of this temperature in K."""
+    def counts(self, temperature: ArrayLike) -> Array:
         offset, _, _, scale = self.parameters
         return np.asarray(offset + scale * _occupation(self._exponent(temperature)))
 
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with the temperature, in 1/K."""
+    def slope(self, temperature: ArrayLike) -> Array:
         return np.asarray(self.parameters[1] * self._by_stretched(temperature))
 
-    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with offset, A, B and C, shape (4, ...)."""
+    def gradient(self, temperature: ArrayLike) -> Array:
         kelvins, stretched = _floats(temperature), self._by_stretched(temperature)
         occupation = _occupation(self._exponent(temperature))
         return np.stack([np.ones_like(kelvins), kelvins * stretched, stretched, occupation])
 
-    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def temperature(self, counts: ArrayLike) -> Array:
         offset, a, b, scale = self.parameters
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithm = np.log1p(scale / (_floats(counts) - offset))
             kelvins = (SECOND_RADIATION_CONSTANT / logarithm - b) / a
         return np.where(kelvins > 0, kelvins, np.nan)
 
-    def _exponent(self, temperature: ArrayLike) -> NDArray[np.float64]:
+    def _exponent(self, temperature: ArrayLike) -> Array:
         _, a, b, _ = self.parameters
         return np.asarray(SECOND_RADIATION_CONSTANT / (a * _floats(temperature) + b))
 
-    def _by_stretched(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with A T + B."""
+    def _by_stretched(self, temperature: ArrayLike) -> Array:
+        """Return the change of the counts with A T + B."""
         exponent = self._exponent(temperature)
         occupation = _occupation(exponent)
         growth = occupation * (1 + occupation) * exponent**2 / SECOND_RADIATION_CONSTANT
@@ -299,25 +243,15 @@ class SakumaHattori(FittedCalibration):
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FactoryCalibration(Calibration):
-    """The conversion that a camera's maker stored in the file; its uncertainty is not known.
-
-    Parameters
-    ----------
-    conversion : PlanckConversion
-        From counts to the temperature of a blackbody.
-    **others
-        As `Calibration` has them.
-    """
+    """The conversion that a camera's maker stored in the file; its uncertainty is not known."""
 
     conversion: PlanckConversion
 
     @property
     def description(self) -> str:
-        """What it is, for people."""
         return "the maker's, from the file; its uncertainty is not known"
 
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+    def radiance(self, counts: ArrayLike) -> Array:
         kelvins = self.conversion.temperature(np.asarray(counts))
         return np.asarray(self.band.radiance(kelvins), np.float64)
 
@@ -330,6 +264,6 @@ def _floats(values: ArrayLike) -> NDArray[Any]:
     return np.asarray(values, np.float64)
 
 
-def _occupation(exponent: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 / (exp(x) − 1), without overflow at large x."""
+def _occupation(exponent: Array) -> Array:
+    """Return 1 / (exp(x) − 1), without overflow at large x."""
     return np.asarray(np.exp(-exponent) / -np.expm1(-exponent))

@@ -16,6 +16,7 @@ from chipglow.camera.calibration.calibration import (
     SakumaHattori,
 )
 from chipglow.camera.calibration.checks import alike, drift_shift, residual_warnings
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
@@ -31,33 +32,23 @@ _IDEAL: Final = Blackbody()
 
 @dataclass(frozen=True, eq=False)
 class CalibrationFit(Generic[Kind]):
-    """A calibration, and how well it meets the points that it was fitted to.
-
-    Parameters
-    ----------
-    calibration : FittedCalibration
-        The calibration.
-    temperatures, counts : ndarray
-        The points: radiance temperature of the blackbody in K and counts, shape (n,).
-    residuals : ndarray
-        Counts minus those of the calibration, shape (n,).
-    standard_uncertainties : ndarray
-        Standard uncertainty of each residual in counts, the temperature's included, shape (n,).
-    stated : bool
-        Whether the points' uncertainties were stated. If not, these are the scatter of
-        the residuals themselves, which then prove nothing of the form of the calibration.
-    """
+    """A calibration, and how well it fits its n points."""
 
     calibration: Kind
-    temperatures: NDArray[np.float64]
-    counts: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    standard_uncertainties: NDArray[np.float64]
+    temperatures: Array
+    """Radiance temperatures of the blackbody in K, shape (n,)."""
+    counts: Array
+    """Shape (n,)."""
+    residuals: Array
+    """Counts minus those of the calibration, shape (n,)."""
+    standard_uncertainties: Array
+    """Of the residuals in counts, the temperatures' included, shape (n,)."""
     stated: bool
+    """Whether the uncertainties were stated; otherwise they are the residuals' scatter."""
 
     @property
-    def residuals_temperature(self) -> NDArray[np.float64]:
-        """The residuals as differences of temperature in K, shape (n,)."""
+    def residuals_temperature(self) -> Array:
+        """Residuals as differences of temperature in K, shape (n,)."""
         return self.residuals / self.calibration.slope(self.temperatures)
 
     @property
@@ -72,7 +63,7 @@ class CalibrationFit(Generic[Kind]):
 
     @property
     def probability(self) -> float | None:
-        """Probability of a chi-squared as large as this or larger; None unless `stated`.
+        """Probability of a chi-squared as large or larger; None unless `stated`.
 
         Where it is small, the form of the calibration or the stated uncertainties are wrong.
         """
@@ -82,10 +73,9 @@ class CalibrationFit(Generic[Kind]):
 
     @property
     def information_criterion(self) -> float:
-        """Akaike's, corrected for few points: the form with the least is to be preferred.
+        """Akaike's, corrected for few points; infinite where there are too few of them.
 
-        Infinite where there are too few points to say. Only of use between fits to the same
-        points, with the same `stated`.
+        Only of use between fits to the same points, with the same `stated`.
         """
         points, parameters = self.counts.size, self.calibration.parameters.size
         estimated = parameters if self.stated else parameters + 1
@@ -102,7 +92,7 @@ class CalibrationFit(Generic[Kind]):
         Of stated ones the root of the reduced chi-squared where it is over 1 (R. T. Birge, Physical
         Review 40 (1932) 207). Where the scatter of the points is all that is known, Student's
         factor for 95 % over the normal distribution's (JCGM 100, G.3): with few points it is large,
-        and twice the standard uncertainty holds the truth as often as it says.
+        and twice the standard uncertainty holds the truth as often as stated.
         """
         free = self.degrees_of_freedom
         if not self.stated:
@@ -110,7 +100,7 @@ class CalibrationFit(Generic[Kind]):
         return max(float(np.sqrt(self.chi_squared / free)), 1.0) if free else 1.0
 
     def coverage_factor(self) -> float:
-        """Factor on the standard uncertainty that gives an interval of 95 %: the normal one's."""
+        """Return the normal distribution's factor of an interval of 95 %."""
         return float(ndtri(_QUANTILE))
 
 
@@ -204,9 +194,7 @@ def fit_sakuma_hattori(
     return _fit(points, _first_guess(points, band, build), build)
 
 
-def _first_guess(
-    points: "_Points", band: Band, build: Callable[..., SakumaHattori]
-) -> NDArray[np.float64]:
+def _first_guess(points: "_Points", band: Band, build: Callable[..., SakumaHattori]) -> Array:
     wavelengths = np.linspace(band.lower, band.upper, 501)
     weights = np.ones_like(wavelengths) if band.response is None else band.response(wavelengths)
     mean = float(np.average(wavelengths, weights=weights))
@@ -225,11 +213,11 @@ class _Points:
     What all points have in common is a list of errors in K by the point, each of one deviation.
     """
 
-    temperatures: NDArray[np.float64]
-    counts: NDArray[np.float64]
-    count_uncertainty: NDArray[np.float64]
-    temperature_uncertainty: NDArray[np.float64]
-    common: tuple[NDArray[np.float64], ...]
+    temperatures: Array
+    counts: Array
+    count_uncertainty: Array
+    temperature_uncertainty: Array
+    common: tuple[Array, ...]
     stated: bool
 
     @classmethod
@@ -277,10 +265,10 @@ class _Points:
 
     def builder(
         self, kind: type[Kind], band: Band, integration_time: float | None, range_name: str | None
-    ) -> Callable[[NDArray[np.float64], NDArray[Any]], Kind]:
+    ) -> Callable[[Array, NDArray[Any]], Kind]:
         """What makes a calibration that holds over the points, of parameters and covariance."""
 
-        def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> Kind:
+        def build(parameters: Array, covariance: NDArray[Any]) -> Kind:
             return kind(
                 band=band,
                 lowest=float(self.temperatures.min()),
@@ -308,14 +296,14 @@ class _Points:
             ),
         )
 
-    def deviations(self, slope: NDArray[np.float64]) -> NDArray[np.float64]:
+    def deviations(self, slope: Array) -> Array:
         """Effective standard uncertainties in counts; 1 if none are stated."""
         if not self.stated:
             return np.ones_like(self.counts)
         return np.hypot(self.count_uncertainty, slope * self.temperature_uncertainty)
 
 
-def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
     try:
         values = np.broadcast_to(np.asarray(0.0 if value is None else value, np.float64), shape)
     except ValueError:
@@ -325,7 +313,7 @@ def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> 
     return values
 
 
-def _expect_unsaturated(kelvins: NDArray[np.float64], counts: NDArray[np.float64]) -> None:
+def _expect_unsaturated(kelvins: Array, counts: Array) -> None:
     """Refuse points whose greatest counts are the same at several temperatures."""
     greatest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
     if greatest.size > 1 and np.unique(counts).size > 1:
@@ -344,9 +332,7 @@ def _expect_rising(rises: bool) -> None:
 
 
 def _fit(
-    points: _Points,
-    start: NDArray[np.float64],
-    build: Callable[[NDArray[np.float64], NDArray[Any]], Kind],
+    points: _Points, start: Array, build: Callable[[Array, NDArray[Any]], Kind]
 ) -> CalibrationFit[Kind]:
     """Least squares by the effective variance, iterated until the weights stay."""
     nothing = np.zeros((start.size, start.size))
@@ -385,16 +371,16 @@ def _fit(
 def _least_squares(
     points: _Points,
     calibration: Kind,
-    deviations: NDArray[np.float64],
-    build: Callable[[NDArray[np.float64], NDArray[Any]], Kind],
-) -> NDArray[np.float64]:
+    deviations: Array,
+    build: Callable[[Array, NDArray[Any]], Kind],
+) -> Array:
     nothing = calibration.covariance
 
-    def misfit(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    def misfit(parameters: Array) -> Array:
         model = build(parameters, nothing).counts(points.temperatures)
         return np.asarray((model - points.counts) / deviations)
 
-    def jacobian(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+    def jacobian(parameters: Array) -> Array:
         return (build(parameters, nothing).gradient(points.temperatures) / deviations).T
 
     try:
@@ -419,19 +405,14 @@ def _least_squares(
     return np.asarray(found.x)
 
 
-def _design(
-    points: _Points, calibration: FittedCalibration, deviations: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _design(points: _Points, calibration: FittedCalibration, deviations: Array) -> Array:
     """Change of the points with the parameters over the deviations, shape (point, parameter)."""
     return np.asarray((calibration.gradient(points.temperatures) / deviations).T)
 
 
 def _covariance(
-    points: _Points,
-    calibration: FittedCalibration,
-    deviations: NDArray[np.float64],
-    enlargement: float,
-) -> NDArray[np.float64]:
+    points: _Points, calibration: FittedCalibration, deviations: Array, enlargement: float
+) -> Array:
     """Covariance of the fit, enlarged, and of what the points have in common."""
     design = _design(points, calibration, deviations)
     lengths = np.linalg.norm(design, axis=0)

@@ -1,4 +1,4 @@
-"""What the detector adds: electrons, noise, counts, non-uniformity, bad pixels, and its range."""
+"""Effects of the detector: electrons, noise, counts, non-uniformity, bad pixels, and its range."""
 
 from chipglow.camera.detector.bad_pixels import (
     LEAST_FRAMES,

@@ -1,4 +1,4 @@
-"""What the optics and the detector elements do to a radiance image."""
+"""Effects of the optics and the detector elements on a radiance image."""
 
 from chipglow.camera.optics.blurs import (
     BLURS,

@@ -35,7 +35,7 @@ from chipglow.camera.optics.psf import (
     check_aperture,
     object_aperture,
 )
-from chipglow.quantities import Parameter
+from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import POSITION, TEMPERATURE
 from chipglow.radiometry import Band
 
@@ -60,12 +60,11 @@ _WIDTH_SQUARES: Final = 128
 
 
 class _Zernike:
-    """How a description writes coefficients: a mapping from Noll's index to a length."""
+    """Schema of coefficients: descriptions write a mapping from Noll's index to a length."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of the field: pairs of index and m."""
         return core_schema.no_info_plain_validator_function(
             self._pairs,
             serialization=core_schema.plain_serializer_function_ser_schema(
@@ -76,7 +75,6 @@ class _Zernike:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """JSON schema: texts with a unit by whole numbers."""
         text = {"type": "string", "examples": ["0.2 um"]}
         return {"type": "object", "patternProperties": {"^[0-9]+$": text}}
 
@@ -89,7 +87,7 @@ class _Zernike:
 
 
 def _whole(index: object) -> Any:
-    """A whole number that was written as a text, as the keys of JSON are."""
+    """Return the whole number written as text, as the keys of JSON are."""
     return int(index) if isinstance(index, str) and re.fullmatch("[0-9]{1,3}", index) else index
 
 
@@ -208,7 +206,6 @@ class PupilPSF(PointSpreadFunction):
 
     @cached_property
     def fwhm(self) -> float:  # type: ignore[override]
-        """Full width at half maximum in m."""
         half = _WIDTH_SQUARES
         spacing = (self._geometric + self._shortest / self.numerical_aperture) / half
         kernel = self._squares(spacing, half, half, beyond=False)
@@ -216,20 +213,10 @@ class PupilPSF(PointSpreadFunction):
         widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
         return float(np.mean(widths)) * spacing
 
-    def transfer(
-        self, across: NDArray[np.float64], up: NDArray[np.float64]
-    ) -> NDArray[np.complex128]:
-        """Optical transfer function.
+    def transfer(self, across: Array, up: Array) -> NDArray[np.complex128]:
+        """Return the complex optical transfer function: 1 at zero frequency, 0 from 2 NA / λ on.
 
-        Parameters
-        ----------
-        across, up : ndarray
-            Spatial frequencies to the right and upwards in 1/m, broadcast against each other.
-
-        Returns
-        -------
-        ndarray
-            Complex; 1 at no frequency, 0 from 2 NA / λ on.
+        Frequencies `across` and `up` are in 1/m and are broadcast against each other.
         """
         across, up = np.broadcast_arrays(across, up)
         frequency = np.hypot(across, up)
@@ -246,23 +233,18 @@ class PupilPSF(PointSpreadFunction):
         return found
 
     def in_band(self, band: Band) -> "PupilPSF":
-        """Diffraction over that band; see `PointSpreadFunction.in_band`."""
         return replace(self, band=band)
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+    def kernel(self, spacing: float) -> Array:
         half = half_size(self._tail / (1 - PUPIL_ENERGY) + self._geometric, spacing)
         return self._squares(spacing, half, half, beyond=False)
 
-    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
-        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
         check_length("spacing", spacing)
         return normalised(self._squares(spacing, rows, columns, beyond=True))
 
-    def _squares(
-        self, spacing: float, rows: int, columns: int, beyond: bool
-    ) -> NDArray[np.float64]:
-        """Fractions of the light on squares; the outermost may hold what goes farther."""
+    def _squares(self, spacing: float, rows: int, columns: int, beyond: bool) -> Array:
+        """Return fractions of the light on squares; the outermost may hold what goes farther."""
         unit = self._shortest / (2 * pi * self.numerical_aperture)
         near = _NEAR * unit + 2 * self._geometric
         reach = max(near, min((max(rows, columns) + 0.5) * spacing, _FAR * unit))
@@ -274,8 +256,8 @@ class PupilPSF(PointSpreadFunction):
         tail = poisson_squares(spacing, rows, columns, self._tail, self._width, beyond)
         return np.maximum(core + tail, 0.0)
 
-    def _core(self, spacing: float, half: int) -> NDArray[np.float64]:
-        """Fractions of the light on squares less those of the tail."""
+    def _core(self, spacing: float, half: int) -> Array:
+        """Return fractions of the light on squares less those of the tail."""
         step = 1 / (_PERIOD * (2 * half + 1) * spacing)
         count = ceil(_FINEST * 2 * self.numerical_aperture / self._shortest / step)
         up = step * np.arange(-count, count + 1, dtype=np.float64)
@@ -294,7 +276,7 @@ class PupilPSF(PointSpreadFunction):
         return np.asarray(((rows[::-1] @ image) @ columns.T).real * (spacing * step) ** 2)
 
     @cached_property
-    def _spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _spectrum(self) -> tuple[Array, Array]:
         return self.band.spectrum(self.temperature, _WAVELENGTHS)
 
     @property
@@ -333,7 +315,7 @@ class PupilPSF(PointSpreadFunction):
 
     @property
     def _changes(self) -> Iterator[NDArray[np.complex128] | None]:
-        """What defocus and aberrations change in the transfer function at each wavelength.
+        """Yield what the path difference changes in the transfer function at each wavelength.
 
         On steps of the pupil's samples, the middle at [samples, samples].
         """
@@ -355,8 +337,8 @@ class PupilPSF(PointSpreadFunction):
             # Not by the middle value: there a sample on the edge counts by its square.
             yield (bent - plain) / pupil.sum()
 
-    def _path(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Optical path difference in m at coordinates of the pupil."""
+    def _path(self, x: Array, y: Array) -> Array:
+        """Return the optical path difference in m at coordinates of the pupil."""
         radius = np.hypot(x, y)
         inside = np.maximum(1 - (self.numerical_aperture * radius) ** 2, 0.0)
         path = self.defocus * (np.sqrt(inside) - 1)
@@ -389,7 +371,6 @@ class Pupil(PSFChoice):
         check_zernike(self.zernike)
 
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        """Diffraction over the band; see `PSFChoice.of_camera`."""
         return PupilPSF(
             band,
             object_aperture(self.numerical_aperture, self.f_number, magnification),
@@ -400,20 +381,10 @@ class Pupil(PSFChoice):
         )
 
 
-def annular_transfer(frequency: NDArray[np.float64], obscuration: float) -> NDArray[np.float64]:
-    """Transfer function of an annular pupil without aberrations.
+def annular_transfer(frequency: Array, obscuration: float) -> Array:
+    """Return the transfer function of an annular pupil without aberrations.
 
-    Parameters
-    ----------
-    frequency : ndarray
-        Spatial frequency over 2 NA / λ, 0 or more.
-    obscuration : float
-        Inner over outer diameter, 0 to under 1.
-
-    Returns
-    -------
-    ndarray
-        From 1 to 0, of the same shape: O'Neill, J. Opt. Soc. Am. 46 (1956) 285.
+    `frequency` is over 2 NA / λ (O'Neill, J. Opt. Soc. Am. 46 (1956) 285).
     """
     apart = 2 * frequency
     shared = (
@@ -424,22 +395,11 @@ def annular_transfer(frequency: NDArray[np.float64], obscuration: float) -> NDAr
     return np.asarray(shared / (pi * (1 - obscuration**2)))
 
 
-def zernike_polynomial(
-    index: int, radius: NDArray[np.float64], angle: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Zernike circle polynomial whose mean square over the unit disc is 1.
+def zernike_polynomial(index: int, radius: Array, angle: Array) -> Array:
+    """Return Noll's Zernike polynomial, of mean square 1 over the unit disc.
 
-    Parameters
-    ----------
-    index : int
-        Noll's index, 1 or more.
-    radius, angle : ndarray
-        Polar coordinates; the angle in rad, counter-clockwise from the right.
-
-    Returns
-    -------
-    ndarray
-        Values: Noll, J. Opt. Soc. Am. 66 (1976) 207, Equations 1 to 3.
+    Polar coordinates, the angle in rad from the right: Noll, J. Opt. Soc. Am. 66 (1976) 207,
+    Equations 1 to 3.
     """
     n, m = _noll(index)
     value = np.zeros(np.broadcast(radius, angle).shape)
@@ -453,13 +413,7 @@ def zernike_polynomial(
 
 
 def check_zernike(pairs: object) -> None:
-    """Refuse what are no coefficients by their index.
-
-    Raises
-    ------
-    ValueError
-        If an index is not 4 to 120 or stands twice, or a coefficient is not finite.
-    """
+    """Raise a ValueError unless indices are 4 to 120, each once, and coefficients finite."""
     expected = f"expected Noll's index, 4 to {_MOST_ZERNIKE}, each once, and its rms in m"
     if not isinstance(pairs, tuple):
         raise ValueError(f"zernike: {pairs!r}, {expected}")
@@ -476,7 +430,7 @@ def check_zernike(pairs: object) -> None:
 
 
 def _noll(index: int) -> tuple[int, int]:
-    """Degree and order of Noll's index."""
+    """Return degree and order of Noll's index."""
     n = 0
     while (n + 1) * (n + 2) // 2 < index:
         n += 1
@@ -484,8 +438,8 @@ def _noll(index: int) -> tuple[int, int]:
     return n, 2 * (place // 2) if n % 2 == 0 else 2 * ((place - 1) // 2) + 1
 
 
-def _shared_area(apart: NDArray[np.float64], first: float, second: float) -> NDArray[np.float64]:
-    """Area that two discs share, by their radii and how far apart their middles are."""
+def _shared_area(apart: Array, first: float, second: float) -> Array:
+    """Return the area that two discs share, by their radii and the distance of their middles."""
     if second < _POINT:
         return np.zeros(apart.shape)
     d = np.clip(apart, max(abs(first - second), _POINT), first + second)
@@ -499,13 +453,11 @@ def _shared_area(apart: NDArray[np.float64], first: float, second: float) -> NDA
 
 
 def _autocorrelation(pupil: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """∫ P(ρ) P*(ρ + s) on steps of the samples, shape (2 n, 2 n), s = 0 at [n, n]."""
+    """Return ∫ P(ρ) P*(ρ + s) on steps of the samples, shape (2 n, 2 n), s = 0 at [n, n]."""
     twice = [2 * count for count in pupil.shape]
     power = np.abs(fft.fft2(pupil, twice)) ** 2
     return np.asarray(fft.fftshift(np.conj(fft.ifft2(power))))
 
 
-def _interpolated(
-    values: NDArray[np.complex128], places: NDArray[np.float64]
-) -> NDArray[np.complex128]:
+def _interpolated(values: NDArray[np.complex128], places: Array) -> NDArray[np.complex128]:
     return np.asarray(map_coordinates(values, places, order=3, mode="grid-constant"))
