@@ -1,15 +1,17 @@
 """Calibrations: parameters found again, uncertainties that cover, what is refused."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from chipglow.camera import (
+    MODELS,
     Blackbody,
     FactoryCalibration,
     LinearCalibration,
     PlanckConversion,
-    fit_linear,
-    fit_sakuma_hattori,
+    fit_calibration,
 )
 from chipglow.radiometry import Band, TabulatedResponse
 
@@ -17,7 +19,8 @@ BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.linspace(573.15, 1273.15, 10)
 BETWEEN = np.array([600.0, 800.0, 1000.0, 1250.0])
 OFFSET, GAIN = 1000.0, 1.7
-FITS = {"linear": fit_linear, "sakuma-hattori": fit_sakuma_hattori}
+FITS = {name: partial(fit_calibration, kind) for name, kind in MODELS.items()}
+fit_linear, fit_sakuma_hattori = FITS.values()
 
 # The nearest Sakuma-Hattori signal to that of the band, for counts of known truth.
 SAKUMA_HATTORI = fit_sakuma_hattori(KELVINS, OFFSET + GAIN * BAND.radiance(KELVINS), BAND)
@@ -49,7 +52,10 @@ def test_exact_points_give_their_sakuma_hattori_back():
 
 
 def test_the_slopes_are_those_of_the_counts():
-    for fit in (SAKUMA_HATTORI, fit_linear(KELVINS, counts_of("linear", KELVINS), BAND)):
+    for fit in (
+        SAKUMA_HATTORI,
+        fit_linear(KELVINS, counts_of("linear", KELVINS), BAND),
+    ):
         calibration = fit.calibration
         rise = calibration.counts(BETWEEN + 0.05) - calibration.counts(BETWEEN - 0.05)
         # The table of slopes has steps of 0.25 K, between which it is straight.
@@ -193,7 +199,12 @@ def test_a_drift_during_the_calibration_is_seen_in_points_up_and_down():
 
 def test_uncertainties_of_zero_are_not_uncertainties_that_are_not_stated():
     with pytest.raises(ValueError, match="both 0, expected one over 0, or none stated"):
-        fit_linear(KELVINS, counts_of("linear", KELVINS), BAND, count_uncertainty=np.zeros(10))
+        fit_linear(
+            KELVINS,
+            counts_of("linear", KELVINS),
+            BAND,
+            count_uncertainty=np.zeros(10),
+        )
 
 
 def test_the_temperature_uncertainty_counts_where_the_counts_are_steep():

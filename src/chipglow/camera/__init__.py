@@ -2,6 +2,7 @@
 
 from chipglow.camera.calibration.blackbody import Blackbody
 from chipglow.camera.calibration.calibration import (
+    MODELS,
     Calibration,
     FactoryCalibration,
     FittedCalibration,
@@ -10,12 +11,8 @@ from chipglow.camera.calibration.calibration import (
 )
 from chipglow.camera.calibration.errors import CalibrationErrors
 from chipglow.camera.calibration.fit import (
-    MODELS,
     CalibrationFit,
-    fit_linear,
-    fit_models,
-    fit_sakuma_hattori,
-    preferred,
+    fit_calibration,
 )
 from chipglow.camera.camera import Camera
 from chipglow.camera.detector import (
@@ -162,12 +159,9 @@ __all__ = [
     "expose_all",
     "expose_views",
     "find_bad_pixels",
-    "fit_linear",
-    "fit_models",
-    "fit_sakuma_hattori",
+    "fit_calibration",
     "flat_field_calibration",
     "frame_weights",
     "lower_range_limit",
-    "preferred",
     "replace_bad_pixels",
 ]

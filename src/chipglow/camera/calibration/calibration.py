@@ -1,6 +1,7 @@
 """Calibrations from a camera's counts to radiance, with their uncertainty."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -37,17 +38,6 @@ class Calibration(ABC):
     warnings: tuple[str, ...] = ()
     """Why it may not be relied on, a sentence each."""
 
-    def __post_init__(self) -> None:
-        if not 0 <= self.lowest < self.highest:
-            raise ValueError(
-                f"calibration: lowest is {self.lowest!r} K and highest {self.highest!r} K, "
-                "expected 0 K or more, in order"
-            )
-        if self.integration_time is not None and not 0 < self.integration_time < inf:
-            raise ValueError(
-                f"calibration: integration_time is {self.integration_time!r}, expected over 0 s"
-            )
-
     @abstractmethod
     def radiance(self, counts: ArrayLike) -> Array:
         """Return the in-band radiance in W/(m² sr) of counts; NaN where there is none."""
@@ -77,11 +67,10 @@ class FittedCalibration(Calibration):
     """Of the fit and of what the blackbodies have in common, shape (n, n)."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        if not (self.lowest >= TABLE_COLDEST and self.highest <= TABLE_HOTTEST):
+        if not TABLE_COLDEST <= self.lowest < self.highest <= TABLE_HOTTEST:
             raise ValueError(
                 f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "
-                f"expected the temperatures of blackbodies, {TABLE_COLDEST:g} to "
+                f"expected temperatures of blackbodies in order, {TABLE_COLDEST:g} to "
                 f"{TABLE_HOTTEST:g} K"
             )
         count = len(self.NAMES)
@@ -94,6 +83,11 @@ class FittedCalibration(Calibration):
             raise ValueError("calibration: a parameter or covariance is not finite")
         if (np.diag(self.covariance) < 0).any():
             raise ValueError("calibration: a variance is negative, expected 0 or more")
+
+    @classmethod
+    @abstractmethod
+    def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
+        """Return parameters to start a fit from, the last of which is over 0 where counts rise."""
 
     @abstractmethod
     def counts(self, temperature: ArrayLike) -> Array:
@@ -168,6 +162,11 @@ class LinearCalibration(FittedCalibration):
         if not self.parameters[1] > 0:
             raise ValueError(f"calibration: gain is {self.parameters[1]:g}, expected over 0")
 
+    @classmethod
+    def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
+        gain, offset = np.polyfit(np.asarray(band.radiance(kelvins), np.float64), counts, 1)
+        return np.array([offset, gain])
+
     @property
     def description(self) -> str:
         return "straight line over the in-band radiance"
@@ -204,6 +203,22 @@ class SakumaHattori(FittedCalibration):
     kind: ClassVar[str] = "sakuma-hattori"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "A", "B", "C")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "m", "m K", "counts")
+
+    @classmethod
+    def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
+        """Return that of a narrow band of mean wavelength λ and standard deviation σ.
+
+        A = λ (1 − 6 σ²/λ²) and B = c2 σ²/(2 λ²) (P. Saunders and D. R. White, Metrologia 40 (2003)
+        195).
+        """
+        wavelengths = np.linspace(band.lower, band.upper, 501)
+        weights = np.ones_like(wavelengths) if band.response is None else band.response(wavelengths)
+        mean = float(np.average(wavelengths, weights=weights))
+        relative = float(np.average((wavelengths / mean - 1) ** 2, weights=weights))
+        a, b = mean * (1 - 6 * relative), SECOND_RADIATION_CONSTANT * relative / 2
+        form = _occupation(SECOND_RADIATION_CONSTANT / (a * kelvins + b))
+        scale, offset = np.polyfit(form, counts, 1)
+        return np.array([offset, a, b, scale])
 
     @property
     def description(self) -> str:
@@ -267,3 +282,9 @@ def _floats(values: ArrayLike) -> NDArray[Any]:
 def _occupation(exponent: Array) -> Array:
     """Return 1 / (exp(x) − 1), without overflow at large x."""
     return np.asarray(np.exp(-exponent) / -np.expm1(-exponent))
+
+
+MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
+    one.kind: one for one in (LinearCalibration, SakumaHattori)
+}
+"""Fitted calibrations by name."""

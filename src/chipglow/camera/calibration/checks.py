@@ -76,7 +76,7 @@ def _outlier(residuals: Array, design: Array, stated: bool) -> int | None:
     By the residual that is studentised with the others' scatter (Cook and Weisberg, Residuals and
     Influence in Regression, 1982); its square is chi-squared's fall.
     """
-    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    orthogonal = _orthonormal(design)
     left = np.maximum(1 - np.sum(orthogonal**2, axis=1), 1e-9)
     total, fall = float(residuals @ residuals), residuals**2 / left
     point = int(np.argmax(fall))
@@ -98,7 +98,7 @@ def _serial_probability(residuals: Array, design: Array) -> float:
     The statistic of J. Durbin and G. S. Watson, Biometrika 37 (1950) 409, with its distribution by
     draws of independent errors that the same fit is subtracted from.
     """
-    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    orthogonal = _orthonormal(design)
     draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, residuals.size))
     draws -= (draws @ orthogonal) @ orthogonal.T
 
@@ -114,7 +114,7 @@ def _drift_probability(residuals: Array, design: Array) -> float:
 
     Student's t of one more parameter, the number of the point, with the scatter that is left.
     """
-    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    orthogonal = _orthonormal(design)
     drift = _drift(design)
     drift = drift - orthogonal @ (orthogonal.T @ drift)
     length = float(drift @ drift)
@@ -124,6 +124,11 @@ def _drift_probability(residuals: Array, design: Array) -> float:
     free = residuals.size - design.shape[1] - 1
     rest = max((float(residuals @ residuals) - square) / free, 1e-300)
     return float(2 * stdtr(free, -np.sqrt(square / rest)))
+
+
+def _orthonormal(design: Array) -> Array:
+    """Return a basis of the columns, which are of very different lengths."""
+    return np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
 
 
 def _drift(design: Array) -> Array:
