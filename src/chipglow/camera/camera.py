@@ -8,26 +8,24 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.detector import (
-    Detector,
-    FlatFieldCalibration,
-    Lag,
-    OperationPoint,
-    flat_field_calibration,
-)
-from chipglow.camera.detector.terms import follows
+from chipglow.camera.detector.detector import Detector
+from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
+from chipglow.camera.detector.response import OperationPoint
+from chipglow.camera.detector.terms import Lag, follows
 from chipglow.camera.exposure import Exposure, expose_all
 from chipglow.camera.measurement import Measurement
-from chipglow.camera.optics import BLURS, AnnularAperturePSF, OpticsTerm, PointSpreadFunction, blur
+from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.convolution import (
+    blur,
     blur_of_like,
     both_borders,
     both_images_on_pixels,
     image_on_pixels,
     light_from_beyond,
 )
+from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
-from chipglow.camera.optics.terms import Blur
+from chipglow.camera.optics.terms import Blur, OpticsTerm
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.quantities import Array, Parameter, Part
