@@ -67,8 +67,6 @@ from chipglow.camera.exposure import (
     Exposure as Exposure,
     View as View,
     expose as expose,
-    expose_all as expose_all,
-    expose_views as expose_views,
     frame_weights as frame_weights,
 )
 from chipglow.camera.measurement import (

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from typing import Annotated, Final, Literal
 from warnings import warn
 
@@ -12,20 +13,13 @@ from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.detector.terms import Lag, follows
-from chipglow.camera.exposure import Exposure, expose_all
+from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import (
-    blur,
-    blur_of_like,
-    both_borders,
-    both_images_on_pixels,
-    image_on_pixels,
-    light_from_beyond,
-)
+from chipglow.camera.optics.convolution import Beyond, blur, image_on_pixels
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
-from chipglow.camera.optics.terms import Blur, OpticsTerm
+from chipglow.camera.optics.terms import OpticsTerm
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.quantities import Array, Parameter, Part
@@ -38,6 +32,7 @@ from chipglow.surface import EmissivityField, Surface
 BORDER_TOLERANCE: Final = 1.0
 """Change in K of a pixel from which on it is said that the border of the scene matters."""
 
+_ROUNDING: Final = 1e-13
 _COLD_FLOOR: Final = 373.15
 """Floor in K up to which a round number is probably one of degrees Celsius."""
 
@@ -251,22 +246,9 @@ class Camera(Part):
         return surface.in_band(self.band, self.reflected).on(scene)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
-        """Let a scene shine on the camera for one integration time.
+        """Return the exposure of a scene from `start` on, in s, over one integration time.
 
-        Parameters
-        ----------
-        scene : Scene
-            What is truly there.
-        surface : Surface
-            Its emissivity.
-        start : float
-            When the integration begins in s.
-
-        Raises
-        ------
-        ValueError
-            If the surface is none, the integration reaches beyond the scene, or the pixels do not
-            fit it.
+        A ValueError if the integration reaches beyond the scene, or the pixels do not fit it.
         """
         (exposure,) = self.expose_fields(scene, (self.lay(surface, scene),), start)
         return replace(exposure, effects=surface.effects)
@@ -278,27 +260,14 @@ class Camera(Part):
         start: float,
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
-        """Exposures of a scene with several surfaces: each of its frames is read once.
+        """Return the exposures of several surfaces, laid by `lay`: each frame is read once.
 
-        Parameters
-        ----------
-        scene : Scene
-            What is truly there.
-        fields : sequence of EmissivityField
-            The surfaces as this camera sees them (`lay`); one or more.
-        start : float
-            When the integration of the first row begins in s.
-        check : callable, optional
-            Called now and then meanwhile; what it raises ends the pass.
-
-        Raises
-        ------
-        ValueError
-            As for `expose`.
+        `start` is when the integration of the first row begins in s; an error that `check`, called
+        now and then meanwhile, raises ends the pass.
         """
-        when = start, self.integration_time
+        views = [View(field, self.band, self.reflected) for field in fields]
         delays = self.row_delays(scene.raster)
-        return expose_all(scene, fields, self.band, *when, self.reflected, delays, check)
+        return expose(scene, views, start, self.integration_time, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Return the frames that the camera reads from exposures.
@@ -328,37 +297,20 @@ class Camera(Part):
         Beyond the scene radiance is taken to be as at the scene's edge. The warning compares with a
         second assumption: that beyond the scene each pixel sees the like of what it sees within.
         """
-        if isinstance(exposures, Exposure):
-            exposures = (exposures,)
-        starts, frames, alike, effects, sensors = [], [], [], [], None
-        for exposure in exposures:
-            found = self.pixels(exposure.raster)
-            if sensors not in (None, found):
-                raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
-            sensors = found
-            starts.append(exposure.start)
-            effects.append(set(exposure.effects.items()))
-            image, like = self._both_images(exposure.mean_radiance, exposure.raster, sensors)
-            frames.append(image)
-            if like is not None:
-                alike.append(like)
-        if sensors is None:
-            raise ValueError("camera: no exposure to develop, expected 1 or more")
-        images, times = np.stack(frames), np.array(starts)
-        measured = self._measurement(images, times, sensors)
+        exposures = [exposures] if isinstance(exposures, Exposure) else list(exposures)
+        if not exposures:
+            raise ValueError("camera: at least one exposure is required")
+        scene = exposures[0].raster
+        if any(self.pixels(one.raster) != self.pixels(scene) for one in exposures):
+            raise ValueError("camera: exposures are of different grids")
+        images = np.stack([self.form_image(one.mean_radiance, one.raster) for one in exposures])
+        starts = np.array([one.start for one in exposures])
+        measured = self.measurement(images, starts, scene)
+        effects = [set(one.effects.items()) for one in exposures]
         measured.data.attrs.update(sorted(set.intersection(*effects)))
-        said = list(self._warnings(times))
-        if alike:
-            other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
-            # Noise is no matter of the border.
-            ideal = (
-                replace(self, detector=None)._measurement(images, times, sensors)
-                if self.detector
-                else measured
-            )
-            said += _border_warning(ideal, other, exposure.raster)
-        if said:
-            measured.data.attrs["warnings"] = "\n".join(said)
+        warnings = [*self._lag_warning(starts), *self._border_warning(exposures, images)]
+        if warnings:
+            measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured
 
     def measure(
@@ -396,14 +348,7 @@ class Camera(Part):
 
     def light_from_beyond(self, scene: Raster) -> Array:
         """Return the fraction of each pixel's light that comes from beyond a scene, (y, x)."""
-        sensors = self.pixels(scene)
-        if self.psf is None:
-            return np.zeros(sensors.shape)
-        if self.psf_order == "optics":
-            fraction = light_from_beyond(self.psf, scene.spacing, scene.shape)
-            return integrate(fraction, scene, sensors, self._sensitive(scene))
-        whole, own = whole_raster(scene, sensors)
-        return light_from_beyond(self.psf, self.pitch, whole.shape)[own].copy()
+        return 1 - self._own_light(scene)
 
     def form_image(self, radiance: Array, scene: Raster) -> Array:
         """Return the image of a radiance map on the pixels: optics, PSF and footprint.
@@ -432,46 +377,35 @@ class Camera(Part):
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
-        sensors = self.pixels(scene)
-        if self.psf is not None and self.psf_order == "optics":
-            if not self.optics:
-                return image_on_pixels(image, self.psf, scene, sensors, self._sensitive(scene))
-            image = blur(image, self.psf, scene.spacing)
-        return self._read_out(image, scene, sensors, blur)
+        return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
 
-    def _both_images(
-        self, radiance: Array, scene: Raster, sensors: Raster
-    ) -> tuple[Array, Array | None]:
-        """Return the image on the pixels by either assumption beyond the scene, if that matters."""
-        image = like = radiance
-        if self.psf is None and not self.optics:
-            return self._read_out(image, scene, sensors, blur), None
+    def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
+        """Return the radiance that the pixels receive: point spread function, optics, footprint."""
+        pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
             if not self.optics:
                 sensitive = self._sensitive(scene)
-                return both_images_on_pixels(image, self.psf, scene, sensors, sensitive)
-            image, like = both_borders(image, self.psf, scene.spacing)
-        return (
-            self._read_out(image, scene, sensors, blur),
-            self._read_out(like, scene, sensors, blur_of_like),
-        )
+                return image_on_pixels(image, self.psf, scene, pixels, sensitive, beyond)
+            image = blurred(image, self.psf, scene.spacing)
+        for term in self.optics:
+            image = term.on_samples(image, scene, pixels, blurred)
+        if self.psf is None or self.psf_order == "optics":
+            return integrate(image, scene, pixels, self._sensitive(scene))
+        # Pixels that are not read out tell what is beyond those that are.
+        whole, own = whole_raster(scene, pixels)
+        return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
-    def _read_out(self, image: Array, scene: Raster, sensors: Raster, blurred: Blur) -> Array:
-        """Return the radiance of every pixel from an image behind the optics' own PSF."""
+    def _show(self, image: Array, pixels: Raster) -> Array:
+        """Return the radiance that the optics show for what the pixels received."""
         for term in self.optics:
-            image = term.on_samples(image, scene, sensors, blurred)
-        image = self._on_pixels(image, scene, sensors, blurred)
-        for term in self.optics:
-            image = term.on_pixels(image, sensors, self.band)
+            image = term.on_pixels(image, pixels, self.band)
         return image
 
-    def _on_pixels(self, image: Array, scene: Raster, sensors: Raster, blurred: Blur) -> Array:
-        """Return what pixels integrate, and the PSF if it is of the detector's order."""
-        if self.psf is None or self.psf_order == "optics":
-            return integrate(image, scene, sensors, self._sensitive(scene))
-        # Pixels that are not read out tell what is beyond those that are.
-        whole, own = whole_raster(scene, sensors)
-        return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
+    @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
+    def _own_light(self, scene: Raster) -> Array:
+        """Return the fraction of each pixel's light that comes from within the scene."""
+        fraction = self._collect(np.ones(scene.shape), scene, "nothing")
+        return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
 
     def _sensitive(self, scene: Raster) -> float:
         """Return the fraction of a pixel's square that it integrates, less after a footprint."""
@@ -485,7 +419,12 @@ class Camera(Part):
 
     def measurement(self, images: Array, starts: Array, scene: Raster) -> Measurement:
         """Return the frames read from images of `form_image` of a scene, shape (time, y, x)."""
-        return self._measurement(images, starts, self.pixels(scene))
+        pixels = self.pixels(scene)
+        radiance, flags = self.read(images, starts)
+        attributes = self._attributes(pixels.shape)
+        return Measurement.from_radiance(
+            radiance, self.band, starts, pixels, self.lower_limit, flags, attributes=attributes
+        )
 
     def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
         """Return radiance and flags that detector and calibration make of images (time, y, x).
@@ -503,26 +442,40 @@ class Camera(Part):
         """Return the noise of the frame that begins then, however many others are read with it."""
         return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
 
-    def _measurement(self, images: Array, starts: Array, sensors: Raster) -> Measurement:
-        radiance, flags = self.read(images, starts)
-        return Measurement.from_radiance(
-            radiance,
-            self.band,
-            starts,
-            sensors,
-            self.lower_limit,
-            flags,
-            attributes=self._attributes(sensors.shape),
-        )
-
-    def _warnings(self, starts: Array) -> Iterator[str]:
-        """Yield warnings about frames by their starts."""
+    def _lag_warning(self, starts: Array) -> Iterator[str]:
+        """Warn where no frame follows another, so that there is no lag."""
         lags = self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms)
         if lags and not follows(starts, 1 / self.frame_rate).any():
             yield (
-                "Lag: no frame comes one time between frames after another, so the frame before is "
-                "taken to be as the frame itself: there is no lag in them."
+                "Lag: no two frames are one frame period apart, so each frame is taken as its own "
+                "predecessor: there is no lag in them."
             )
+
+    def _border_warning(self, exposures: Sequence[Exposure], images: Array) -> Iterator[str]:
+        """Warn how far another assumption about what is beyond the scene changes temperatures."""
+        if self.psf is None and not self.optics:
+            return
+        scene = exposures[0].raster
+        pixels, own_light = self.pixels(scene), self._own_light(scene)
+        within = (self._collect(one.mean_radiance, scene, "nothing") for one in exposures)
+        others = np.stack([self._show(image / own_light, pixels) for image in within])
+        kelvins = self.band.temperature(images)
+        change = np.abs(kelvins - self.band.temperature(others))
+        change[~(kelvins >= (self.lower_limit or 0.0))] = np.nan
+        changed = change > BORDER_TOLERANCE
+        if not changed.any():
+            return
+        left, right, bottom, top = scene.extent
+        across = np.minimum(pixels.x - left, right - pixels.x)
+        down = np.minimum(top - pixels.y, pixels.y - bottom)
+        reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
+        yield (
+            "The border of the scene: beyond it the surface is taken to be as at the edge. If the "
+            "surroundings instead resembled what each pixel sees within the scene, "
+            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
+            f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
+            "most."
+        )
 
     def _attributes(self, shape: tuple[int, int]) -> dict[str, float | str]:
         """Return the camera's attributes of a measurement, in SI, without those that are None."""
@@ -548,22 +501,3 @@ class Camera(Part):
                 "netd_temperature": calibration.half_temperature,
             }
         return {name: value for name, value in attributes.items() if value is not None}
-
-
-def _border_warning(measured: Measurement, other: Array, scene: Raster) -> Iterator[str]:
-    """Warn how far another assumption about what is beyond the scene changes temperatures."""
-    change = np.abs(measured.radiance_temperature() - other)
-    changed = change > BORDER_TOLERANCE
-    if not changed.any():
-        return
-    (left, right, bottom, top), at = scene.extent, measured.raster
-    across = np.minimum(at.x - left, right - at.x)
-    down = np.minimum(top - at.y, at.y - bottom)
-    reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
-    yield (
-        "The border of the scene: beyond it the surface is taken to be as at the edge. With "
-        "the like of what each pixel sees within the scene there instead, "
-        f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
-        f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
-        "most."
-    )

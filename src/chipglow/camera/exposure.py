@@ -65,34 +65,35 @@ class View:
 
 def expose(
     scene: Scene,
-    emissivity: EmissivityField,
-    band: Band,
+    views: Sequence[View],
     start: float,
     duration: float,
-    reflected: float | None = None,
     delays: Array | None = None,
-) -> Exposure:
-    """Sum a scene's apparent radiance over an integration time.
+    check: Check | None = None,
+) -> tuple[Exposure, ...]:
+    """Sum a scene's apparent radiance over an integration time, of one or more views.
+
+    Each frame is read once. A surface that is seen in several bands, and a band in which several
+    surfaces are seen, are computed once for each frame.
 
     Parameters
     ----------
     scene : Scene
         The true temperature over time.
-    emissivity : EmissivityField
-        The surface, laid on the scene.
-    band : Band
-        The camera's spectral band.
+    views : sequence of View
+        Surfaces, laid on the scene, and the bands in which they are seen.
     start, duration : float
         When the integration begins and how long it lasts, in s.
-    reflected : float, optional
-        Temperature in K of surroundings that the surface reflects; none by default.
     delays : ndarray, optional
         How much later than `start` the integration of each row of samples begins in s, 0 or more,
         shape (y,): a rolling shutter's (`Camera.row_delays`). All at once by default.
+    check : callable, optional
+        Called now and then meanwhile; an error that it raises ends the pass.
 
     Returns
     -------
-    Exposure
+    tuple of Exposure
+        One for each view.
 
     Raises
     ------
@@ -105,74 +106,6 @@ def expose(
     Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
     (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
     between values 1/32 K apart, within 6e-7 of it from 250 K on.
-    """
-    return expose_all(scene, (emissivity,), band, start, duration, reflected, delays)[0]
-
-
-def expose_all(
-    scene: Scene,
-    emissivities: Sequence[EmissivityField],
-    band: Band,
-    start: float,
-    duration: float,
-    reflected: float | None = None,
-    delays: Array | None = None,
-    check: Check | None = None,
-) -> tuple[Exposure, ...]:
-    """Exposures of a scene with several surfaces: each of its frames is read once.
-
-    Parameters
-    ----------
-    scene, band, start, duration, reflected, delays
-        As for `expose`.
-    emissivities : sequence of EmissivityField
-        The surfaces, laid on the scene; one or more.
-    check : callable, optional
-        Called now and then meanwhile; what it raises ends the pass.
-
-    Returns
-    -------
-    tuple of Exposure
-        One for each surface, the same as `expose` makes.
-
-    Raises
-    ------
-    ValueError
-        As for `expose`.
-    """
-    views = [View(emissivity, band, reflected) for emissivity in emissivities]
-    return expose_views(scene, views, start, duration, delays, check)
-
-
-def expose_views(
-    scene: Scene,
-    views: Sequence[View],
-    start: float,
-    duration: float,
-    delays: Array | None = None,
-    check: Check | None = None,
-) -> tuple[Exposure, ...]:
-    """Exposures of a scene with several surfaces in several bands: each frame is read once.
-
-    A surface that is seen in several bands, and a band in which several surfaces are seen, are
-    computed once for each frame.
-
-    Parameters
-    ----------
-    scene, start, duration, delays, check
-        As for `expose_all`.
-    views : sequence of View
-        What is looked at, and in which band; one or more.
-
-    Returns
-    -------
-    tuple of Exposure
-        One for each view, the same as `expose` makes.
-
-    Raises
-    ------
-    ValueError
-        As for `expose`.
     """
     if delays is None:
         delays = np.zeros(scene.raster.rows)
@@ -187,7 +120,7 @@ def expose_views(
         np.array([view.environment for view in views], np.float32),
         stack.most,
         scene.raster.shape,
-        check or _nothing,
+        check,
     )
     _sweep(scene, stack, indices, weights, middles, sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
@@ -210,10 +143,6 @@ def expose_views(
         )
         for n in range(len(views))
     )
-
-
-def _nothing() -> None:
-    pass
 
 
 def frame_weights(

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from chipglow.camera.camera import Camera
-from chipglow.camera.exposure import Exposure, View, expose_views
+from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.quantities import Array
 from chipglow.radiometry import RatioThermometer
@@ -102,11 +102,10 @@ class RatioCamera:
         ]
         views = views_of(surface, scene, cameras)
         if times[0] == times[1]:
-            together = expose_views(scene, views, *times[0])
+            together = expose(scene, views, *times[0])
         else:
             together = tuple(
-                expose_views(scene, [view], *time)[0]
-                for view, time in zip(views, times, strict=True)
+                expose(scene, [view], *time)[0] for view, time in zip(views, times, strict=True)
             )
         return cast(tuple[Exposure, Exposure], together)
 

@@ -1,7 +1,7 @@
 """Convolution with a point spread function."""
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -15,6 +15,9 @@ from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.surface.blocks import in_blocks
 
+Beyond: TypeAlias = Literal["edge", "nothing"]
+"""What is taken to be beyond the edges of a field."""
+
 _Kernel: TypeAlias = tuple[Array, tuple[Array, ...]]
 """A kernel, and its sums over all that is beyond the left, right, upper and lower edge."""
 
@@ -24,123 +27,34 @@ _FARTHEST: Final = 2048
 """Squares that a kernel reaches at most: light that goes farther is taken to go so far."""
 
 
-def blur(radiance: Array, psf: PointSpreadFunction, spacing: float) -> Array:
-    """Image of a field of radiance behind a point spread function.
+def blur(
+    radiance: Array, psf: PointSpreadFunction, spacing: float, beyond: Beyond = "edge"
+) -> Array:
+    """Return the image of a field of radiance (y, x) behind a point spread function.
 
-    Parameters
-    ----------
-    radiance : ndarray
-        Radiance in W/(m² sr), shape (y, x).
-    psf : PointSpreadFunction
-        How a point is spread.
-    spacing : float
-        Distance between the values in m.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape (y, x).
-
-    Notes
-    -----
-    Beyond its edges the field goes on with the value at the nearest edge, however far; nothing
-    wraps around, and no tail of the point spread function is left out. What truly is there is not
-    known: `light_from_beyond` says how much of the light it decides, and `blur_of_like` gives the
-    image under another assumption.
+    Beyond its edges the field goes on with the value at the nearest edge, however far, or there is
+    nothing. Nothing wraps around, and no tail of the point spread function is left out.
     """
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    return _without_rounding(within + _edges(psf, spacing, radiance.shape).light(radiance))
-
-
-def blur_of_like(radiance: Array, psf: PointSpreadFunction, spacing: float) -> Array:
-    """The same where beyond the field there is, for each value, the like of what it sees within.
-
-    Parameters
-    ----------
-    radiance, psf, spacing
-        As `blur`.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape (y, x): the light from within the field, over its fraction.
-    """
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    return _without_rounding(within / (1 - light_from_beyond(psf, spacing, radiance.shape)))
-
-
-def both_borders(radiance: Array, psf: PointSpreadFunction, spacing: float) -> tuple[Array, Array]:
-    """Images by `blur` and by `blur_of_like`: the light from within the field is computed once.
-
-    Parameters
-    ----------
-    radiance, psf, spacing
-        As `blur`.
-
-    Returns
-    -------
-    tuple of ndarray
-        Radiance in W/(m² sr), each of shape (y, x).
-    """
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    like = within / (1 - light_from_beyond(psf, spacing, radiance.shape))
-    within += _edges(psf, spacing, radiance.shape).light(radiance)
-    return _without_rounding(within), _without_rounding(like)
+    image = _transfer(psf, spacing, radiance.shape).within(radiance)
+    if beyond == "edge":
+        image += _edges(psf, spacing, radiance.shape).light(radiance)
+    return _without_rounding(image)
 
 
 def image_on_pixels(
-    radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
+    radiance: Array,
+    psf: PointSpreadFunction,
+    scene: Raster,
+    sensors: Raster,
+    fill_factor: float,
+    beyond: Beyond = "edge",
 ) -> Array:
-    """What pixels integrate of the image by `blur`, which is formed nowhere but on them.
-
-    Parameters
-    ----------
-    radiance : ndarray
-        Radiance of the scene's samples in W/(m² sr), shape `scene.shape`.
-    psf : PointSpreadFunction
-        How a point is spread.
-    scene, sensors : Raster
-        Where the samples and the pixels are.
-    fill_factor : float
-        Fraction of a pixel's square that is sensitive: a square in its middle.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape `sensors.shape`.
-    """
+    """Return what pixels integrate of the image by `blur`, formed on the pixels alone."""
     seen = _seen(psf, scene, sensors, fill_factor)
-    return _without_rounding(seen.within(radiance) + seen.from_edges(radiance))
-
-
-def both_images_on_pixels(
-    radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
-) -> tuple[Array, Array]:
-    """The same, and the image if beyond the scene there is for each pixel the like of within.
-
-    Parameters
-    ----------
-    radiance, psf, scene, sensors, fill_factor
-        As `image_on_pixels`.
-
-    Returns
-    -------
-    tuple of ndarray
-        Radiance in W/(m² sr), each of shape `sensors.shape`.
-    """
-    seen = _seen(psf, scene, sensors, fill_factor)
-    within = seen.within(radiance)
-    image = _without_rounding(within + seen.from_edges(radiance))
-    return image, _without_rounding(within / seen.own_light)
-
-
-@lru_cache(maxsize=2)
-def light_from_beyond(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> Array:
-    """Return the fraction of each value's light that comes from beyond a field; read-only."""
-    fraction = 1 - _transfer(psf, spacing, shape).within(np.ones(shape))
-    fraction = np.where(fraction > _ROUNDING, fraction, 0.0)
-    fraction.flags.writeable = False
-    return fraction
+    image = seen.within(radiance)
+    if beyond == "edge":
+        image += seen.from_edges(radiance)
+    return _without_rounding(image)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,12 +163,6 @@ class _Seen:
         left, right, top, bottom = self.edges.strips(radiance)
         beside, over = self.down @ (left + right).T, self.across @ (top + bottom).T
         return np.asarray(beside + over.T)
-
-    @cached_property
-    def own_light(self) -> Array:
-        """Fraction of each pixel's light that comes from within the scene."""
-        fraction = self.within(np.ones((self.down.shape[1], self.across.shape[1])))
-        return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
 
 
 @lru_cache(maxsize=2)

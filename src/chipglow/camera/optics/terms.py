@@ -17,7 +17,7 @@ from chipglow.radiometry import Band
 from chipglow.scene import Raster
 
 Blur: TypeAlias = Callable[[Array, PointSpreadFunction, float], Array]
-"""A convolution with a point spread function: `chipglow.camera.blur`, or `blur_of_like`."""
+"""A convolution with a point spread function: `chipglow.camera.blur`."""
 
 OPTICS_TERMS: Final = Family("optics_term")
 """Terms by their kind; other packages add theirs in the group ``chipglow.optics_term``."""
