@@ -141,10 +141,10 @@ def test_an_emissivity_of_the_blackbody_is_an_input():
 @pytest.mark.parametrize(
     ("said", "text"),
     [
-        ({"emissivity": 0.0}, "emissivity: is 0.0"),
-        ({"emissivity": 1.1}, "expected over 0 to 1"),
-        ({"emissivity_uncertainty": -0.1}, "emissivity_uncertainty: is -0.1"),
-        ({"surroundings": 0.0}, "surroundings: is 0.0 K"),
+        ({"emissivity": 0.0}, "emissivity: 0, expected over 0, up to 1"),
+        ({"emissivity": 1.1}, "emissivity: 1.1"),
+        ({"emissivity_uncertainty": -0.1}, "emissivity_uncertainty: -0.1"),
+        ({"surroundings": 0.0}, "surroundings: 0 K"),
     ],
 )
 def test_an_impossible_blackbody_is_refused(said, text):
@@ -300,7 +300,6 @@ def test_a_tabulated_response_is_the_band_that_it_samples():
         ({"count_uncertainty": [1.0, 2.0]}, "not of as many points"),
         ({"count_uncertainty": -1.0}, "finite, 0 or more"),
         ({"count_uncertainty": [1.0, 0.0, 1.0]}, "both 0"),
-        ({"integration_time": -1.0}, "integration_time is -1.0"),
     ],
 )
 def test_impossible_points_are_refused(changed, message):
@@ -321,7 +320,7 @@ def test_sakuma_hattori_needs_more_points():
         ({"parameters": np.array([0.0])}, "shapes"),
         ({"covariance": -np.eye(2)}, "variance is negative"),
         ({"covariance": np.full((2, 2), np.nan)}, "not finite"),
-        ({"lowest": 900.0, "highest": 800.0}, "lowest is 900.0 K and highest 800.0 K"),
+        ({"lowest": 900.0, "highest": 800.0}, "lowest is 900 K and highest 800 K"),
         ({"highest": np.inf}, "temperatures of blackbodies"),
     ],
 )
