@@ -13,10 +13,9 @@ from scipy.special import j0
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
-    half_maximum_width,
     half_size,
+    kernel_fwhm,
     normalised,
-    peak,
     resized,
 )
 from chipglow.camera.optics.psf import PointSpreadFunction
@@ -103,19 +102,10 @@ class Jitter(_RandomBlur):
     standard_deviation: Deviation
 
 
-@dataclass(frozen=True)
-class _DirectedBlur(BlurTerm):
-    """Displacements along one line."""
-
-    def _along(self, across: Array, up: Array, direction: float) -> Array:
-        """Return the frequency along a direction in 1/m."""
-        return across * cos(direction) + up * sin(direction)
-
-
 @final
 @BLURS.part
 @dataclass(frozen=True)
-class LinearMotion(_DirectedBlur):
+class LinearMotion(BlurTerm):
     """Camera and scene that move against each other, evenly, while the camera integrates."""
 
     kind: ClassVar[str] = "linear-motion"
@@ -130,13 +120,13 @@ class LinearMotion(_DirectedBlur):
         return self.distance / 2
 
     def transfer(self, across: Array, up: Array) -> Array:
-        return np.asarray(np.sinc(self.distance * self._along(across, up, self.direction)))
+        return np.asarray(np.sinc(self.distance * _along(self.direction, across, up)))
 
 
 @final
 @BLURS.part
 @dataclass(frozen=True)
-class Vibration(_DirectedBlur):
+class Vibration(BlurTerm):
     """Sinusoidal vibration along a line with many periods in an integration time."""
 
     kind: ClassVar[str] = "vibration"
@@ -151,8 +141,13 @@ class Vibration(_DirectedBlur):
         return self.amplitude
 
     def transfer(self, across: Array, up: Array) -> Array:
-        along = self._along(across, up, self.direction)
+        along = _along(self.direction, across, up)
         return np.asarray(j0(2 * pi * self.amplitude * along))
+
+
+def _along(direction: float, across: Array, up: Array) -> Array:
+    """Return the frequency along a direction in 1/m."""
+    return across * cos(direction) + up * sin(direction)
 
 
 @final
@@ -213,9 +208,7 @@ class BlurredPSF(PointSpreadFunction):
         half = ceil((self.psf.fwhm + self._reach) / spacing)
         kernel = self.view_kernel(spacing, half, half)
         kernel = kernel[1:-1, 1:-1]  # the outermost squares hold what goes farther
-        row, column = peak(kernel)
-        widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
-        return float(np.mean(widths)) * spacing
+        return kernel_fwhm(kernel, spacing)
 
     def in_band(self, band: Band) -> "BlurredPSF":
         return replace(self, psf=self.psf.in_band(band))

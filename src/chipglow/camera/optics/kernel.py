@@ -85,6 +85,13 @@ def peak(weights: Array) -> tuple[int, int]:
     return row, column
 
 
+def kernel_fwhm(kernel: Array, spacing: float) -> float:
+    """Return the mean full width at half maximum of row and column through the peak, in m."""
+    row, column = peak(kernel)
+    widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
+    return float(np.mean(widths)) * spacing
+
+
 def half_maximum_width(line: Array) -> float:
     """Return the full width at half maximum of a line of samples, in samples."""
     padded = np.pad(line, 1)

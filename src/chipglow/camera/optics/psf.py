@@ -16,10 +16,9 @@ from scipy.special import erf, erfinv, j1
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
-    half_maximum_width,
     half_size,
+    kernel_fwhm,
     normalised,
-    peak,
 )
 from chipglow.camera.optics.round import light_on_squares
 from chipglow.camera.optics.sampling import overlap_lengths
@@ -306,10 +305,7 @@ class MeasuredPSF(PointSpreadFunction):
         estimate = given / given.sum()
         object.__setattr__(self, "weights", estimate.values)
         object.__setattr__(self, "components", estimate.components)
-        row, column = peak(estimate.values)
-        lines = estimate.values[row], estimate.values[:, column]
-        widths = [half_maximum_width(line) for line in lines]
-        object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
+        object.__setattr__(self, "fwhm", kernel_fwhm(estimate.values, self.spacing))
 
     @property
     def estimate(self) -> Estimate:
@@ -369,41 +365,41 @@ class MeasuredPSF(PointSpreadFunction):
         )
 
 
-NumericalAperture = Annotated[
-    float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
-]
-FNumber = Annotated[
-    float | None,
-    Parameter(
-        "F-number of the lens, focused at infinity; with the camera's magnification m the "
-        "numerical aperture is m / (2 f_number (1 + m)).",
-        over=0.0,
-    ),
-]
+@dataclass(frozen=True)
+class ApertureChoice(PSFChoice):
+    """Diffraction by the data sheet of a lens; one of the two is given."""
 
+    numerical_aperture: Annotated[
+        float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+    ] = None
+    f_number: Annotated[
+        float | None,
+        Parameter(
+            "F-number of the lens, focused at infinity; with the camera's magnification m the "
+            "numerical aperture is m / (2 f_number (1 + m)).",
+            over=0.0,
+        ),
+    ] = None
 
-def check_aperture(numerical_aperture: float | None, f_number: float | None) -> None:
-    """Raise a ValueError unless exactly one of the two is given."""
-    if (numerical_aperture is None) == (f_number is None):
-        raise ValueError("expected one of numerical_aperture and f_number")
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.numerical_aperture is None) == (self.f_number is None):
+            raise ValueError("expected one of numerical_aperture and f_number")
 
-
-def object_aperture(
-    numerical_aperture: float | None, f_number: float | None, magnification: float | None
-) -> float:
-    """Return the numerical aperture on the scene's side; an f-number needs the magnification."""
-    if numerical_aperture is not None:
-        return numerical_aperture
-    assert f_number is not None
-    if magnification is None:
-        raise ValueError("magnification: is missing, expected it with psf.f_number")
-    return magnification / (2 * f_number * (1 + magnification))
+    def aperture(self, magnification: float | None) -> float:
+        """Return the numerical aperture on the scene's side; an f-number needs a magnification."""
+        if self.numerical_aperture is not None:
+            return self.numerical_aperture
+        assert self.f_number is not None
+        if magnification is None:
+            raise ValueError("magnification: is missing, expected it with psf.f_number")
+        return magnification / (2 * self.f_number * (1 + magnification))
 
 
 @final
 @PSFS.part
 @dataclass(frozen=True)
-class AiryAperture(PSFChoice):
+class AiryAperture(ApertureChoice):
     """Diffraction of a round aperture, by the data sheet of a lens."""
 
     kind: ClassVar[str] = "airy"
@@ -417,17 +413,10 @@ class AiryAperture(PSFChoice):
             most=0.1,
         ),
     ] = None
-    numerical_aperture: NumericalAperture = None
-    f_number: FNumber = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_aperture(self.numerical_aperture, self.f_number)
 
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        aperture = object_aperture(self.numerical_aperture, self.f_number, magnification)
         wavelength = self.wavelength or (band.lower + band.upper) / 2
-        return AnnularAperturePSF(wavelength, aperture, 0.0)
+        return AnnularAperturePSF(wavelength, self.aperture(magnification), 0.0)
 
 
 @final

@@ -10,31 +10,20 @@ from typing import Annotated, Any, ClassVar, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 from scipy import fft
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
-    half_maximum_width,
     half_size,
+    kernel_fwhm,
     normalised,
-    peak,
     poisson_squares,
     resized,
 )
-from chipglow.camera.optics.psf import (
-    PSFS,
-    FNumber,
-    NumericalAperture,
-    PointSpreadFunction,
-    PSFChoice,
-    check_aperture,
-    object_aperture,
-)
+from chipglow.camera.optics.psf import PSFS, ApertureChoice, PointSpreadFunction
 from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import POSITION, TEMPERATURE
 from chipglow.radiometry import Band
@@ -59,31 +48,28 @@ _POINT: Final = 1e-12
 _WIDTH_SQUARES: Final = 128
 
 
-class _Zernike:
-    """Schema of coefficients: descriptions write a mapping from Noll's index to a length."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            self._pairs,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda pairs: {index: POSITION.text(rms) for index, rms in pairs}, when_used="json"
-            ),
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        text = {"type": "string", "examples": ["0.2 um"]}
-        return {"type": "object", "patternProperties": {"^[0-9]+$": text}}
-
-    def _pairs(self, value: object) -> tuple[tuple[int, float], ...]:
-        if isinstance(value, tuple):
-            return value
-        if not isinstance(value, Mapping):
-            raise ValueError(f"{value!r}, expected lengths by Noll's index such as {{11: 0.2 um}}")
-        return tuple((_whole(index), POSITION.parse(rms)) for index, rms in value.items())
+def _zernike(value: Any) -> Any:
+    """Return pairs of index and m, of such pairs or of a mapping from index to length."""
+    if isinstance(value, Mapping):
+        pairs = tuple((_whole(index), POSITION.parse(rms)) for index, rms in value.items())
+    elif isinstance(value, tuple):
+        pairs = value
+    else:
+        raise ValueError(f"{value!r}, expected lengths by Noll's index such as {{11: 0.2 um}}")
+    seen: set[int] = set()
+    for pair in pairs:
+        index, rms = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
+        if (
+            not (isinstance(index, Integral) and 4 <= int(index) <= _MOST_ZERNIKE)
+            or index in seen
+            or not (isinstance(rms, Real) and abs(float(rms)) <= _STRONGEST)
+        ):
+            raise ValueError(
+                f"{pair!r}, expected Noll's index, 4 to {_MOST_ZERNIKE}, each once, and its rms "
+                "in m"
+            )
+        seen.add(index)
+    return pairs
 
 
 def _whole(index: object) -> Any:
@@ -105,7 +91,16 @@ Defocus = Annotated[
 ]
 Aberrations = Annotated[
     tuple[tuple[int, float], ...],
-    _Zernike(),
+    PlainValidator(_zernike),
+    PlainSerializer(
+        lambda pairs: {index: POSITION.text(rms) for index, rms in pairs}, when_used="json"
+    ),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "patternProperties": {"^[0-9]+$": {"type": "string", "examples": ["0.2 um"]}},
+        }
+    ),
     Parameter(
         f"Zernike aberrations by Noll's index, 4 to {_MOST_ZERNIKE}: optical path difference as\n"
         "the root of its mean square over the unobscured pupil."
@@ -135,17 +130,6 @@ class PupilPSF(PointSpreadFunction):
     ----------
     band : Band
         The camera's band, with its response.
-    numerical_aperture : float
-        On the side of the scene, the sine of the half angle, over 0 to 1.
-    obscuration : float
-        Diameter of the central obstruction, as a fraction of the pupil's, 0 to 0.9.
-    defocus : float
-        How far the surface is from the plane of best focus in m, away from the lens.
-    zernike : tuple of (int, float)
-        Index of Noll (4 to 120) and coefficient of Zernike circle polynomials: the optical path
-        difference in m, as the root of its mean square over the unobscured pupil.
-    temperature : float
-        Of the blackbody in K.
 
     Attributes
     ----------
@@ -176,10 +160,12 @@ class PupilPSF(PointSpreadFunction):
     """
 
     band: Band
-    numerical_aperture: float
+    numerical_aperture: Annotated[
+        float, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+    ]
     obscuration: Obscuration = 0.0
     defocus: Defocus = 0.0
-    zernike: tuple[tuple[int, float], ...] = ()
+    zernike: Aberrations = ()
     temperature: SourceTemperature = 1000.0
 
     def __str__(self) -> str:
@@ -193,10 +179,6 @@ class PupilPSF(PointSpreadFunction):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        aperture = self.numerical_aperture
-        if not (isinstance(aperture, Real) and 0.0 < aperture <= 1.0):
-            raise ValueError(f"psf: numerical_aperture is {aperture!r}, expected over 0 to 1")
-        check_zernike(self.zernike)
         if self._samples > _LARGEST_PUPIL:
             raise ValueError(
                 f"psf: defocus and aberrations change the path by {self._slope:.3g} m from the "
@@ -209,9 +191,7 @@ class PupilPSF(PointSpreadFunction):
         half = _WIDTH_SQUARES
         spacing = (self._geometric + self._shortest / self.numerical_aperture) / half
         kernel = self._squares(spacing, half, half, beyond=False)
-        row, column = peak(kernel)
-        widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
-        return float(np.mean(widths)) * spacing
+        return kernel_fwhm(kernel, spacing)
 
     def transfer(self, across: Array, up: Array) -> NDArray[np.complex128]:
         """Return the complex optical transfer function: 1 at zero frequency, 0 from 2 NA / λ on.
@@ -350,7 +330,7 @@ class PupilPSF(PointSpreadFunction):
 @final
 @PSFS.part
 @dataclass(frozen=True)
-class Pupil(PSFChoice):
+class Pupil(ApertureChoice):
     """A pupil with obscuration, defocus and aberrations, over the camera's band."""
 
     kind: ClassVar[str] = "pupil"
@@ -358,22 +338,15 @@ class Pupil(PSFChoice):
         "{kind: pupil, numerical_aperture: 0.28, obscuration: 0.35, defocus: 10 um,\n"
         "    zernike: {11: 0.2 um}}"
     )
-    numerical_aperture: NumericalAperture = None
-    f_number: FNumber = None
     obscuration: Obscuration = 0.0
     defocus: Defocus = 0.0
     zernike: Aberrations = ()
     temperature: SourceTemperature = 1000.0
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_aperture(self.numerical_aperture, self.f_number)
-        check_zernike(self.zernike)
-
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         return PupilPSF(
             band,
-            object_aperture(self.numerical_aperture, self.f_number, magnification),
+            self.aperture(magnification),
             self.obscuration,
             self.defocus,
             self.zernike,
@@ -410,23 +383,6 @@ def zernike_polynomial(index: int, radius: Array, angle: Array) -> Array:
         return sqrt(n + 1) * value
     turn = np.cos(m * angle) if index % 2 == 0 else np.sin(m * angle)
     return np.asarray(sqrt(2 * (n + 1)) * value * turn)
-
-
-def check_zernike(pairs: object) -> None:
-    """Raise a ValueError unless indices are 4 to 120, each once, and coefficients finite."""
-    expected = f"expected Noll's index, 4 to {_MOST_ZERNIKE}, each once, and its rms in m"
-    if not isinstance(pairs, tuple):
-        raise ValueError(f"zernike: {pairs!r}, {expected}")
-    seen = set()
-    for pair in pairs:
-        index, rms = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
-        if (
-            not (isinstance(index, Integral) and 4 <= int(index) <= _MOST_ZERNIKE)
-            or index in seen
-            or not (isinstance(rms, Real) and abs(float(rms)) <= _STRONGEST)
-        ):
-            raise ValueError(f"zernike: {pair!r}, {expected}")
-        seen.add(index)
 
 
 def _noll(index: int) -> tuple[int, int]:
