@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite
-from typing import cast
+from typing import Annotated, cast
 
 import numpy as np
 
 from chipglow.camera.camera import Camera
 from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities.units import INSTANT, Position
 from chipglow.radiometry import RatioThermometer
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
@@ -34,7 +34,7 @@ class RatioMeasurement:
 
 
 @dataclass(frozen=True)
-class RatioCamera:
+class RatioCamera(Part):
     """A camera of two bands.
 
     Parameters
@@ -42,13 +42,6 @@ class RatioCamera:
     first, second : Camera
         The channels, that of the shorter wavelengths first. Each has its own band, point spread
         function, integration time, detector and seed; pitch, offset and shape are the same.
-    emissivity_ratio : float
-        Assumed emissivity in the first band over that in the second.
-    shift : tuple of float
-        Misregistration: how far right of and above the first's pixels those of the second look,
-        in m on the scene, though they are taken to look at the same places.
-    delay : float
-        How much later than the first the second begins to integrate, in s.
 
     Raises
     ------
@@ -58,21 +51,29 @@ class RatioCamera:
 
     first: Camera
     second: Camera
-    emissivity_ratio: float = 1.0
-    shift: tuple[float, float] = (0.0, 0.0)
-    delay: float = 0.0
+    emissivity_ratio: Annotated[
+        float, Parameter("Assumed emissivity in the first band over that in the second.", over=0.0)
+    ] = 1.0
+    shift: Annotated[
+        tuple[Position, Position],
+        Parameter(
+            "Misregistration: how far right of and above the first's pixels those of the second "
+            "look on the scene, though they are taken to look at the same places."
+        ),
+    ] = (0.0, 0.0)
+    delay: Annotated[
+        float,
+        Parameter("How much later than the first the second begins to integrate.", INSTANT),
+    ] = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("pitch", "offset", "shape"):
             one, other = getattr(self.first, name), getattr(self.second, name)
             if one != other:
                 raise ValueError(
                     f"ratio camera: {name} is {one!r} and {other!r}, expected the same of both"
                 )
-        if not (len(self.shift) == 2 and all(isfinite(s) for s in self.shift)):
-            raise ValueError(f"ratio camera: shift is {self.shift!r}, expected two lengths in m")
-        if not isfinite(self.delay):
-            raise ValueError(f"ratio camera: delay is {self.delay!r}, expected a time in s")
         self.thermometer.range  # noqa: B018 - refuses bands without a ratio now, not later
 
     @cached_property

@@ -2,29 +2,24 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST, Band
 
 
 @dataclass(frozen=True)
-class RatioThermometer:
+class RatioThermometer(Part):
     """The temperature at which two bands send radiances of a given ratio.
 
     Parameters
     ----------
     first, second : Band
         The bands, that of the shorter wavelengths first.
-    emissivity_ratio : float
-        Emissivity in the first band over that in the second; 1 for a grey body.
-    emissivity_ratio_uncertainty : float
-        Its standard uncertainty.
 
     Raises
     ------
@@ -42,19 +37,18 @@ class RatioThermometer:
 
     first: Band
     second: Band
-    emissivity_ratio: float = 1.0
-    emissivity_ratio_uncertainty: float = 0.0
+    emissivity_ratio: Annotated[
+        float,
+        Parameter(
+            "Emissivity in the first band over that in the second; 1 for a grey body.", over=0.0
+        ),
+    ] = 1.0
+    emissivity_ratio_uncertainty: Annotated[
+        float, Parameter("Its standard uncertainty.", least=0.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.emissivity_ratio < inf:
-            raise ValueError(
-                f"emissivity_ratio: {self.emissivity_ratio!r}, expected over 0, such as 1"
-            )
-        if not 0.0 <= self.emissivity_ratio_uncertainty < inf:
-            raise ValueError(
-                f"emissivity_ratio_uncertainty: {self.emissivity_ratio_uncertainty!r}, expected 0 "
-                "or more"
-            )
+        super().__post_init__()
         if self._rising.stop - self._rising.start < 2:
             raise ValueError(
                 "bands: the ratio of their radiances does not rise with the temperature, expected "

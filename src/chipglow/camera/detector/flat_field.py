@@ -61,25 +61,6 @@ class FlatFieldCalibration:
     levels: tuple[float, float]
     """The median pixel's counts of them."""
 
-    @classmethod
-    def of(
-        cls, detector: Detector, point: OperationPoint, shape: tuple[int, int]
-    ) -> "FlatFieldCalibration":
-        """Make it of frames of the detector's sources; a ValueError if they are not possible."""
-        dark, bright = sources = _sources(detector, point)
-        cold = _frames(detector, point, shape, dark, detector.frames, "cold")
-        hot = _frames(detector, point, shape, bright, detector.frames, "hot")
-        uniformity = _uniformity(detector, cold, hot)
-        light = _BEYOND * full_light(detector, point)
-        full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
-        saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
-        bad = find_bad_pixels(cold, hot).unresponsive
-        bad |= mean_frame(hot) >= saturated
-        low, high = (
-            float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
-        )
-        return cls(detector, point, uniformity, bad, saturated, sources, (low, high))
-
     @property
     def effects(self) -> Mapping[str, str]:
         """Attributes of a measurement about detector and calibration, in SI."""
@@ -167,16 +148,6 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
     return dark, bright
 
 
-def _uniformity(
-    detector: Detector, cold: NDArray[np.uint32], hot: NDArray[np.uint32]
-) -> NonUniformity:
-    if detector.correction == "two-point":
-        return NonUniformity.two_point(cold, hot)
-    if detector.correction == "one-point":
-        return NonUniformity.one_point(cold)
-    return NonUniformity(np.ones(cold.shape[1:]), np.zeros(cold.shape[1:]))
-
-
 def _frames(
     detector: Detector,
     point: OperationPoint,
@@ -194,8 +165,25 @@ def _frames(
 def flat_field_calibration(
     detector: Detector, point: OperationPoint, shape: tuple[int, int]
 ) -> FlatFieldCalibration:
-    """Return the calibration of a detector in a camera, `FlatFieldCalibration.of`, made once."""
-    return FlatFieldCalibration.of(detector, point, shape)
+    """Return the calibration of a detector in a camera, by frames of its sources."""
+    dark, bright = sources = _sources(detector, point)
+    cold = _frames(detector, point, shape, dark, detector.frames, "cold")
+    hot = _frames(detector, point, shape, bright, detector.frames, "hot")
+    if detector.correction == "two-point":
+        uniformity = NonUniformity.two_point(cold, hot)
+    elif detector.correction == "one-point":
+        uniformity = NonUniformity.one_point(cold)
+    else:
+        uniformity = NonUniformity(np.ones(shape), np.zeros(shape))
+    light = _BEYOND * full_light(detector, point)
+    full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
+    saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
+    bad = find_bad_pixels(cold, hot).unresponsive
+    bad |= mean_frame(hot) >= saturated
+    low, high = (
+        float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
+    )
+    return FlatFieldCalibration(detector, point, uniformity, bad, saturated, sources, (low, high))
 
 
 @lru_cache(maxsize=32)

@@ -2,14 +2,14 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from math import isfinite, pi
+from math import pi
 from typing import Annotated, ClassVar, Final, final
 
 import numpy as np
 from scipy.constants import c, h
 
 from chipglow.quantities import Family, Parameter, Part
-from chipglow.quantities.units import LENGTH, TEMPERATURE, WAVELENGTH
+from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, WAVELENGTH
 from chipglow.radiometry import Band
 
 RESPONSES: Final = Family("detector_response")
@@ -17,23 +17,16 @@ RESPONSES: Final = Family("detector_response")
 
 
 @dataclass(frozen=True)
-class OperationPoint:
+class OperationPoint(Part):
     """How a camera uses its detector (EMVA 1288: the operation point)."""
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
     """With the relative spectral response."""
-    integration_time: float = 10e-6
-    """In s."""
-    frame_rate: float = 600.0
-    """Frames a second."""
-    fill_factor: float = 1.0
-    """Fraction of an element's square that takes light."""
-
-    def __post_init__(self) -> None:
-        for name in ("integration_time", "frame_rate", "fill_factor"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise ValueError(f"operation point: {name} is {value!r}, expected over 0")
+    integration_time: Annotated[float, Parameter("Exposure.", TIME, over=0.0)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
+    fill_factor: Annotated[
+        float, Parameter("Fraction of an element's square that takes light.", over=0.0)
+    ] = 1.0
 
     @property
     def frame_time(self) -> float:
