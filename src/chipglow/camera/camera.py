@@ -297,18 +297,23 @@ class Camera(Part):
         Beyond the scene radiance is taken to be as at the scene's edge. The warning compares with a
         second assumption: that beyond the scene each pixel sees the like of what it sees within.
         """
-        exposures = [exposures] if isinstance(exposures, Exposure) else list(exposures)
-        if not exposures:
-            raise ValueError("camera: at least one exposure is required")
-        scene = exposures[0].raster
-        if any(self.pixels(one.raster) != self.pixels(scene) for one in exposures):
-            raise ValueError("camera: exposures are of different grids")
-        images = np.stack([self.form_image(one.mean_radiance, one.raster) for one in exposures])
-        starts = np.array([one.start for one in exposures])
-        measured = self.measurement(images, starts, scene)
-        effects = [set(one.effects.items()) for one in exposures]
+        images: list[Array] = []
+        alike, starts, effects, grids = [], [], [], set()
+        for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
+            scene = exposure.raster
+            images.append(self.form_image(exposure.mean_radiance, scene))
+            alike.append(self._image_of_like(exposure.mean_radiance, scene))
+            starts.append(exposure.start)
+            effects.append(set(exposure.effects.items()))
+            grids.add(self.pixels(scene))
+        if len(grids) != 1:
+            raise ValueError("camera: one or more exposures of the same grid are required")
+        measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
-        warnings = [*self._lag_warning(starts), *self._border_warning(exposures, images)]
+        warnings = [
+            *self._lag_warning(measured.times),
+            *self._border_warning(np.stack(images), np.stack(alike), scene),
+        ]
         if warnings:
             measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured
@@ -401,6 +406,11 @@ class Camera(Part):
             image = term.on_pixels(image, pixels, self.band)
         return image
 
+    def _image_of_like(self, image: Array, scene: Raster) -> Array:
+        """Return the image if each pixel saw beyond the scene the like of what it sees within."""
+        within = self._collect(image, scene, "nothing") / self._own_light(scene)
+        return self._show(within, self.pixels(scene))
+
     @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
     def _own_light(self, scene: Raster) -> Array:
         """Return the fraction of each pixel's light that comes from within the scene."""
@@ -451,21 +461,15 @@ class Camera(Part):
                 "predecessor: there is no lag in them."
             )
 
-    def _border_warning(self, exposures: Sequence[Exposure], images: Array) -> Iterator[str]:
+    def _border_warning(self, images: Array, alike: Array, scene: Raster) -> Iterator[str]:
         """Warn how far another assumption about what is beyond the scene changes temperatures."""
-        if self.psf is None and not self.optics:
-            return
-        scene = exposures[0].raster
-        pixels, own_light = self.pixels(scene), self._own_light(scene)
-        within = (self._collect(one.mean_radiance, scene, "nothing") for one in exposures)
-        others = np.stack([self._show(image / own_light, pixels) for image in within])
         kelvins = self.band.temperature(images)
-        change = np.abs(kelvins - self.band.temperature(others))
+        change = np.abs(kelvins - self.band.temperature(alike))
         change[~(kelvins >= (self.lower_limit or 0.0))] = np.nan
         changed = change > BORDER_TOLERANCE
         if not changed.any():
             return
-        left, right, bottom, top = scene.extent
+        pixels, (left, right, bottom, top) = self.pixels(scene), scene.extent
         across = np.minimum(pixels.x - left, right - pixels.x)
         down = np.minimum(top - pixels.y, pixels.y - bottom)
         reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
