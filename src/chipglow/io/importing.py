@@ -15,7 +15,7 @@ import numpy as np
 
 from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
-from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
+from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
