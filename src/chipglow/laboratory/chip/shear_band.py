@@ -46,7 +46,7 @@ class ShearBand:
     rate: Array
     """Plastic strain rate on the ridge in 1/s, shape (n,)."""
     widths: Array
-    """Full width at half maximum of the rate across the ridge in m, shape (n,); NaN if undefined."""
+    """Full width at half maximum of the rate across the ridge in m, shape (n,), or NaN."""
     reaches_surface: bool
     """Whether the curve ends at a free surface, not at the border of the field of view."""
 
@@ -163,10 +163,11 @@ def _widths(points: Array, raster: Raster, rate: Array) -> Array:
     """Compute the full width at half maximum across each point of the curve."""
     step = raster.spacing / 2
     offsets = step * np.arange(ceil(_WIDEST / step) + 1, dtype=np.float64)
-    sides = (
-        np.nan_to_num(sample(rate, raster, across_curve(points, s * offsets))) for s in (-1, 1)
+    below, above = (
+        np.nan_to_num(sample(rate, raster, across_curve(points, sign * offsets)))
+        for sign in (-1.0, 1.0)
     )
-    return np.sum([_half_crossing(values, offsets) for values in sides], axis=0)
+    return _half_crossing(below, offsets) + _half_crossing(above, offsets)
 
 
 def _half_crossing(values: Array, offsets: Array) -> Array:
