@@ -20,7 +20,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import FrameScatter
+from chipglow.laboratory.chip.frames import frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -491,40 +491,32 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
         return np.stack([_at(distance, profile.distance, row) for row in rows])
 
     frames = read(profile.temperature)
-    known = np.isfinite(frames)
+    systematic = profile.estimate.without(POSITION)
+    components = tuple(
+        Component(one.cause, np.stack([read(part).ravel() for part in one.effects.T], axis=1))
+        for one in systematic.components
+    )
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
-    position = _mean(read(profile.estimate.contribution(POSITION)), known)
-    systematic = [
-        Component(one.cause, np.stack([_mean(read(e), known) for e in one.effects.T], axis=1))
-        for one in profile.estimate.without(POSITION).components
-    ]
-    found = Estimate(_mean(frames, known), tuple(systematic), profile.estimate.unevaluated)
-    found = found.with_component(POSITION, position, independent="per element")
-    return replace(found, components=(*found.components, _scatter(frames, known).component()))
+    position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
+    mean = frame_mean(Estimate(frames, components, systematic.unevaluated))
+    mean = mean.with_component(POSITION, position.values, independent="per element")
+    return replace(mean, components=(*mean.components, _scatter(frames)))
 
 
-def _scatter(frames: Array, known: NDArray[np.bool_]) -> FrameScatter:
-    """How the frames differ, where they are known."""
-    count, scatter = known.sum(axis=0), FrameScatter.of(frames)
+def _scatter(frames: Array) -> Component:
+    """Return the scatter of the frames; where only one reaches, it is the mean of the others'."""
+    scatter, count = frame_scatter(frames), np.isfinite(frames).sum(axis=0)
     several = count > 1
     if several.any() and (count == 1).any():
-        patterns = scatter.patterns.copy()
-        squares = count * scatter.standard_deviation**2
-        patterns[0, count == 1] = sqrt(float(squares[several].mean()))
-        scatter = replace(scatter, patterns=patterns)
+        effects = scatter.effects.copy()
+        effects[count == 1, 0] = sqrt(float((count * scatter.variance)[several].mean()))
+        scatter = replace(scatter, effects=effects)
     return scatter
 
 
 def _at(distance: Array, own: Array, values: Array) -> Array:
     """Values at other distances; NaN next to a NaN and beyond the ends."""
     return np.interp(distance, own, values, left=np.nan, right=np.nan)
-
-
-def _mean(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Mean over the first axis of what is known; NaN where nothing is."""
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.asarray(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
 
 
 def _places(
