@@ -31,9 +31,9 @@ from chipglow.laboratory.emissivity.study_sections import (
     surface_text as surface_text,
 )
 from chipglow.laboratory.emissivity.temperature import (
-    ReflectedTemperature as ReflectedTemperature,
     RegionTemperatures as RegionTemperatures,
     TrueTemperature as TrueTemperature,
+    reflected_temperature as reflected_temperature,
     true_temperature as true_temperature,
     true_temperatures as true_temperatures,
 )
