@@ -318,6 +318,8 @@ def test_a_mark_of_the_order_of_bytes_is_no_part_of_the_study(tmp_path):
 
 
 def test_an_empty_study_or_section_means_the_defaults(tmp_path):
+    with pytest.raises(DescriptionError, match=r"study.yaml: is empty, expected a study"):
+        load("", tmp_path)
     assert load("surface:\n", tmp_path) == Study()
     assert load("camera:\nanalysis:\n", tmp_path) == Study()
 

@@ -6,7 +6,6 @@ from chipglow.cutting import material_names
 from chipglow.quantities import (
     Part,
     changed,
-    field_tables,
     own_settings,
     setting_at,
     settings,
@@ -93,13 +92,6 @@ def test_the_materials_that_are_told_are_those_there_are():
     assert Study(cutting={"workpiece": "aisi-1045/ozel"})
     tools = next(entry for entry in own_settings(cutting.tool) if entry.name == "material")
     assert tools.allowed.split(", ") == list(material_names("tool"))
-
-
-def test_the_tables_have_a_row_for_every_field_of_the_cut():
-    text = field_tables(Study().cutting, "cutting")
-    rows = [line for line in text.splitlines() if line.startswith("| `")]
-    assert all(f"## `{name}`\n" in text for _, name in CUTTING)
-    assert [row.split("`")[1] for row in rows] == [entry.name for _, entry in FIELDS]
 
 
 def test_paths_lead_through_lists_and_mappings():

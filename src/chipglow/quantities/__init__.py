@@ -19,7 +19,6 @@ from chipglow.quantities.part import (
 from chipglow.quantities.settings import (
     Setting as Setting,
     changed as changed,
-    field_tables as field_tables,
     own_settings as own_settings,
     setting_at as setting_at,
     settings as settings,
