@@ -1,7 +1,4 @@
-"""Images, lines and numbers of a scene or a measurement at a state of the controls.
-
-The stages of a picture are computed once for all states that agree up to them.
-"""
+"""Images, lines and numbers at a state of the controls; states share the stages they agree on."""
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
@@ -56,22 +53,17 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """Images and lines at a state; `quick` marks those on a coarser scene.
-
-    `data` has the images in K over the pixels: ``measured`` and ``flagged``, of a scene those of
-    `error_images`. `lines` are in µm and °C by name: ``along``, ``measured`` and ``reference``.
-    That of a scene has the camera, its exposure, and what computes the `error_parts`.
-    """
+    """Images over the pixels in K and lines in µm and °C at a state; `quick` marks coarse ones."""
 
     state: State
     raster: Raster
-    data: xr.Dataset
+    data: xr.Dataset  # of a scene that of `error_images`, else ``measured`` and ``flagged``
     panels: dict[str, Panel]
-    lines: dict[str, dict[str, Array]]
+    lines: dict[str, dict[str, Array]]  # ``along``, ``measured`` and ``reference`` by name
     quick: bool = False
     camera: Camera | None = None
     exposure: Exposure | None = None
-    parts: Callable[[], xr.Dataset] | None = None
+    parts: Callable[[], xr.Dataset] | None = None  # computes the `error_parts`
 
     @property
     def lower_limit(self) -> float | None:
@@ -216,10 +208,7 @@ class SceneModel:
     def drawn(
         self, state: State, phases: int, textures: int, progress: Callable[[float], None]
     ) -> Drawn:
-        """Return lines and error at the cursor at `phases`² positions of the pixels and textures.
-
-        `progress` takes the finished fraction and may raise.
-        """
+        """Return lines and error at the cursor over `phases`² pixel positions and textures."""
         # This is done in another thread than the pictures, whose caches it leaves alone.
         fitted = fit(state.study, self.opened.scene)
         scene, (surface,) = fitted.scene, fitted.surfaces.values()
@@ -267,10 +256,7 @@ class SceneModel:
         return self._surfaces.result((state.key(*_SURFACE), quick), make)
 
     def _camera(self, state: State, scene: Scene, quick: bool = False) -> Camera:
-        """Return the study's camera; if quick, with no pixels finer than the scene's samples.
-
-        Its band is kept, whose tables take longer than an image.
-        """
+        """Return the study's camera; if quick, with no pixels finer than the scene's samples."""
         camera = state.study.camera.on(scene.raster, state.study.seed)
         larger = scene.raster.spacing / camera.pitch
         if quick and larger > 1:

@@ -1,8 +1,4 @@
-"""The state of one user, and the threads that compute its pictures.
-
-Pictures are always of the newest state: states between are never computed, and work for an older
-one ends at the next opportunity. Draws have a thread of their own.
-"""
+"""The state of one user, and the threads that compute pictures, always of the newest state."""
 
 import logging
 from collections.abc import Callable
@@ -108,13 +104,7 @@ class Session:
         self._pictures.ask(self.state)
 
     def change(self, texts: Texts, final: bool = True) -> None:
-        """Set controls; only a final state is one that `step` goes to.
-
-        Raises
-        ------
-        ValueError
-            If that is not possible; the state then stays.
-        """
+        """Set controls; only a final state is one that `step` goes to."""
         self._set(self.model.controls.changed(self.state, texts), final)
 
     def restore(self, texts: Texts) -> None:

@@ -55,10 +55,7 @@ class Page(JSComponent):  # type: ignore[misc]
         super().__init__(**params)
 
     def alone(self, change: Callable[[], None]) -> None:
-        """Change a notebook's page while it receives no message.
-
-        Messages of a notebook may come in another thread, and Panel drops changes made meanwhile.
-        """
+        """Change a notebook's page while no message comes: Panel drops changes made meanwhile."""
         with self._message:
             change()
 
@@ -67,11 +64,7 @@ class Page(JSComponent):  # type: ignore[misc]
 
 
 class View:
-    """A page and its session.
-
-    A link gives `texts` of controls and other parameters, `link`; `uploads` is the maximum size of
-    an uploaded file, empty if none is accepted; `embedded` marks a part of another page.
-    """
+    """A page and its session; a link gives `texts` of controls and other parameters, `link`."""
 
     def __init__(
         self,

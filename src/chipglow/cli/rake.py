@@ -56,13 +56,13 @@ def rake(
 
 def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[int] | None:
     """Return the indices of the chosen frames, or None for all."""
-    from chipglow.cli.times import frame_at
+    from chipglow.drawing.frames import shown_frame
 
     times = measurement.times
     if at is not None:
         if frame != "all":
             raise ValueError("--frame and --at cannot be combined")
-        return [frame_at("--at", at, times)]
+        return [shown_frame(times, at, option="--at: ")]
     if frame == "all":
         return None
     if not (frame.isdecimal() and int(frame) < times.size):

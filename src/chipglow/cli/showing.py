@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.screen import current, figure, finish
-from chipglow.cli.times import frame_at
+from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.measurement import MeasurementSummary, measurement_summary
@@ -53,7 +53,7 @@ def _show_scene(path: Path, at: float | None, plot: Path | None) -> None:
 
     _check_shown(path)
     scene = open_scene(path)
-    time = None if at is None else scene.times[frame_at("--at", at, scene.times, "scene")]
+    time = None if at is None else scene.times[shown_frame(scene.times, at, "scene", "--at: ")]
     summary = scene_summary(scene, time)
     screen = current()
     screen.facts("scene", _scene_facts(scene, path))
@@ -86,7 +86,7 @@ def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
 
     measurement = read_measurement(path)
     times = measurement.times
-    time = None if at is None else times[frame_at("--at", at, times, "measurement")]
+    time = None if at is None else times[shown_frame(times, at, option="--at: ")]
     say_measurement(measurement, time)
     finish(measurement.notes, (plot, figure(draw_measurement, measurement, time)))
 
