@@ -431,7 +431,7 @@ def test_calibrate_says_what_is_doubtful(laboratory):
     assert "Assumed: The blackbody reflects 20 degC" in said
     code, said = run("calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "97")
     assert code == 2
-    assert "emissivity: is 97.0, expected over 0 to 1" in said
+    assert "emissivity: 97, expected over 0, up to 1" in said
     (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
     code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
     assert code == 0, said

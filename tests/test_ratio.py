@@ -354,9 +354,9 @@ def test_what_a_ratio_camera_refuses():
             RatioCamera(camera.first, other)
     with pytest.raises(ValueError, match="the band of the shorter wavelengths first"):
         RatioCamera(camera.second, camera.first)
-    with pytest.raises(ValueError, match="shift is"):
+    with pytest.raises(ValueError, match="shift"):
         two(shift=(np.nan, 0.0))
-    with pytest.raises(ValueError, match="delay is"):
+    with pytest.raises(ValueError, match="delay"):
         two(delay=np.inf)
 
 
