@@ -14,7 +14,6 @@ import numpy as np
 from numba import njit, prange
 
 from chipglow.cutting.flow_stress import comes_with_chipglow, flow_stress
-from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST, INLINE
 from chipglow.cutting.stencil import ADDED, SUMMED, add_to_nodes, sum_nodes
 from chipglow.cutting.stress import (
@@ -167,6 +166,15 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
         (0.0, qxy, qyy, -txy, -tyy),
     )
     return True
+
+
+@njit
+def friction_coefficient(coefficient, exponent, melting_temperature, temperature):  # type: ignore[no-untyped-def]
+    """Return Coulomb's coefficient at a temperature: see `Friction`.
+
+    With an infinite melting temperature it is `coefficient`, to the last bit.
+    """
+    return coefficient * max(1.0 - (temperature / melting_temperature) ** exponent, 0.0)
 
 
 @njit(**FAST)

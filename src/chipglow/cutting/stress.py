@@ -14,7 +14,6 @@ from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import FAST, INLINE, exponential
 from chipglow.cutting.material import TABLE_COLDEST
-from chipglow.cutting.plastic_heat import heat_fraction
 
 LANES = 128
 """Points of a batch: their rows stay in the fastest cache."""
@@ -231,6 +230,20 @@ def update_stresses(  # type: ignore[no-untyped-def]
             if work > 0.0:
                 heat = heat_fraction(p.increment / step.time_step, heat_fractions) * work
                 p.temperature += heat / (step.heat_mass * property_at(capacity, p.temperature))
+
+
+@njit
+def heat_fraction(rate, fractions):  # type: ignore[no-untyped-def]
+    """Return the fraction of the plastic work that becomes heat at a plastic strain rate in 1/s."""
+    last = fractions.shape[1] - 1
+    if rate <= fractions[0, 0]:
+        return fractions[1, 0]
+    for i in range(last):
+        low, high = fractions[0, i], fractions[0, i + 1]
+        if rate < high:
+            way = np.log(rate / low) / np.log(high / low)
+            return fractions[1, i] + way * (fractions[1, i + 1] - fractions[1, i])
+    return fractions[1, last]
 
 
 @njit
