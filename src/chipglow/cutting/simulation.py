@@ -368,13 +368,13 @@ class _State:
         self.tool = simulation.tool.surface
         self.speed, self.spacing = conditions.speed, spacing
         self.simulation, self.interval = simulation, interval
-        heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
-        mass = heat_mass * simulation.mass_scaling
+        self.heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
+        mass = self.heat_mass * simulation.mass_scaling
         resists = material.nonlocal_viscosity
         self.step = Step(
             mass=mass,
-            heat_mass=heat_mass,
-            volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
+            heat_mass=self.heat_mass,
+            volume=self.heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
             time_step=0.0,
             kept=_KEPT,
             shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
@@ -392,12 +392,17 @@ class _State:
             viscosity=resists.viscosity if resists is not None else 0.0,
             **_thermal_friction(simulation),
         )
-        self.law = material.flow_stress.numbers()
-        self.step_points = advance_with(self.law)
-        self.damage = Damage.of(material.damage, material.failing_layer(cell))
+        law, damage = material.flow_stress.numbers(), material.damage
+        self.step_points = advance_with(law)
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.heat_fractions = material.heat_fractions()
+        self.matter = (
+            law,
+            Damage.of(damage, material.failing_layer(cell)),
+            self.elastic,
+            self.capacity,
+            material.heat_fractions(),
+        )
         self.conductivity = material.conductivity.sampled()
         self.diffusivity, self.effusivity = _conduction(material, conditions.initial_temperature)
         self.tool_heat = _tool_heat(simulation, self.effusivity, spacing)
@@ -423,8 +428,10 @@ class _State:
         far = (len(self.tool_border), CELLS)
         self.tool_beyond = np.full(far, of_tool)
         self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
-        self.right = numerics.downstream
-        self.top = numerics.height
+        self.grids = (
+            self.starts, self.velocity, self.nodes, self.friction_heat, self.tool, self.grid
+        )  # fmt: skip
+        self.right, self.top = numerics.downstream, numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
         self.choose_steps()
@@ -509,29 +516,14 @@ class _State:
     @np.errstate(invalid="ignore", over="ignore")  # `find_trouble` finds what is not finite
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; return mean forces in N/m, and the energies."""
-        sums = np.zeros_like(self.work)
+        sums, threads = np.zeros_like(self.work), get_num_threads()
         for _ in range(self.cycles):
             before = self._held().sum()
             self._let_in(self.time)
             self._sort()
             self.carried += self._held().sum() - before
             good = self.step_points(
-                self.steps,
-                self.points,
-                self.starts,
-                self.velocity,
-                self.nodes,
-                self.friction_heat,
-                self.tool,
-                self.grid,
-                self.step,
-                self.law,
-                self.damage,
-                self.elastic,
-                self.capacity,
-                self.heat_fractions,
-                sums,
-                get_num_threads(),
+                self.steps, self.points, *self.grids, self.step, *self.matter, sums, threads
             )
             self.time += self.cycle
             if not good:
@@ -550,7 +542,7 @@ class _State:
         )
 
     def choose_steps(self, allowed: float = inf) -> None:
-        """Time step and cycles of the next interval, by the fastest point.
+        """Choose time step and cycles of the next interval, by the fastest point.
 
         It may not have been faster than `allowed` (m/s) by the steps of the interval before.
         """
@@ -575,69 +567,24 @@ class _State:
     def _average_rates(self) -> None:
         resists = self.simulation.workpiece.nonlocal_viscosity
         if resists is not None:
-            average_rates(
-                self.points,
-                self.count,
-                self.rate_nodes,
-                self.rate_spare,
-                self.grid,
-                self.cycle,
-                resists.length,
-            )
+            nodes, spare, length = self.rate_nodes, self.rate_spare, resists.length
+            average_rates(self.points, self.count, nodes, spare, self.grid, self.cycle, length)
 
     def _conduct(self) -> None:
-        conduct(
-            self.points,
-            self.count,
-            self.heat_nodes,
-            self.increment,
-            self.conductivity,
-            self.capacity,
-            self.step.heat_mass,
-            self.grid,
-            self.cycle,
-            min(self.diffusivity * self.cycle / self.grid.cell**2, 1.0),
-        )
-        conduct_tool(
-            self.tool_temperature, self.tool_fraction, self.tool_heat, self.grid, self.cycle
-        )
-        conduct_beyond(
-            self.tool_temperature,
-            self.tool_beyond,
-            self.tool_border,
-            self.tool_fraction,
-            self.tool_heat,
-            self.grid,
-            self.cycle,
-        )
+        points, count, grid, cycle = self.points, self.count, self.grid, self.cycle
+        nodes, rise, capacity, mass = self.heat_nodes, self.increment, self.capacity, self.heat_mass
+        tool, filled, heat = self.tool_temperature, self.tool_fraction, self.tool_heat
+        part = min(self.diffusivity * cycle / grid.cell**2, 1.0)
+        conduct(points, count, nodes, rise, self.conductivity, capacity, mass, grid, cycle, part)
+        conduct_tool(tool, filled, heat, grid, cycle)
+        conduct_beyond(tool, self.tool_beyond, self.tool_border, filled, heat, grid, cycle)
         if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
-            self.lost_heat += lose_heat(
-                self.heat_nodes,
-                self.increment,
-                self.tool_temperature,
-                self.tool_fraction,
-                self.tool_heat,
-                self.loss,
-                self.grid,
-                self.cycle,
-            )
+            self.lost_heat += lose_heat(nodes, rise, tool, filled, heat, self.loss, grid, cycle)
         heat_contact(
-            self.points,
-            self.count,
-            self.friction_heat,
-            self.touched,
-            self.entered,
-            self.increment,
-            self.heat_nodes,
-            self.tool_temperature,
-            self.tool_fraction,
-            self.tool,
-            self.tool_heat,
-            self.capacity,
-            self.step.heat_mass,
-            self.grid,
-        )
-        return_heat(self.points, self.count, self.increment, self.grid)
+            points, count, self.friction_heat, self.touched, self.entered, rise, nodes, tool,
+            filled, self.tool, heat, capacity, mass, grid,
+        )  # fmt: skip
+        return_heat(points, count, rise, grid)
 
     def frame(self, picture: Picture) -> Frame:
         """Return the fields now; the strain rate is the mean over the last interval."""
