@@ -43,42 +43,32 @@ _NEEDED: Final = {
 
 @dataclass(frozen=True, eq=False)
 class CuttingForces:
-    """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
-
-    `unaccounted` is the part of the drive's work that the energy balance of the cutting simulation
-    does not account for at the end; NaN if the scene has no energy account.
-    """
+    """Forces per width of cut in N/m over time in s, shape (n,), and their segments."""
 
     time: NDArray[np.float64]
     cutting: NDArray[np.float64]
     thrust: NDArray[np.float64]
     segmentation: Segmentation
-    unaccounted: float
+    unaccounted: float  # part of the drive's work, NaN without an energy account
     inertia: Inertia
 
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """What only a cut with a shear band and a contact at the rake face has.
+    """Segments, instants, chip and forces that only a cut with a developed band and contact has."""
 
-    `instants` show the shear band over the scene's longest part without a gap, then in each of the
-    `other_parts`; `developed` is the number of that with the fully developed band. `segments` are
-    the exposures that are drawn: the developed one, then one of each other part. `moments` are
-    frames before, with and after the developed band.
-    """
-
-    instants: tuple[Instant, ...]
+    instants: tuple[Instant, ...]  # of the longest part without a gap, then one of each other part
     other_parts: int
-    developed: int
-    segments: tuple[Segment, ...]
-    moments: tuple[Frame, ...]
+    developed: int  # the instant with the fully developed band
+    segments: tuple[Segment, ...]  # the drawn exposures: the developed one, then the other parts
+    moments: tuple[Frame, ...]  # before, with and after the developed band
     chip: ChipMetrics | None = None
     forces: CuttingForces | None = None
     heated: tuple[HeatedObject, ...] = ()
 
     @property
     def one_segment(self) -> tuple[Instant, ...]:
-        """The instants of the scene's longest part: how one band develops."""
+        """The instants of the scene's longest part."""
         return self.instants[: len(self.instants) - self.other_parts]
 
     @property
@@ -93,7 +83,7 @@ class Cut:
 
 
 def lacking(scene: Scene) -> Iterator[str]:
-    """What the scene lacks for the analysis of a cut, a sentence each."""
+    """Yield a sentence for each thing that the scene lacks for the analysis of a cut."""
     if scene.tool is None:
         yield (
             "No rake face is read: the scene has no tool (the section cutting.tool of the study "
@@ -105,16 +95,7 @@ def lacking(scene: Scene) -> Iterator[str]:
 
 
 def find_cut(scene: Scene, duration: float, exposures: int, touching: float, tell: Progress) -> Cut:
-    """Segments of a cut's chip with a developed shear band: one for each part of the scene.
-
-    `duration` is that of an exposure in s; see `Plan` for `exposures` and `touching`.
-
-    Raises
-    ------
-    ValueError
-        If the scene is shorter than an exposure or has no shear band or no contact at the rake
-        face.
-    """
+    """Return the segments of a cut with a developed shear band, one per part of the scene."""
     starts = spread_starts(scene, duration, exposures)
     others = other_starts(scene, duration)
     instants = []
@@ -144,7 +125,7 @@ def find_cut(scene: Scene, duration: float, exposures: int, touching: float, tel
 
 
 def cutting_forces(scene: Scene) -> CuttingForces | None:
-    """The forces of a cut and their segments, if the scene has them."""
+    """Return the forces of a cut and their segments, if the scene has them."""
     if "cutting_force" not in scene.data:
         return None
     time, cutting, thrust = (
@@ -158,22 +139,13 @@ def cutting_forces(scene: Scene) -> CuttingForces | None:
 
 
 def middle_frame(scene: Scene, start: float, duration: float) -> int:
-    """Number of the frame in the middle of an exposure."""
+    """Return the number of the frame in the middle of an exposure."""
     middle = start + duration / 2 + 1e-6 * scene.frame_spacing
     return max(int(np.searchsorted(scene.times, middle, side="right")) - 1, 0)
 
 
 def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:
-    """Beginnings of exposures spread over the longest part of the scene, each at a frame of it.
-
-    `duration` is that of an exposure in s. There are fewer than `count` if the scene has not as
-    many frames for them, and one of a scene of a single frame.
-
-    Raises
-    ------
-    ValueError
-        If no part of the scene is as long as an exposure.
-    """
+    """Return starts of `count` exposures or fewer, spread over the scene's longest part."""
     times, spacing = scene.times[scene.longest_block], scene.frame_spacing
     if len(scene.times) == 1:
         return times
@@ -189,7 +161,7 @@ def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float
 
 
 def other_starts(scene: Scene, duration: float) -> list[float]:
-    """Beginnings of the scene's other parts that are as long as an exposure."""
+    """Return starts of the scene's other parts that are as long as an exposure."""
     starts = []
     for block in scene.blocks:
         first, last = scene.times[block[0]], scene.times[block[-1]]
@@ -200,11 +172,7 @@ def other_starts(scene: Scene, duration: float) -> list[float]:
 
 
 def _developed(scene: Scene, instants: list[Instant]) -> int:
-    """Number of the first instant whose band has come near the greatest rise of its temperature.
-
-    From then on the band's temperature hardly changes, but the chip carries it away from the edge:
-    the paper takes bands that are "fully developed but not moved".
-    """
+    """Return the number of the first instant whose band is near its greatest temperature."""
     means = np.array([instant.mean_temperature for instant in instants])
     if np.isnan(means).all():
         raise NoShearBandError("shear band: none is found in any of the exposures")
@@ -213,7 +181,7 @@ def _developed(scene: Scene, instants: list[Instant]) -> int:
 
 
 def _unaccounted(scene: Scene) -> float:
-    """Fraction of the drive's work that the energy balance does not account for at the end."""
+    """Return the fraction of the drive's work that the energy balance does not explain."""
     if "drive_work" not in scene.data:
         return nan
     account = {name: np.asarray(scene.data[name].values, dtype=np.float64) for name in ENERGY_UNITS}

@@ -1,4 +1,4 @@
-"""A figure of merit over its draws: how it scatters, what makes it scatter, where a value lies."""
+"""A figure of merit over its draws: its scatter, and the causes of the scatter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,11 +18,7 @@ COVERAGE: Final = 0.95
 
 
 class VarianceComponent(NamedTuple):
-    """What one cause contributes to the scatter of a distribution.
-
-    The cause took `draws` values. `standard_deviation` is that of the means over all other causes,
-    NaN for a single draw; `fraction` is its part of the sum of squares of the scatter, 0 to 1.
-    """
+    """Scatter by one cause: its number of values, deviation of its means, part of the variance."""
 
     draws: int
     standard_deviation: float
@@ -67,13 +63,7 @@ class Distribution:
 
     @cached_property
     def parts(self) -> Mapping[str, VarianceComponent]:
-        """What each cause and, last, their combinations contribute; the fractions sum to 1.
-
-        Notes
-        -----
-        Analysis of variance of a complete design: the sum of squares about the mean is that of
-        the means of each cause, and a rest that only combinations of causes make.
-        """
+        """Analysis of variance of the complete design; last the combinations of causes."""
         total = float(((self.values - self.mean) ** 2).sum())
         parts, axes = {}, range(self.values.ndim)
         for axis, name in enumerate(self.causes):
@@ -90,17 +80,7 @@ class Distribution:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Where one more draw, of other values of all causes, lies with probability `COVERAGE`.
-
-        Infinite where a single draw says nothing of the scatter.
-
-        Notes
-        -----
-        A prediction interval about the mean. Its variance is the sum of those of the causes, each
-        with the uncertainty of its own mean; its degrees of freedom are those of Welch and
-        Satterthwaite (JCGM 100, G.4), so that three draws of a cause that dominates count as
-        three, however many draws there are of the others. Causes of a single value do not count.
-        """
+        """Prediction interval for one more draw (JCGM 100, G.4); infinite for a single draw."""
         terms = [
             (part.standard_deviation**2 * (1 + 1 / part.draws), freedom)
             for part, freedom in zip(self.parts.values(), self._freedoms, strict=True)
@@ -116,12 +96,12 @@ class Distribution:
         return self.mean - half, self.mean + half
 
     def differs_from(self, value: float) -> bool:
-        """Whether a value is too far away for one more draw."""
+        """Return whether a value lies outside the interval."""
         low, high = self.interval
         return not low <= value <= high
 
     def fraction_below(self, value: float) -> float:
-        """Part of the draws under a value, 0 to 1; draws that equal it count half."""
+        """Return the part of the draws under a value, 0 to 1; equal draws count half."""
         return float(((self.values < value) + 0.5 * (self.values == value)).mean())
 
     @property

@@ -124,7 +124,7 @@ class _Task:
         return self.camera.frame_duration(self.scene.raster)
 
     def attempt(self, title: str, compute: Callable[[], _Part]) -> _Part | None:
-        """Compute a part of the analysis; if it fails, keep the reason and continue without it."""
+        """Return a part of the analysis; if it fails, keep the reason and return None."""
         try:
             return compute()
         except ValueError as error:
@@ -222,7 +222,7 @@ def analyse(
 
 
 def _find_cut(task: _Task) -> tuple[Cut | None, tuple[str, ...]]:
-    """The cut; None and the reasons if the scene shows none or none is wanted."""
+    """Return the cut; None and the reasons if the scene shows none or none is wanted."""
     plan, scene = task.plan, task.scene
     if plan.all_places or not plan.cut:
         return None, ()
@@ -238,7 +238,7 @@ def _find_cut(task: _Task) -> tuple[Cut | None, tuple[str, ...]]:
 
 
 def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
-    """All instants; the segments are drawn, at the rake face and in the shear band."""
+    """Return all instants; the segments are drawn, at the rake face and in the shear band."""
     plan, reach = task.plan, (task.plan.line_reach, task.plan.line_step)
     used: tuple[tuple[str, list[list[Place]]], ...] = (
         (
@@ -268,7 +268,7 @@ def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
 
 
 def _scene_schedule(task: _Task) -> Schedule:
-    """Exposures spread over the scene, which are all drawn; that with the hottest is shown."""
+    """Return exposures spread over the scene, all drawn; the hottest one is shown."""
     plan, scene, duration = task.plan, task.scene, task.duration
     starts = spread_starts(scene, duration, plan.exposures)
     frames = [middle_frame(scene, start, duration) for start in starts]
@@ -293,13 +293,13 @@ def _scene_schedule(task: _Task) -> Schedule:
 
 
 def _textures(task: _Task, name: str) -> int:
-    """How many textures of a surface are drawn: one if none is random."""
+    """Return how many textures of a surface are drawn: one if none is random."""
     surface = task.surfaces[name]
     return task.plan.textures if surface.redrawn(1) is not surface else 1
 
 
 def _places(task: _Task, middle: int) -> Iterator[Place]:
-    """The hottest pixel, the rake face if material touches it, then the user's places."""
+    """Yield the hottest pixel, the rake face if material touches it, then the user's places."""
     plan, scene = task.plan, task.scene
     yield HottestPlace()
     if scene.tool is not None and not plan.all_places:
@@ -311,7 +311,7 @@ def _places(task: _Task, middle: int) -> Iterator[Place]:
 
 
 def _completed(task: _Task, cut: Cut) -> Cut:
-    """The cut with its chip, forces and heated objects; each of them may fail."""
+    """Return the cut with its chip, forces and heated objects; each of them may fail."""
     task.tell("chip", 0.0)
     chip = task.attempt("chip metrics", lambda: chip_metrics(task.scene))
     task.tell("chip", 1.0)
@@ -328,7 +328,7 @@ def _completed(task: _Task, cut: Cut) -> Cut:
 def _scene_variables(
     task: _Task, frame: Frame, fields: Mapping[str, EmissivityField], looked: Looked
 ) -> Variables:
-    """The scene at the shown exposure, and its emissivity and radiance temperature by surface."""
+    """Return the scene at the shown exposure, its emissivity and radiance temperature."""
     raster, temperature = task.scene.raster, task.camera.band.temperature
     radiant = [temperature(exposure.centre_radiance) for exposure, _ in looked.shown.values()]
     known = {name: getattr(frame, name) for name in _SHOWN_FIELDS}
@@ -354,7 +354,7 @@ def _scene_variables(
 def _image_variables(
     measurements: Mapping[str, Measurement], looked: Looked, shown: int
 ) -> Variables:
-    """What the camera makes of every instant, and of the shown one with and without effects."""
+    """Return the images of every instant, and of the shown one by effects."""
     every = list(measurements.values())
     pixels, per_pixel = every[0].raster, ("pixel_y", "pixel_x")
     over = "surface", "instant", *per_pixel
@@ -380,7 +380,7 @@ def _image_variables(
 
 
 def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Variables:
-    """The shear band's ridge in every instant, and what is measured along it."""
+    """Return the shear band's ridge in every instant, and what is measured along it."""
     bands = [instant.band for instant in cut.instants]
     length = max(band.ridge.distance.size for band in bands if band is not None)
 
@@ -412,7 +412,7 @@ def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Varia
 
 
 def _history_variables(cut: Cut) -> Variables:
-    """Forces and chip thickness over time, as far as they are known."""
+    """Return forces and chip thickness over time, as far as they are known."""
     variables: Variables = {}
     if forces := cut.forces:
         variables |= {
@@ -431,14 +431,14 @@ def _history_variables(cut: Cut) -> Variables:
 
 
 def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
-    """Warnings of the images of the shown exposure."""
+    """Yield warnings of the images of the shown exposure."""
     for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"
 
 
 def _unread(data: xr.Dataset) -> Iterator[str]:
-    """Places of which there is no reading that all draws have, a sentence each."""
+    """Yield a sentence for each place without a reading in all draws."""
     read = {(one.place, one.surface) for one in headlines(data).values()}
     for key in dict.fromkeys(zip(data.place.values, data.seen_surface.values, strict=True)):
         if key not in read:

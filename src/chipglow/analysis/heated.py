@@ -1,8 +1,4 @@
-"""Heated chips and a heated tool, and the emissivity that an image of them gives back.
-
-The paper's Figures 3 and 4 and its Table 1: the laboratory's procedure on objects of which the
-emissivity is known.
-"""
+"""Heated chips and tool, and the emissivity that their images give back (Figures 3, 4, Table 1)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -47,29 +43,22 @@ _TOOL_MARGIN: Final = 3.0
 
 @dataclass(frozen=True, eq=False)
 class HeatedRow:
-    """Emissivity of one feature, as it was put in and as it comes back: a row of Table 1.
-
-    `found` is that of the first texture with its uncertainty; `means` and `deviations` are those
-    over the pixels of every texture, shape (textures,).
-    """
+    """Emissivity of a feature as put in and as determined: a row of Table 1."""
 
     feature: str
     true: Emissivity
-    found: RegionEmissivity
-    means: NDArray[np.float64]
+    found: RegionEmissivity  # of the first texture
+    means: NDArray[np.float64]  # over the pixels, shape (texture,)
     deviations: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class HeatedObject:
-    """A heated chip or tool by name, its image of the first texture and what comes back.
-
-    There are no `regions` of the tool, which is read as a whole.
-    """
+    """A heated chip or tool, its image of the first texture and the results by region."""
 
     name: str
     map: EmissivityMap
-    regions: tuple[Region, ...]
+    regions: tuple[Region, ...]  # none of the tool, which is read as a whole
     rows: tuple[HeatedRow, ...]
 
 
@@ -83,11 +72,9 @@ def heated_objects(
 ) -> tuple[HeatedObject, ...]:
     """Heat a chip of each `FeatureSurface`, then a tool, and determine their emissivity.
 
-    The chip is a strip of one temperature with straight bands across it, `band_width` wide and
-    `band_spacing` apart in m. It reflects the paper's laboratory of 293 K (Equation 2), which the
-    procedure takes into account. As in the laboratory, the camera has neither the lower limit of
-    its range at the exposure of the cut nor its detector, which may saturate.
+    A chip is a strip with straight bands across it, `band_spacing` apart in m.
     """
+    # The laboratory's camera has neither the cut's range nor a detector that may saturate.
     oven = replace(
         camera,
         lower_limit=None,
@@ -159,7 +146,7 @@ def _heated_tool(
 
 
 def _raster(pitch: float, columns: int, corner: tuple[float, float] | None = None) -> Raster:
-    """Samples of pixels around the origin, or from an upper left corner on."""
+    """Return samples of pixels around the origin, or from an upper left corner on."""
     spacing, rows, columns = pitch / _SAMPLES, _SAMPLES * _ROWS, _SAMPLES * columns
     left, top = corner or (-columns * spacing / 2, rows * spacing / 2)
     return Raster(left, top, spacing, rows, columns)
@@ -171,7 +158,7 @@ def _scene(
     material: NDArray[np.integer],
     rate: NDArray[np.float64] | float,
 ) -> Scene:
-    """One frame of one temperature, at rest."""
+    """Return a scene of one frame of one temperature, at rest."""
     x, y = np.meshgrid(raster.x, raster.y)
     fields = {
         "temperature": temperature,
@@ -190,7 +177,7 @@ def _scene(
 def _images(
     camera: Camera, scene: Scene, surface: FeatureSurface, textures: int, temperature: float
 ) -> list[EmissivityMap]:
-    """Emissivity maps of the object with each texture."""
+    """Return emissivity maps of the object with each texture."""
     heating = Heating(temperature, reference_uncertainty=THERMOCOUPLE)
     at_rest = [replace(surface.redrawn(k), follow="material") for k in range(textures)]
     return [determine_emissivity([camera.measure(scene, one, 0.0)], heating) for one in at_rest]

@@ -125,10 +125,7 @@ def error_parts(
 
 
 class ExposureImages:
-    """Images of one exposure by cameras that differ in pixels, PSF or detector; the last are kept.
-
-    With `shares_blur` the samples are blurred once for all positions of the pixels.
-    """
+    """Images of one exposure by cameras that differ in pixels, PSF or detector; kept."""
 
     def __init__(
         self, exposure: Exposure, kind: ReferenceKind = "maximum", shares_blur: bool = False
@@ -140,7 +137,7 @@ class ExposureImages:
         self._references: dict[tuple[object, ...], Array] = {}
 
     def reference(self, camera: Camera) -> Array:
-        """Reference temperature of a camera's pixels; see `reference_temperature`."""
+        """Return the reference temperature of a camera's pixels."""
         key = camera.pitch, camera.offset, camera.shape, camera.fill_factor
         reference = self._references.get(key)
         if reference is None:
@@ -151,15 +148,15 @@ class ExposureImages:
         return reference
 
     def radiance(self, camera: Camera) -> Array:
-        """Radiance of a camera's pixels before its detector in W/(m² sr)."""
+        """Return the radiance of a camera's pixels before its detector in W/(m² sr)."""
         return self._formed(_without_detector(camera))
 
     def measured(self, camera: Camera) -> Array:
-        """Measured radiance temperature in K, whether flagged or not."""
+        """Return the measured radiance temperature in K, whether flagged or not."""
         return self._read(camera)[0]
 
     def stack(self, camera: Camera, effects: Mapping[str, Effect]) -> Stack:
-        """Reference, then what is measured with each of the effects, NaN where it is."""
+        """Return the reference, then measured images with each effect, NaN where it is."""
         reference = self.reference(camera)
         rows = [reference]
         for effect in effects.values():
@@ -211,7 +208,7 @@ class ExposureImages:
 
 
 def around(raster: Raster, points: Array) -> tuple[tuple[slice, slice], Raster]:
-    """The samples around points, shape (n, 2), as a part of the rows and columns of a raster."""
+    """Return the slices around points, shape (n, 2), and their part of a raster."""
     columns, rows = ((points - [raster.left, raster.top]) * [1, -1] / raster.spacing).T
     above, left = (
         min(max(floor(places.min()) - 2, 0), count - 1)
@@ -225,11 +222,7 @@ def around(raster: Raster, points: Array) -> tuple[tuple[slice, slice], Raster]:
 
 
 def pixel_phases(camera: Camera, count: int) -> list[Camera]:
-    """The camera with its pixels at other places of the scene, spread evenly over a pixel.
-
-    `count` is the number of places along each axis: `count`² cameras, each with as many whole
-    pixels as fit the scene. The first phase is the camera's own.
-    """
+    """Return cameras with `count`² offsets over a pixel; the first is the camera's own."""
     right, down = camera.offset
     steps = camera.pitch * np.arange(count) / count
     return [
@@ -244,14 +237,14 @@ def _without_detector(camera: Camera) -> Camera:
 
 
 def _blurred(exposure: Exposure, psf: PointSpreadFunction) -> Array:
-    """Radiance of the samples behind the optics."""
+    """Return the radiance of the samples behind the optics."""
     return blur(exposure.mean_radiance, psf, exposure.raster.spacing)
 
 
 def _formed(
     exposure: Exposure, blurred: Callable[[PointSpreadFunction], Array] | None, camera: Camera
 ) -> Array:
-    """Radiance of the pixels."""
+    """Return the radiance of the pixels."""
     radiance, psf = exposure.mean_radiance, camera.psf
     if blurred and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         radiance, camera = blurred(psf), replace(camera, psf=None)
@@ -261,7 +254,7 @@ def _formed(
 def _read(
     formed: Callable[[Camera], Array], start: float, camera: Camera
 ) -> tuple[Array, NDArray[np.bool_] | bool]:
-    """Temperatures that a camera reads, and which its detector marks as unusable."""
+    """Return measured temperatures, and which pixels the detector marks as unusable."""
     radiance = formed(_without_detector(camera))
     read, flags = camera.read(radiance[None], np.array([start]))
     kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
@@ -271,7 +264,7 @@ def _read(
 def reference_temperature(
     camera: Camera, exposure: Exposure, kind: ReferenceKind = "maximum"
 ) -> NDArray[np.float64]:
-    """Temperature in K that a pixel without error would read; NaN where nothing radiates."""
+    """Return the temperature in K of a pixel without error; NaN where nothing radiates."""
     pixels = camera.pixels(exposure.raster)
     if kind == "maximum":
         return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, pixels))
@@ -289,7 +282,7 @@ def reference_temperature(
 def _maximum(
     values: NDArray[np.floating], camera: Camera, exposure: Exposure, pixels: Raster
 ) -> NDArray[np.float64]:
-    """Greatest value of the samples in every pixel's sensitive square; NaN for none."""
+    """Return the greatest value of the samples in every pixel's sensitive square; NaN for none."""
     grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
     known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
     columns = _covered(pixels.x - grid.left, side, grid.columns, grid.spacing)
@@ -302,7 +295,7 @@ def _maximum(
 def _covered(
     centres: NDArray[np.float64], side: float, samples: int, spacing: float
 ) -> list[slice]:
-    """Samples under each pixel along a line; slivers under `LEAST_COVERED` do not count."""
+    """Return the samples under each pixel along a line, without slivers."""
     least = LEAST_COVERED * min(spacing, side)
     covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
     first = covered.argmax(axis=1)

@@ -1,8 +1,4 @@
-"""The loop of an analysis: images of a scene over exposures, textures and pixel phases.
-
-Images that agree up to a stage share it: frames are read once for all surfaces and textures of an
-exposure, an exposure is formed by all cameras, and blurred radiance serves all pixel phases.
-"""
+"""The loop of an analysis: images of a scene over exposures, textures and pixel phases."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,14 +30,11 @@ _DRAWS: Final = ("exposure", "texture", "pixel_phase")
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A surface and the places that are read on it in each drawn exposure.
-
-    `numbers` are those of the detector's noise, shape (exposure, texture, pixel phase).
-    """
+    """A surface and the places that are read on it in each drawn exposure."""
 
     surface: str
-    places: Sequence[Sequence[Place]]
-    numbers: NDArray[np.int_]
+    places: Sequence[Sequence[Place]]  # by drawn exposure
+    numbers: NDArray[np.int_]  # of the detector's noise, shape (exposure, texture, pixel phase)
 
     @property
     def textures(self) -> int:
@@ -51,31 +44,20 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Which images are taken: exposures that begin at `starts`, of which some are drawn.
+    """The exposures, draws, effects and other cameras of an analysis."""
 
-    `drawn` are the numbers of those that are read for all textures and pixel phases, and `shown`
-    is that of which the images are kept. The first of the `effects` is that nothing is switched
-    off. `vary` makes other cameras of the camera, which are read for the first texture.
-    """
-
-    starts: Array
-    drawn: tuple[int, ...]
-    shown: int
+    starts: Array  # in s
+    drawn: tuple[int, ...]  # exposures that are read with all textures and pixel phases
+    shown: int  # the exposure of which the images are kept
     views: tuple[View, ...]
     phases: int
     reference: ReferenceKind
-    effects: Mapping[str, Effect]
-    vary: Sequence[Callable[[Camera], Camera]] = ()
+    effects: Mapping[str, Effect]  # the first switches nothing off
+    vary: Sequence[Callable[[Camera], Camera]] = ()  # other cameras, for the first texture
 
 
 class Looked:
-    """Images by surface, and what is read of every view by reading or line, NaN for nothing.
-
-    `images` (radiance) and `references` are lists over the exposures; `shown` is the shown exposure
-    and what is measured with each of the effects, NaN where the reference is. Readings and lines
-    are numbered by view and place. Their rows are the reference, then what is measured with each
-    of the effects; `places` holds distance, x and y of the points of lines.
-    """
+    """Images by surface, and readings of every view, NaN for nothing."""
 
     def __init__(self, schedule: Schedule, surfaces: Iterable[str], pitch: float) -> None:
         self.schedule = schedule
@@ -164,7 +146,7 @@ class Looked:
         exposure: Exposure,
         camera: Camera,
     ) -> None:
-        """Where the lines of a place lie, what the scene's samples show there, and motion."""
+        """Read where the lines of a place lie, the scene's samples there, and motion."""
         raster, temperature = exposure.raster, camera.band.temperature
         for name, line in place.lines(camera.pitch).items():
             row, points = self.lines.index((*key, name)), line.distance.size
@@ -179,10 +161,7 @@ class Looked:
             self.motion[row, *index] = temperature(mean) - temperature(peak)
 
     def variables(self, names: Mapping[tuple[str, str], str], cause: str) -> Variables:
-        """Variables of the Dataset.
-
-        `names` are those of readings by place and quantity, and `cause` says what an exposure is.
-        """
+        """Return variables of the Dataset; `names` are those of readings by place and quantity."""
         schedule, views = self.schedule, self.schedule.views
         readings, lines, kelvin, metre = self.readings, self.lines, {"units": "K"}, {"units": "m"}
 
@@ -238,10 +217,7 @@ def look(
     schedule: Schedule,
     progress: Callable[[float], None],
 ) -> Looked:
-    """Take the images of a schedule and read them; `progress` is told the fraction done.
-
-    `fields` are the surfaces with their first texture on the scene.
-    """
+    """Take the images of a schedule and read them; `fields` are the surfaces on the scene."""
     first = {(name, 0): laid for name, laid in fields.items()}
     others = {
         (view.surface, number): camera.lay(surfaces[view.surface].redrawn(number), scene)

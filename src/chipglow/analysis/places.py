@@ -1,8 +1,4 @@
-"""Where the error is read: points, lines, regions, the hottest pixel, rake face and shear band.
-
-A place reads a stack of images of one exposure, shape (row, y, x): the reference, then what is
-measured, with all effects first. Each reading is a vector of as many rows.
-"""
+"""Where the error is read: points, lines, regions, the hottest pixel, rake face, shear band."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -39,18 +35,15 @@ class Place(ABC):
             raise ValueError("place: the name is empty, expected one such as melt pool")
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
-        """Lines along which the images are sampled, by name; `pitch` is that of the pixels in m."""
+        """Return lines along which the images are sampled, by name; `pitch` is in m."""
         return {}
 
     @abstractmethod
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
-        """The `quantities`, shape (quantity, row); NaN where the images show nothing.
-
-        `lines` holds the images along `lines`, shape (row, point) each.
-        """
+        """Return the `quantities` of images (reference first) and their `lines`; NaN for none."""
 
     def outline(self) -> NDArray[np.float64] | None:
-        """Points to draw it, x and y in m, shape (n, 2); None for what is everywhere."""
+        """Return points to draw it, x and y in m, shape (n, 2); None for the whole image."""
         return None
 
     def check_within(self, raster: Raster) -> None:
@@ -97,7 +90,7 @@ class LinePlace(Place):
             raise ValueError(f"{self.name}: two corners are the same, expected a line")
 
     def line(self, pitch: float) -> Line:
-        """Points along it, the distance in m from its first corner."""
+        """Return points along it, the distance in m from its first corner."""
         corners = np.array(self.corners)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
         distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
@@ -149,15 +142,12 @@ class HottestPlace(Place):
 
 @dataclass(frozen=True)
 class RakePlace(Place):
-    """The rake face as far as the chip touches it, read across at mid-contact and along it.
-
-    The line across it reaches `half_length` to either side; its points are `step` apart, in m.
-    """
+    """The rake face as far as the chip touches it, read across at mid-contact and along it."""
 
     tool: Tool
     contact_length: float
-    half_length: float
-    step: float
+    half_length: float  # of the line across, in m
+    step: float  # between its points, in m
     quantities: ClassVar = (
         "mid-contact",
         "most negative within two pixels",
@@ -166,7 +156,6 @@ class RakePlace(Place):
     motion_samples: ClassVar[float] = 1.5  # from there on a sample shows the chip alone
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
-        """The line across counts from the face into the chip, that along it from the edge."""
         length = self.contact_length
         along = np.linspace(0.0, length, max(round(length / self.step) + 1, 2))
         distance = _to_both_sides(self.half_length, self.step)
@@ -191,15 +180,11 @@ class RakePlace(Place):
 
 @dataclass(frozen=True)
 class BandPlace(Place):
-    """The shear band, read across its middle.
-
-    The line reaches `half_length` to either side of the ridge of the strain rate; its points are
-    `step` apart, in m.
-    """
+    """The shear band, read across its middle."""
 
     band: ShearBand
-    half_length: float
-    step: float
+    half_length: float  # of the line across, to either side of the ridge, in m
+    step: float  # between its points, in m
     quantities: ClassVar = (
         "ridge of strain rate",
         "ridge of measured temperature",
@@ -207,7 +192,6 @@ class BandPlace(Place):
     )
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
-        """The distance is 0 on the ridge, negative on the workpiece's side."""
         return {"band": self.band.across(self.half_length, self.step)}
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
@@ -228,19 +212,19 @@ def _to_both_sides(half_length: float, step: float) -> NDArray[np.float64]:
 
 
 def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> int:
-    """Number of the lowest value within `NEAR` pixels of where the distance is 0."""
+    """Return the number of the lowest value within `NEAR` pixels of distance 0."""
     near = np.abs(distance) <= NEAR * pitch
     return int(np.argmin(np.where(near & np.isfinite(values), values, np.inf)))
 
 
 def _mean(values: Stack) -> float:
-    """Mean of what is known; NaN if nothing is."""
+    """Return the mean of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else nan
 
 
 def _mean_and_extremes(values: Stack) -> Array:
-    """Mean, and where the error is most negative and greatest, shape (row, n) of pixels."""
+    """Return mean, and the values at the least and the greatest error, shape (3, row)."""
     known = values[:, np.isfinite(values).all(axis=0)]
     if known.shape[1] == 0:
         return np.full((3, len(values)), np.nan)

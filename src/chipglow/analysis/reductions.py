@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import nan
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,10 +16,7 @@ _DRAWS = ("exposure", "texture", "pixel_phase")
 
 @dataclass(frozen=True, eq=False)
 class Headline:
-    """One reading over all draws, in K of radiance temperature.
-
-    `psf_portion` is the part of the error that the point spread function makes.
-    """
+    """One reading over all draws, in K of radiance temperature."""
 
     place: str
     quantity: str
@@ -37,33 +34,27 @@ class Headline:
         return Distribution(self.psf_portion.values / self.error.values, self.error.causes)
 
 
-@dataclass(frozen=True)
-class OneDraw:
+class OneDraw(NamedTuple):
     """One reading of a single frame, in K of radiance temperature; NaN where it is unknown."""
 
     error: float
     psf_portion: float
 
-    @property
-    def psf_fraction(self) -> float:
-        """The PSF's portion over the error; NaN for no error."""
-        return self.psf_portion / self.error if self.error else nan
-
 
 def error(data: xr.Dataset, kind: str = "", effects: str = ALL) -> xr.DataArray:
-    """Error of readings (or of `kind` line_ or varied_), by default with all effects."""
+    """Return the error of readings (or of `kind` line_ or varied_), by default with all effects."""
     return data[f"{kind}measured"].sel(effects=effects, drop=True) - data[f"{kind}reference"]
 
 
 def psf_portion(data: xr.Dataset, kind: str = "") -> xr.DataArray:
-    """What the point spread function adds to the error; see `error`."""
+    """Return what the point spread function adds to the error; see `error`."""
     measured = data[f"{kind}measured"]
     with_psf, without = (measured.sel(effects=name, drop=True) for name in (ALL, WITHOUT_PSF))
     return with_psf - without
 
 
 def headline(data: xr.Dataset, reading: str) -> Headline | None:
-    """One reading over all draws; None unless it is finite in each of them."""
+    """Return one reading over all draws; None unless it is finite in each of them."""
     if reading not in data.reading.values:
         return None
     one = data[["reference", "measured"]].sel(reading=reading)
@@ -81,35 +72,35 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
 
 
 def headlines(data: xr.Dataset) -> dict[str, Headline]:
-    """All readings that are finite in every draw."""
+    """Return all readings that are finite in every draw."""
     every = {str(name): headline(data, str(name)) for name in data.reading.values}
     return {name: one for name, one in every.items() if one is not None}
 
 
 def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
-    """What a single frame gives: the first exposure, texture and pixel phase."""
+    """Return a reading of the first exposure, texture and pixel phase."""
     one = data.sel(reading=reading).isel(dict.fromkeys(_DRAWS, 0))
     return OneDraw(float(error(one)), float(psf_portion(one)))
 
 
 def line_error(data: xr.Dataset, line: str) -> xr.DataArray:
-    """Error along a line over exposure, texture, pixel phase and point."""
+    """Return the error along a line over exposure, texture, pixel phase and point."""
     return error(_line(data, line), "line_")
 
 
 def line_psf_portion(data: xr.Dataset, line: str) -> xr.DataArray:
-    """The PSF's portion along a line over exposure, texture, pixel phase and point."""
+    """Return the PSF's portion along a line."""
     return psf_portion(_line(data, line), "line_")
 
 
 def line_change(data: xr.Dataset, line: str, near: float, far: float) -> float:
-    """Mean change of the scene's radiance temperature in K between two distances in m."""
+    """Return the mean change of the scene's temperature in K between two distances in m."""
     ends = [np.interp([near, far], at, values) for at, values in _scene_lines(data, line)]
     return float(np.mean([last - first for first, last in ends]))
 
 
 def line_steepest(data: xr.Dataset, line: str, length: float) -> float:
-    """Greatest change of the scene's radiance temperature in K over a length in m, as a mean."""
+    """Return the mean greatest change of the scene's temperature in K over a length in m."""
     changes = [
         np.nanmax(np.abs(np.interp(at + length, at, values) - values))
         for at, values in _scene_lines(data, line)
@@ -118,29 +109,29 @@ def line_steepest(data: xr.Dataset, line: str, length: float) -> float:
 
 
 def image_error(data: xr.Dataset, effects: str = ALL) -> xr.DataArray:
-    """Error of every pixel in the shown exposure."""
+    """Return the error of every pixel in the shown exposure."""
     reference = data["reference_temperature"].isel(instant=data.attrs["shown_instant"], drop=True)
     return data["image_measured"].sel(effects=effects, drop=True) - reference
 
 
 def image_psf_portion(data: xr.Dataset) -> xr.DataArray:
-    """The PSF's portion of the error of every pixel in the shown exposure."""
+    """Return the PSF's portion of the error of every pixel in the shown exposure."""
     return psf_portion(data, "image_")
 
 
 def sensitivity_error(data: xr.Dataset, order: str, reading: str) -> Array:
-    """Mean error over exposures and pixel phases, by the width of the PSF."""
+    """Return the mean error by the width of the PSF."""
     return _by_width(error(data.sel(psf_order=order, reading=reading), "varied_"))
 
 
 def sensitivity_psf_fraction(data: xr.Dataset, order: str, reading: str) -> Array:
-    """Mean of the PSF's portion over the error, by the width of the PSF."""
+    """Return the mean PSF portion over the error, by the width of the PSF."""
     one = data.sel(psf_order=order, reading=reading)
     return _by_width(psf_portion(one, "varied_") / error(one, "varied_"))
 
 
 def with_errors(data: xr.Dataset) -> xr.Dataset:
-    """The Dataset with the errors of the images and of the readings as variables."""
+    """Return the Dataset with the errors of images and readings as variables."""
     errors = {
         "error_case_1": image_error(data),
         "error_case_2": image_error(data, WITHOUT_PSF),
@@ -158,12 +149,7 @@ def with_errors(data: xr.Dataset) -> xr.Dataset:
 
 
 def readings_frame(data: xr.Dataset) -> pd.DataFrame:
-    """Every reading at every place, a row each.
-
-    Columns ``surface``, ``place``, ``reading``, ``draws``, and the means over the draws
-    ``reference_degC``, ``error_K`` and ``psf_portion_K``; of the error also the
-    ``standard_deviation_K`` and the ``least_K`` and ``greatest_K``.
-    """
+    """Return a table of every reading: reference, error, its scatter, and the PSF's portion."""
     return pd.DataFrame(
         {
             "surface": one.surface,
@@ -182,7 +168,7 @@ def readings_frame(data: xr.Dataset) -> pd.DataFrame:
 
 
 def _line(data: xr.Dataset, line: str) -> xr.Dataset:
-    """The variables of a line without the points beyond its end in the first exposure."""
+    """Return the variables of a line without the points beyond its end."""
     names = [name for name in data.data_vars if str(name).startswith("line_")]
     one = data[names].sel(line=line)
     distance = one.line_distance.isel(exposure=0, drop=True)

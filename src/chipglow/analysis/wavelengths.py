@@ -14,7 +14,6 @@ from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSc
 
 from chipglow.analysis.cut import Progress, find_cut, middle_frame, spread_starts
 from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
-from chipglow.analysis.places import PointPlace
 from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
 from chipglow.camera.ratio_camera import views_of
@@ -233,32 +232,9 @@ def wavelength_errors(
     textures: int,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Errors of one band and of ratios of two at some spots.
+    """Return errors in K of bands and ratios over place, ratio and draw, by cause (`STEPS`).
 
-    The camera is given every band of the plan in turn, its diffraction with it. Spots of one place
-    are draws of it; each is drawn for `phases` positions of the pixels along each axis and
-    `textures` of the emissivity.
-
-    Returns
-    -------
-    xarray.Dataset
-        In K over ``place``, ``ratio`` (the bands alone, then their pairs) and ``draw``: ``step``,
-        what each ``cause`` of `STEPS` adds to the error; ``misregistration``, what a shift of the
-        second channel adds by ``direction``; without draws the standard uncertainties ``noise``
-        and ``emissivity_uncertainty``. ``truth`` is the true temperature. `wavelengths_frame`
-        makes a table of it.
-
-    Raises
-    ------
-    ValueError
-        If no exposure is left that has room for the delay, or a spot is outside the pixels.
-
-    Notes
-    -----
-    The pixel that holds the spot is read. Its true temperature is that at its centre in the middle
-    of the exposure, interpolated linearly between the four samples around it. For one band the
-    emissivity at the pixel's centre is taken as known; for a ratio the two emissivities are taken
-    as equal. Steps are differences like those of `ratio_errors`.
+    The emissivity at a pixel's centre counts as known for one band; for a ratio, two as equal.
     """
     tell = progress or (lambda label, part: None)
     cameras = [camera.in_band(band) for band in plan.bands]
@@ -289,14 +265,7 @@ def wavelength_errors(
 
 
 def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
-    """A row for each band and pair at each place.
-
-    Columns ``place``, ``first_um`` and ``second_um`` (the bands; the second is empty for one
-    alone), ``draws``, ``truth_degC``; the mean ``error_K`` and what its causes add,
-    ``emissivity_K`` to ``delay_K``; the ``standard_deviation_K`` of the error over the draws;
-    ``misregistration_K``, ``noise_K`` and ``emissivity_uncertainty_K``; and ``total_K``, the root
-    of the sum of their squares and that of the mean.
-    """
+    """Return a table of the bands and pairs at each place: mean error, causes and total."""
     error = data.step.sum("cause", skipna=False)
     table = xr.Dataset(
         {
@@ -320,11 +289,7 @@ def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
 def cut_spots(
     scene: Scene, camera: Camera, plan: Plan, progress: Progress | None = None
 ) -> list[Spot]:
-    """The chip at the rake face and the middle of the shear band, in every segment of a cut.
-
-    The first is half a pixel from the face, at mid-contact; on the face chip and tool differ.
-    Raises a ValueError if there is no band or no contact.
-    """
+    """Return spots at the rake face, half a pixel into the chip, and in each shear band."""
     tell = progress or (lambda label, part: None)
     cut = find_cut(scene, camera.integration_time, plan.exposures, plan.touching, tell)
     spots = []
@@ -341,25 +306,18 @@ def cut_spots(
 
 
 def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str]) -> list[Spot]:
-    """The points of a plan in every exposure, with every surface."""
+    """Return the points of a plan in every exposure, with every surface."""
     starts = spread_starts(scene, camera.integration_time, plan.exposures)
-    several = len(surfaces) > 1
     return [
-        Spot(
-            f"{place.name}, {name}" if several else place.name,
-            name,
-            float(start),
-            np.array(place.point),
-        )
-        for place in plan.all_places
-        if isinstance(place, PointPlace)
-        for name in surfaces
+        Spot(f"{name}, {one}" if len(surfaces) > 1 else name, one, float(start), np.array(point))
+        for name, point in plan.points.items()
+        for one in surfaces
         for start in starts
     ]
 
 
 def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
-    """Whether the scene lasts until a delayed exposure ends."""
+    """Return whether the scene lasts until a delayed exposure ends."""
     try:
         frame_weights(scene.times, scene.frame_spacing, start + delay, camera.integration_time)
     except ValueError:
@@ -375,11 +333,7 @@ def _draws(
     spot: Spot,
     phases: int,
 ) -> xr.Dataset:
-    """Every band and ratio at one spot with one texture, a draw for each phase of the pixels.
-
-    Beside the variables of `wavelength_errors`, ``gain`` is the change of temperature in K by a
-    relative change of radiance, and ``radiance`` that of the pixels by band.
-    """
+    """Return every band and ratio at one spot with one texture, a draw for each phase."""
     duration = cameras[0].integration_time
     views = views_of(surface, scene, cameras)
     exposures = expose_views(scene, views, spot.start, duration)
@@ -398,7 +352,7 @@ def _draws(
         for camera, seen, later in zip(cameras, images, late, strict=True)
     ]
     part, window = around(scene.raster, centres)
-    at_centres = partial(sample, raster=window, points=centres)
+    at_centres = partial(sample, raster=window, points=centres)  # linear between the samples
     local = [np.stack([one.centre_radiance[part], one.mean_radiance[part]]) for one in exposures]
     truth = true_temperature(scene, spot.start + duration / 2)[part]
     compared = [
@@ -419,11 +373,7 @@ def _compared(
     pixels: Sequence[Array],
     at_centres: Callable[[Array], Array],
 ) -> xr.Dataset:
-    """One band, by the emissivity at the pixel's centre, or the ratio of two, as of a grey body.
-
-    `truth` and `local` are those of the samples around the centres: true temperature, and by band
-    the radiance in the middle of the exposure and its mean.
-    """
+    """Return one band by the emissivity at the pixel's centre, or the ratio of a grey body."""
     own, first = at_centres(truth), cameras[bands[0]]
     on_samples: Callable[..., Array]
     in_pixels: Callable[..., Array]
@@ -469,7 +419,7 @@ def _compared(
 
 
 def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: Array) -> Array:
-    """Temperature by radiance and emissivity in a band, and the radiance that is reflected."""
+    """Return the temperature by radiance and emissivity in a band."""
     return np.asarray(band.temperature((radiance - environment) / emissivity + environment))
 
 
@@ -479,7 +429,7 @@ def _of_place(
     cameras: Sequence[Camera],
     plan: WavelengthPlan,
 ) -> xr.Dataset:
-    """All draws of a place but those with a pixel at whose centre there is no material."""
+    """Return all draws of a place but those without material at the pixel's centre."""
     data = xr.concat(parts, "draw").dropna("draw", subset=["truth"])
     if not data.sizes["draw"]:
         raise ValueError(f"{name}: no material is there, expected some in one draw or more")
@@ -494,7 +444,7 @@ def _of_place(
 
 
 def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
-    """Centre of the pixel that holds a spot."""
+    """Return the centre of the pixel that holds a spot."""
     pixels = camera.pixels(scene.raster)
     corner = np.array([pixels.left, pixels.top])
     column, row = np.floor((spot.point - corner) * [1, -1] / pixels.spacing).astype(int)
@@ -506,7 +456,7 @@ def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
 def _of_pixel(
     camera: Camera, images: ExposureImages, late: ExposureImages, centre: Array, distance: float
 ) -> list[float]:
-    """Radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
+    """Return the radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
 
     def read(camera: Camera, of: ExposureImages, shift: tuple[float, float] = (0.0, 0.0)) -> float:
         # The pixel that looks elsewhere is one of a grid that begins within the first pixel.
@@ -525,29 +475,29 @@ def _of_pixel(
 
 
 def _image(camera: Camera, exposure: Exposure) -> Array:
-    """Radiance of a camera's pixels before its detector in W/(m² sr), shape (y, x)."""
+    """Return the radiance of a camera's pixels before its detector in W/(m² sr), shape (y, x)."""
     return camera.form_image(exposure.mean_radiance, exposure.raster)
 
 
 def _ideal(camera: Camera) -> Camera:
-    """The camera without its optics."""
+    """Return the camera without its optics."""
     return replace(camera, psf=None, optics=())
 
 
 def _read(camera: Camera, image: Array, start: float) -> Array:
-    """What the camera's detector makes of an image."""
+    """Return what the camera's detector makes of an image."""
     return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)
 
 
 def true_temperature(scene: Scene, time: float) -> Array:
-    """True temperature of a scene's samples at a time in K, shape (y, x); NaN in the void."""
+    """Return the true temperature of a scene's samples in K; NaN in the void."""
     frame = scene.frame(middle_frame(scene, time, 0.0), ())
     void = frame.material == Material.VOID
     return np.where(void, np.nan, np.asarray(frame.temperature, np.float64))
 
 
 def _noise(camera: Camera, radiance: float) -> float:
-    """Standard deviation of the radiance that a camera reads of such pixels, relative to it."""
+    """Return the relative standard deviation of the radiance that a camera reads."""
     calibration = camera.calibration(_NOISE_SHAPE)
     if calibration is None:
         return 0.0
@@ -556,5 +506,5 @@ def _noise(camera: Camera, radiance: float) -> float:
 
 
 def band_name(band: Band) -> str:
-    """Limits of a band in um."""
+    """Return the limits of a band in µm."""
     return f"{1e6 * band.lower:.4g}-{1e6 * band.upper:.4g}"

@@ -52,13 +52,7 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
 
 
 def serve(path: Path | None, address: str, port: int, ready: Callable[[str], None]) -> None:
-    """Serve the app until Ctrl-C; `ready` takes the URL as soon as a browser can open it.
-
-    Raises
-    ------
-    ValueError
-        If Panel is not installed, the path cannot be opened, or the address is not available.
-    """
+    """Serve the app until Ctrl-C; `ready` takes the URL as soon as a browser can open it."""
     _check_installed()
     from chipglow.app.opening import open_any
     from chipglow.app.server import App

@@ -313,13 +313,7 @@ class Controls:
         return value_at(state.study, row.setting) if self.is_shown(row, state) else None
 
     def changed(self, state: State, texts: Texts) -> State:
-        """Return the state with some controls at other values.
-
-        Raises
-        ------
-        ValueError
-            If a text is no such value, or there is no picture at it; the message names the control.
-        """
+        """Return the state with some controls at other values; a ValueError names the control."""
         if unknown := [path for path in texts if path not in self._by_path]:
             known = ", ".join(self._by_path)
             raise ValueError(f"{unknown[0]}: unknown control, expected one of {known}")

@@ -40,11 +40,7 @@ _Points: TypeAlias = Iterable[Any]
 
 @dataclass(frozen=True, eq=False)
 class OpenedScene:
-    """A scene and the controls of its study.
-
-    `coarse` is the same scene with fewer samples, for a quick look; None where that is not needed
-    or not possible. `from_file` marks a scene whose file a study can name.
-    """
+    """A scene and the controls of its study; `coarse` has fewer samples for a quick look."""
 
     name: str
     scene: Scene
@@ -54,13 +50,7 @@ class OpenedScene:
 
     @classmethod
     def of(cls, scene: Scene, study: Study, name: str, from_file: bool = False) -> "OpenedScene":
-        """Open a scene in an exposure in its middle.
-
-        Raises
-        ------
-        ValueError
-            If the scene is shorter than the study's exposure.
-        """
+        """Open a scene in an exposure in its middle; a ValueError if it is shorter."""
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
             study = unchecked(study, surface=UniformEmissivity(0.5))
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
@@ -96,15 +86,7 @@ Opened: TypeAlias = OpenedScene | OpenedMeasurement
 
 
 def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
-    """Open a scene, a measurement or a folder of results; without a path the bundled scene.
-
-    Raises
-    ------
-    FileNotFoundError
-        If it does not exist.
-    ValueError
-        If it is none of these; the message names it.
-    """
+    """Open a scene, a measurement or a folder of results; without a path the bundled scene."""
     if path is None:
         return OpenedScene.of(example_scene(), study or Study(), "bundled scene", from_file=True)
     path = Path(path)
@@ -116,13 +98,7 @@ def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
 
 
 def open_uploaded(path: Path, name: str) -> Opened:
-    """Open an uploaded file by the name that its owner gave it: first in a subprocess.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be read, or takes more time or memory than an import may.
-    """
+    """Open an uploaded file by the name that its owner gave it: first in a subprocess."""
     patience = _PATIENCE * patience_for((str(path),))
     with Sandbox(name, patience).answers(partial(probed, path, name)) as answers:
         next(answers)
@@ -136,10 +112,7 @@ def open_uploaded(path: Path, name: str) -> Opened:
 
 
 def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
-    """Return a spline scene with at most `count` samples a frame; others as they are.
-
-    With fewer frames, time is coarser by the same factor.
-    """
+    """Return a spline scene with at most `count` samples a frame; others as they are."""
     step = ceil(sqrt(scene.raster.rows * scene.raster.columns / count))
     if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
         return scene
@@ -171,10 +144,7 @@ def _with_places(study: Study, cursor: _Points, *lines: _Points) -> Study:
 
 
 def _scene_places(scene: Scene, start: float, duration: float) -> list[_Points]:
-    """Return a cursor on the rake face and lines across it and across the shear band.
-
-    For a scene without them: its middle and lines through it.
-    """
+    """Return a cursor on the rake face, and lines across it and across the shear band."""
     cursor, rake, band = _through(scene.raster)
     tool = scene.tool
     if tool is None:

@@ -66,13 +66,7 @@ class OpenFiles:
         return self._opened.get(key)
 
     def add(self, path: Path, name: str) -> str:
-        """Open an uploaded file and return its key; the oldest of too many is removed.
-
-        Raises
-        ------
-        ValueError
-            If it cannot be opened.
-        """
+        """Open an uploaded file and return its key; the oldest of too many is removed."""
         self._opened[path.stem] = open_uploaded(path, name)
         for old in list(self._opened)[1:-_MOST_OPEN]:
             del self._opened[old]
@@ -132,13 +126,7 @@ class Upload(RequestHandler):  # type: ignore[misc]
 
 
 class App:
-    """The running app; port 0 means any that is free.
-
-    Raises
-    ------
-    ValueError
-        If the address or the port is not available.
-    """
+    """The running app; port 0 means any that is free."""
 
     def __init__(self, first: Opened, address: str = LOCAL, port: int = 0) -> None:
         port = _free_port(address, port)

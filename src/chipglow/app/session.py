@@ -1,8 +1,4 @@
-"""The state of one user, and the threads that compute its pictures.
-
-Pictures are always of the newest state: states between are never computed, and work for an older
-one ends at the next opportunity. Draws have a thread of their own.
-"""
+"""The state of one user, and the threads that compute pictures, always of the newest state."""
 
 import logging
 from collections.abc import Callable
@@ -10,8 +6,8 @@ from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import State, Texts
-from chipglow.app.opening import Opened
-from chipglow.app.pictures import Picture, SceneModel, model_of
+from chipglow.app.opening import Opened, OpenedScene
+from chipglow.app.pictures import MeasurementModel, Picture, SceneModel
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
@@ -93,7 +89,9 @@ class Session:
     """The state of one user, by default that of the study."""
 
     def __init__(self, opened: Opened, notify: Notify) -> None:
-        self.model = model_of(opened)
+        self.model: SceneModel | MeasurementModel = (
+            SceneModel(opened) if isinstance(opened, OpenedScene) else MeasurementModel(opened)
+        )
         self.state = opened.controls.initial
         self._settled, self._at = [self.state], 0
         self._notify = notify
@@ -108,13 +106,7 @@ class Session:
         self._pictures.ask(self.state)
 
     def change(self, texts: Texts, final: bool = True) -> None:
-        """Set controls; only a final state is one that `step` goes to.
-
-        Raises
-        ------
-        ValueError
-            If that is not possible; the state then stays.
-        """
+        """Set controls; only a final state is one that `step` goes to."""
         self._set(self.model.controls.changed(self.state, texts), final)
 
     def restore(self, texts: Texts) -> None:

@@ -15,14 +15,7 @@ INTERRUPTED: Final = 130
 
 
 class Boundary(TyperGroup):
-    """Commands that end in one line and an exit code if they fail, never in a traceback.
-
-    Every command has the program's option ``--json``, and what it writes is checked before it
-    begins.
-
-    The code is 2 for what the user can put right (input, files, disk), 1 for a failed simulation
-    and 130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
-    """
+    """Commands that end in one line and an exit code if they fail, never in a traceback."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

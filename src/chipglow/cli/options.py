@@ -1,7 +1,4 @@
-"""Arguments and options that several commands have.
-
-What a command writes is checked before it does anything: see `check_outputs`.
-"""
+"""Arguments and options that several commands have, and the check of what a command writes."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress

@@ -25,11 +25,7 @@ _PIPE_WIDTH: Final = 200
 
 
 class Screen:
-    """Output of one command.
-
-    Text is printed immediately: results on stdout, notes on stderr. With `json`, nothing is
-    printed before `close`, which prints everything as one object.
-    """
+    """Output of one command: text at once, or one JSON object at the end."""
 
     def __init__(self, json: bool = False) -> None:
         self.json = json
@@ -45,10 +41,7 @@ class Screen:
         title: str | None = None,
         unbroken: Collection[str] = (),
     ) -> None:
-        """Print a frame as `screen_table` formats it.
-
-        A table without a name repeats another one and is omitted from the JSON object.
-        """
+        """Print a frame as `screen_table` does; without a name it is not in the JSON object."""
         if name is not None:
             self._record["tables"].setdefault(name, []).extend(frame.to_dict("records"))
         if not self.json:

@@ -38,10 +38,7 @@ def screen_table(
     title: str | None = None,
     unbroken: Collection[str] = (),
 ) -> "Table":
-    """Return a frame as a table; heading, unit and digits follow from a column's name.
-
-    A narrow terminal breaks no number and no column named in `unbroken`.
-    """
+    """Return a frame as a table; heading, unit and digits follow from a column's name."""
     from rich.table import Table
 
     columns = columns or list(frame.columns)

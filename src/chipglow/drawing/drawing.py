@@ -54,10 +54,7 @@ def new_figure(height: float) -> Figure:
 
 
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
-    """Return an empty figure of the page's width for rows of images, as high as they need.
-
-    `panel_width` is the width of an image in inches.
-    """
+    """Return an empty figure of the page's width for rows of images of a width in inches."""
     panel = panel_width * raster.rows / raster.columns
     figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
     FigureCanvasAgg(figure)

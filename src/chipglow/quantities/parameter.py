@@ -56,13 +56,7 @@ class Parameter:
         return self._limits(self._text)
 
     def number(self, value: object) -> float:
-        """SI number of a value as descriptions write it, with its unit if it has one.
-
-        Raises
-        ------
-        ValueError
-            If it is no such number, or outside the limits.
-        """
+        """Return the SI number of a value as descriptions write it; a ValueError if impossible."""
         if self.quantity is not None:
             number = self.quantity.parse(value)
         elif is_bare_number(value):
@@ -87,11 +81,7 @@ class Parameter:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of a field: text with a unit or a plain value, within the limits.
-
-        Numbers in SI units pass from Python; what is read from a file, in a context, needs its
-        unit.
-        """
+        """Return the schema of a field: text with a unit or a plain value, within the limits."""
         plain, words = self._without_words(source)
         if self.quantity is None:
             schema = handler(plain)

@@ -118,7 +118,7 @@ class Part:
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
-        """Data of the section with what follows from them; numbers from a file need units."""
+        """Return the section's data with what follows from them; numbers from a file need units."""
         return data
 
     @classmethod
@@ -192,16 +192,7 @@ def unchecked(part: PartType, **values: Any) -> PartType:
 
 
 class Family:
-    """Parts of which a description chooses one by its kind.
-
-    An annotation of a description's field. Other packages add theirs by an entry point in the
-    group ``chipglow.<name>``.
-
-    Parameters
-    ----------
-    name : str
-        What the family is called, and the field of descriptions that chooses.
-    """
+    """Parts of which a description chooses one by its kind; entry points may add more."""
 
     def __init__(self, name: str) -> None:
         self.name: Final = name
@@ -213,10 +204,7 @@ class Family:
         return part
 
     def add(self, kind: str, part: Any) -> None:
-        """Add a part.
-
-        A class that is defined again, as by a notebook's cell, replaces the one before.
-        """
+        """Add a part; a class that is defined again replaces the one before."""
         taken = self._own.get(kind, part)
         same = (taken.__module__, taken.__qualname__) == (part.__module__, part.__qualname__)
         if not kind or not same:
@@ -309,11 +297,9 @@ def of_other_packages(group: str) -> dict[str, Any]:
 
 
 def beside_the_study(file: str, info: ValidationInfo) -> str:
-    """Path of a file that a description names: relative to the description's folder.
-
-    A link keeps its own name, which says what kind of file it is.
-    """
+    """Return the path of a file that a description names, beside the description."""
     path = Path((info.context or {}).get("folder") or ".", file)
+    # A link keeps its own name, which says what kind of file it is.
     try:
         return str(path.parent.resolve() / path.name)
     except (OSError, RuntimeError):  # Python 3.13 and later let a link to itself be

@@ -12,20 +12,15 @@ from chipglow.quantities.part import Family, Part, PartType, adapter, first_sent
 
 @dataclass(frozen=True)
 class Setting:
-    """A field of a part, with its value.
-
-    `path` holds its keys, joined by dots: ``camera.psf.fwhm``. `value` is in SI units, or a part;
-    `plain` is the same as YAML has it. `default` is None if it must be given. `examples` has a line
-    for each kind of part that a description may choose for it.
-    """
+    """A field of a part by its path, such as ``camera.psf.fwhm``, with its value in SI units."""
 
     path: str
     parameter: Parameter
     kind: Any
     value: Any
-    plain: Any
-    default: Any = None
-    examples: str = ""
+    plain: Any  # as YAML has it
+    default: Any = None  # None if it must be given
+    examples: str = ""  # a line for each kind of part that may be chosen
 
     @property
     def name(self) -> str:
@@ -80,13 +75,7 @@ def own_settings(part: Part) -> Iterator[Setting]:
 
 
 def value_at(part: Any, path: str) -> Any:
-    """Value of a setting by its path, which may lead through lists and mappings.
-
-    Raises
-    ------
-    LookupError
-        If there is no such setting.
-    """
+    """Return a setting's value by its path; a LookupError if there is none."""
     for key in path.split("."):
         if isinstance(part, tuple):
             part = dict(enumerate(part))[int(key) if key.isdigit() else -1]
@@ -100,13 +89,7 @@ def value_at(part: Any, path: str) -> Any:
 
 
 def setting_at(part: Part, path: str) -> Setting:
-    """Setting by its path; one in a list or a mapping has unit and type of the whole.
-
-    Raises
-    ------
-    LookupError
-        If there is no such setting.
-    """
+    """Return a setting by its path; one in a list or a mapping has unit and type of the whole."""
     keys, owner, at = path.split("."), part, 0
     for count in range(1, len(keys)):
         inner = value_at(part, ".".join(keys[:count]))
@@ -117,21 +100,7 @@ def setting_at(part: Part, path: str) -> Setting:
 
 
 def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
-    """A copy with other values, all of them checked.
-
-    Parameters
-    ----------
-    part : Part
-        The part.
-    changes : mapping
-        New values by their paths, as of `value_at`: numbers in SI units, text with units, mappings
-        or parts.
-
-    Raises
-    ------
-    ValueError
-        If a value is not possible.
-    """
+    """Return a copy with other values by their paths, all checked; a ValueError if impossible."""
     try:
         made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes))
     except ValidationError as error:
@@ -159,28 +128,6 @@ def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
     for name, one in inner.items():
         data[name] = _with_changes(value_at(part, name), one)
     return tuple(data.values()) if isinstance(part, tuple) else data
-
-
-def field_tables(part: Part, name: str) -> str:
-    """Tables in Markdown of a part with this key, and of the parts in it."""
-    return "\n".join(_table_lines(part, name))
-
-
-def _table_lines(part: Part, name: str) -> Iterator[str]:
-    yield from (f"## `{name}`", "", first_sentence(type(part)), "")
-    yield "| field | meaning | unit | default | allowed |"
-    yield "|---|---|---|---|---|"
-    inner = []
-    for one in own_settings(part):
-        if one.is_section:
-            inner.append(one)
-            continue
-        cells = (one.meaning, one.unit, f"`{one.plain}`", one.allowed)
-        row = (" ".join(cell.split()).replace("|", r"\|") for cell in cells)
-        yield f"| `{one.name}` | {' | '.join(row)} |"
-    yield ""
-    for one in inner:
-        yield from _table_lines(one.value, f"{name}.{one.name}")
 
 
 def _families(annotation: Any) -> Iterator[Family]:

@@ -1,7 +1,4 @@
-"""Quantities with units at the border: text such as ``10 us`` to SI numbers and back.
-
-And units alone, as other people's files write them: ``degC``, ``m s-1``, ``us since 2000-01-01``.
-"""
+"""Quantities with units at the border: text such as ``10 us`` or ``m s-1`` to SI and back."""
 
 import re
 from dataclasses import dataclass, field
@@ -80,22 +77,7 @@ CELSIUS: Final = Unit(1.0, ZERO_CELSIUS)
 
 
 def parse_unit(text: str, base: str, name: str) -> Unit:
-    """A unit from its text in a file.
-
-    Parameters
-    ----------
-    text : str
-        The unit, as CF conventions, udunits or pint write it; a date after ``since`` is left out.
-    base : str
-        The SI unit of the same quantity; 1 for a mere number.
-    name : str
-        What has this unit, as errors call it.
-
-    Raises
-    ------
-    ValueError
-        If it is no unit of such a quantity.
-    """
+    """Return the unit of a text (CF, udunits, pint); a date after ``since`` is left out."""
     clean = text.split(" since ")[0].strip()
     if base == "1" and clean.lower() in _NO_UNIT:
         return SI
@@ -135,13 +117,7 @@ class Quantity:
     is_difference: bool = False
 
     def parse(self, value: object, si: bool = False) -> float:
-        """SI number of a text such as ``10 us``; if `si`, also of a number in SI units.
-
-        Raises
-        ------
-        ValueError
-            If the text has no unit, another quantity's unit, or a value that is out of range.
-        """
+        """Return the SI number of a text such as ``10 us``; if `si`, also of an SI number."""
         if si and isinstance(value, int | float) and not isinstance(value, bool):
             return self._checked(f"{value} {self.base}", float(value))
         if is_bare_number(value):
@@ -152,13 +128,7 @@ class Quantity:
         return self._to_base(str(value), match[1], match[2])
 
     def parse_range(self, value: object, si: bool = False) -> tuple[float, float]:
-        """SI limits of a text such as ``3.8-5.1 um``; if `si`, also of two numbers in SI units.
-
-        Raises
-        ------
-        ValueError
-            As `parse`, and if the lower limit does not come first.
-        """
+        """Return the SI limits of ``3.8-5.1 um``; if `si`, also of two numbers in SI units."""
         if si and isinstance(value, tuple) and len(value) == 2:
             lower, upper = (self.parse(limit, si) for limit in value)
         else:

@@ -17,10 +17,7 @@ _STRAINS: Final = np.linspace(0.0, 2.0, 81)
 
 
 def material_figure(material: MaterialFile) -> Figure:
-    """Draw the flow stress of every set; conductivity, heat capacity, moduli and density.
-
-    Tool materials, whose properties are constant, raise ValueError.
-    """
+    """Draw flow stress, heat properties, moduli and density of a workpiece's material."""
     if not material.workpieces:
         raise ValueError(f"{material.name} is a tool's material, expected a workpiece's to draw")
     sets = material.workpieces

@@ -44,12 +44,7 @@ class MovieScales:
 
     @classmethod
     def of(cls, simulation: CuttingSimulation) -> "MovieScales":
-        """Return the scales of a cut.
-
-        Temperature: from the initial one to 0.6 of the way to melting (of steel, if the flow law
-        has no melting temperature), rounded up to 50 °C. Strain rate: three decades from a tenth
-        of speed over feed, the rate of a shear as thick as the feed.
-        """
+        """Return the scales of a cut."""
         conditions = simulation.conditions
         start = conditions.initial_temperature
         melting = getattr(simulation.workpiece.flow_stress, "melting_temperature", _MELTING)
@@ -138,11 +133,7 @@ class CutPicture:
 def cut_movie(
     path: str | os.PathLike[str], raster: Raster, simulation: CuttingSimulation
 ) -> Iterator[Callable[[Frame], None]]:
-    """Write a movie of a cut, .mp4 or .gif; yields the function that appends a frame.
-
-    The file appears when the block ends without an exception. Another ending, a missing PyAV for
-    .mp4, or no frame raise ValueError.
-    """
+    """Write a movie of a cut from the frames that the yielded function takes."""
     picture = CutPicture(raster, simulation)
     with movie_writer(path, picture.shape, _palette()) as append:
         yield lambda frame: append(picture.draw(frame))

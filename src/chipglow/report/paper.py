@@ -57,10 +57,7 @@ def table_2(study: Study) -> list[tuple[str, str, str]]:
 def comparison(
     key: str, draws: Distribution | None, unit: str, widths: Array, series: Array | None
 ) -> str:
-    """Return how a row of the report compares with the paper, as sentences.
-
-    `series` are its values with Gaussian PSFs of the widths in m; None if unknown.
-    """
+    """Return how a row of the report compares with the paper, as sentences."""
     sentences = [_TEXTS["rows"].get(key, "")]
     paper = PAPER.get(key)
     if paper and series is not None:

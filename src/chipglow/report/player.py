@@ -78,10 +78,7 @@ class View:
 
 @dataclass(frozen=True)
 class Player:
-    """Views of the same frames; `still` is shown first, without script and in print.
-
-    The curves are drawn on all views; `times` are the captions of the frames.
-    """
+    """Views of the same frames with their times; `still` is shown first, and in print."""
 
     title: str
     caption: str

@@ -27,26 +27,20 @@ _ACROSS: Final = ("rake", "band")
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of the report, in its unit, and the published value if there is one.
-
-    `here` is the result (the mean of its `draws`), `one_draw` that of a single frame. Without draws
-    `uncertainty` is its standard uncertainty or its standard deviation over time or segments.
-    `reference` belongs to an error: the reading of a camera without error in °C. So do `parts`, the
-    contributions to it: psf, and motion and footprint or their rest.
-    """
+    """One quantity of the report, in its unit, and the published value if there is one."""
 
     key: str
     quantity: str
     unit: str
-    here: float | None
+    here: float | None  # the result, a mean of the draws
     decimals: int = 0
     explanation: str = ""
     draws: Distribution | None = None
-    one_draw: float | None = None
-    uncertainty: float | None = None
-    reference: Distribution | None = None
+    one_draw: float | None = None  # of a single frame
+    uncertainty: float | None = None  # standard, or deviation over time or segments
+    reference: Distribution | None = None  # reading of a camera without error in °C
     published: PaperValue | None = None
-    parts: Mapping[str, Distribution] = field(default_factory=dict)
+    parts: Mapping[str, Distribution] = field(default_factory=dict)  # contributions to an error
 
     @property
     def paper(self) -> float | None:
@@ -102,29 +96,13 @@ class Row:
 
 
 def result_rows(analysis: Analysis, study: object = None) -> list[Row]:
-    """Return all errors of an analysis and, for a cut, period, forces, contact and shear band.
-
-    Parameters
-    ----------
-    analysis : Analysis
-        The analysis.
-    study : Study, optional
-        Its study; published values are included if it is the paper's.
-    """
+    """Return all errors of an analysis and, for a cut, period, forces, contact and shear band."""
     rows = all_rows(Facts(analysis, study))
     return [*rows["errors"], *rows["cut"]]
 
 
 def results_frame(analysis: Analysis, study: object = None) -> pd.DataFrame:
-    """Return the numbers of `result_rows`, one row per key.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns ``quantity``, ``unit``, ``paper``, ``here``, ``one_draw``, ``uncertainty``,
-        ``differs``, and ``standard_deviation``, ``least`` and ``greatest`` of the draws; None or
-        NaN where unknown.
-    """
+    """Return the numbers of `result_rows` as a table, one row per key."""
     rows = result_rows(analysis, study)
     draws = [(row.draws.standard_deviation, *row.draws.range) if row.draws else () for row in rows]
     scatter = pd.DataFrame(draws, columns=["standard_deviation", "least", "greatest"])
@@ -189,7 +167,8 @@ def _reading(facts: Facts, name: str) -> Iterator[Row]:
         yield _drawn(facts, name, "psf_portion_degC", found.psf_portion, one.psf_portion)
     else:
         draws = Distribution(100.0 * fraction.values, fraction.causes) if fraction else None
-        yield _drawn(facts, name, "psf_fraction_percent", draws, 100 * one.psf_fraction)
+        single = one.psf_portion / one.error if one.error else nan
+        yield _drawn(facts, name, "psf_fraction_percent", draws, 100 * single)
 
 
 def _drawn(

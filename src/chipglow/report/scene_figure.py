@@ -27,11 +27,7 @@ _ARROWS: Final = 14
 
 
 def draw_scene(scene: Scene, time: float | None = None) -> Figure:
-    """Draw the fields of the frame nearest to a time in s, by default the middle one.
-
-    Below are histograms of the values over the workpiece. A time outside the scene raises
-    ValueError.
-    """
+    """Draw the fields of the frame nearest to a time in s, and histograms over the workpiece."""
     frame = scene.frame(shown_frame(scene.times, time, "scene"))
     raster, tool, panels = scene.raster, scene.tool, _panels(frame)
     has_quality = frame.quality is not None and bool(

@@ -37,40 +37,26 @@ _FIELDS: Final = {
 
 
 class QualitySummary(NamedTuple):
-    """Reliability of the samples that show material, at the time of the summary.
-
-    `filled` is the fraction whose value is taken from neighbours; `median` and `percentile_95` are
-    the distance of the other samples' colours from the colour scale in CIE L*a*b*.
-    """
+    """Fraction of samples taken from neighbours, and colour distances of the others."""
 
     filled: float
-    median: float
+    median: float  # distance to the colour scale in CIE L*a*b*
     percentile_95: float
 
 
 @dataclass(frozen=True)
 class SceneSummary:
-    """The contents of a scene in the frame `index`; `sampled` are all frames that were read.
-
-    `fields` has a row for each field of the frame: its title ``field``, its ``unit``, and in this
-    unit ``least``, ``median`` and ``greatest`` over the workpiece at the time of the summary, and
-    the range ``overall`` of all frames that were read; NaN and () if no workpiece is visible.
-    `fractions` are those of the samples that show each material.
-    """
+    """The contents of a scene in the frame `index`; `sampled` are all frames that were read."""
 
     index: int
     sampled: tuple[int, ...]
-    fields: pd.DataFrame
-    fractions: Mapping[Material, float]
+    fields: pd.DataFrame  # least, median and greatest over the workpiece; overall: of all frames
+    fractions: Mapping[Material, float]  # of the samples
     quality: QualitySummary | None
 
 
 def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
-    """Summarise the frame nearest to a time in s, by default the middle one.
-
-    At most five further frames are read for the range of the values. A time outside the scene
-    raises ValueError.
-    """
+    """Summarise the frame nearest to a time in s, by default the middle one."""
     index = shown_frame(scene.times, time, "scene")
     last = len(scene.times) - 1
     sampled = tuple(sorted({index, *np.linspace(0, last, _SAMPLED).astype(int).tolist()}))

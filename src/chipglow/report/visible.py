@@ -17,10 +17,7 @@ _DARKEST: Final = 0.45
 
 
 def visible_picture(frame: Frame, raster: Raster) -> NDArray[np.float64]:
-    """Return grey values from 0 to 1, shape (y, x), for orientation only.
-
-    The texture of the steel moves with the material, sheared material is darker, the tool black.
-    """
+    """Return grey values from 0 to 1, shape (y, x), for orientation only."""
     x, y = frame.material_x, frame.material_y
     if x is None or y is None:
         x, y = (grid.astype(np.float32) for grid in np.meshgrid(raster.x, raster.y))

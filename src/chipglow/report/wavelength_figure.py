@@ -28,10 +28,7 @@ _PARTS: Final = {
 
 
 def draw_wavelengths(data: xr.Dataset) -> Figure:
-    """Draw a place a column: above all bands and pairs, below the causes of the best.
-
-    `data` is that of `chipglow.wavelengths`.
-    """
+    """Draw a place a column: above all bands and pairs, below the causes of the best."""
     frame = wavelengths_frame(data)
     places = list(frame.place.unique())
     with drawing.style():

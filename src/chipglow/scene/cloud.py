@@ -1,16 +1,9 @@
-"""From scattered points, as of SPH or of the material point method, to fields with a sharp surface.
+"""Fields of scattered points, as of SPH or the material point method, on a raster.
 
-Every point first gets the gradient of each field from its neighbours; a sample then is the weighted
-mean of what the points around it say of its place. So a linear field comes back as it was, on the
-free surface too, where points lie to one side only.
-
-Notes
------
-Weights are quadratic B-splines. Values reach 1.1 spacings from a point and gradients 2: what lies
-beyond a gap wider than a spacing has no part in them. The filled fraction of the area, whose half
-is the surface, is smoothed twice as wide: on a straight surface half a spacing outside of the last
-row it is one half. Where points lie at random, not as on a lattice that was deformed, all widths
-are twice as large, or the area would have holes between them.
+A sample is the mean of the first-order expansions of the points around it, so linear fields are
+exact, on the free surface too. Weights are quadratic B-splines: values reach 1.1 spacings from a
+point, gradients 2, and the filled fraction, whose half is the surface, is smoothed twice as wide.
+Where points lie at random all widths are twice as large, or the area would have holes.
 """
 
 from collections.abc import Mapping
@@ -40,33 +33,19 @@ _SHELLS: Final[Mapping[int, tuple[int, float]]] = {2: (12, 2.0), 3: (26, 3.0**0.
 
 @dataclass(frozen=True)
 class Cloud:
-    """Points at one time.
-
-    Parameters
-    ----------
-    places : ndarray
-        Where they are in m, shape (points, 2).
-    values : ndarray
-        Fields at the points, shape (points, fields).
-    material : ndarray
-        `Material` of each point, shape (points,).
-    spacing : ndarray
-        Distance of each point from its neighbours in the undeformed state in m, shape (points,).
-    area : ndarray
-        Area in m^2 that each point stands for: the square of the spacing, or less if several points
-        lie behind one another, shape (points,).
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit, a place is not finite, or spacing or area is not over 0.
-    """
+    """Points at one time."""
 
     places: NDArray[np.float64]
+    """Where they are in m, shape (points, 2)."""
     values: NDArray[np.float64]
+    """Fields at the points, shape (points, fields)."""
     material: NDArray[np.uint8]
+    """`Material` of each point, shape (points,)."""
     spacing: NDArray[np.float64]
+    """Distance of each point from its neighbours in the undeformed state in m, shape (points,)."""
     area: NDArray[np.float64]
+    """Area of each point in m^2: the square of the spacing, or less if several points lie behind
+    one another, shape (points,)."""
 
     def __post_init__(self) -> None:
         count = len(self.places)
@@ -84,19 +63,10 @@ class Cloud:
 
 
 def neighbour_distance(places: NDArray[np.float64]) -> float:
-    """Typical distance of neighbours in m.
+    """Return the typical distance of neighbours among places in m, shape (points, 2 or 3).
 
-    Parameters
-    ----------
-    places : ndarray
-        In m, shape (points, 2 or 3).
-
-    Returns
-    -------
-    float
-        On a square lattice its spacing. It is the median distance of the nearest 4 neighbours (6 in
-        three dimensions) or, where points are in disorder and some are very near, that of the 12th
-        (26th) by what it is on a lattice, whichever is more. NaN for fewer than 2 points.
+    The median distance of the nearest 4 (6) neighbours, or of the 12th (26th) over its value on a
+    lattice where points are in disorder; NaN for fewer than 2 points.
     """
     nearest = 2 * places.shape[1]
     shell, radius = _SHELLS[places.shape[1]]
@@ -111,20 +81,9 @@ def neighbour_distance(places: NDArray[np.float64]) -> float:
 
 
 def sample_cloud(cloud: Cloud, raster: Raster) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Fields of a cloud on a raster.
+    """Return fields (fields, rows, columns), NaN in voids, and the material of most of each sample.
 
-    Parameters
-    ----------
-    cloud : Cloud
-        The points.
-    raster : Raster
-        Where the samples shall be. If they are coarser than the points, they are means.
-
-    Returns
-    -------
-    values, material : ndarray
-        Shapes (fields, rows, columns) and (rows, columns). Values are those of the material that
-        fills most of a sample, NaN in voids; they stay within the range of the points' own.
+    Samples coarser than the points are means. Values stay within the range of the points' own.
     """
     fields = cloud.values.shape[1]
     values = np.full((fields, *raster.shape), np.nan, np.float32)

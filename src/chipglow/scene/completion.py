@@ -41,11 +41,6 @@ class Completion(Part):
     """What stands in for what the source does not have.
 
     Its ``tool`` is an outline: samples in it are tool, whatever the source says.
-
-    Raises
-    ------
-    ValueError
-        If a number is not possible or the chip has under three corners.
     """
 
     surroundings: Annotated[
@@ -102,15 +97,7 @@ class Completion(Part):
         return max(self.rate_frames, _FLOW_FRAMES)
 
     def fields(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
-        """Names of the fields of the scene, in their order.
-
-        Parameters
-        ----------
-        found : iterable of str
-            Those that the source has.
-        frames : int
-            Number of its frames.
-        """
+        """Names of the fields of the scene, in their order."""
         known = set(found)
         has = {
             "temperature": True,
@@ -180,22 +167,9 @@ class Completion(Part):
 def complete(
     frames: Iterable[SampledFrame], raster: Raster, completion: Completion
 ) -> Iterator[Frame]:
-    """Whole frames of a scene, one after the other; a few are in memory.
+    """Yield the whole frames of a scene from frames in order of time; a few are in memory.
 
-    Parameters
-    ----------
-    frames : iterable of SampledFrame
-        Frames in order of time. The first one's strain rate and optical flow are taken from the
-        second.
-    raster : Raster
-        Where their samples are.
-    completion : Completion
-        What stands in for what is missing.
-
-    Raises
-    ------
-    SceneError
-        If there is no temperature, or over half of the material's samples have none.
+    The first one's strain rate and optical flow are taken from the second.
     """
     chip, in_tool = _inside(completion.chip, raster), _in_tool(completion.tool, raster)
     history: deque[SampledFrame] = deque(maxlen=completion.memory)

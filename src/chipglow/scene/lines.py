@@ -11,23 +11,12 @@ from chipglow.scene.raster import Raster
 
 @dataclass(frozen=True)
 class Line:
-    """Points along a line or curve.
-
-    Parameters
-    ----------
-    distance : ndarray
-        Distance along it in m, shape (n,), ascending; what it counts from is up to its maker.
-    points : ndarray
-        x and y in m, shape (n, 2).
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit, or the distance does not ascend.
-    """
+    """Points along a line or curve."""
 
     distance: NDArray[np.float64]
+    """Distance along it in m, shape (n,), ascending; what it counts from is up to its maker."""
     points: NDArray[np.float64]
+    """x and y in m, shape (n, 2)."""
 
     def __post_init__(self) -> None:
         if self.points.shape != (self.distance.size, 2):
@@ -40,17 +29,7 @@ class Line:
 
 
 def straight_line(origin: ArrayLike, direction: ArrayLike, distance: ArrayLike) -> Line:
-    """Line through a point.
-
-    Parameters
-    ----------
-    origin : array_like
-        x and y in m where the distance is 0.
-    direction : array_like
-        Unit vector along which the distance grows.
-    distance : array_like
-        Distances in m, ascending, shape (n,).
-    """
+    """Return the line through a point along a unit vector, at ascending distances from it in m."""
     distances = np.asarray(distance, dtype=np.float64)
     direction = np.asarray(direction, dtype=np.float64)
     points = np.asarray(origin, dtype=np.float64) + distances[:, None] * direction
@@ -58,21 +37,9 @@ def straight_line(origin: ArrayLike, direction: ArrayLike, distance: ArrayLike) 
 
 
 def sample(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.float64]:
-    """Image read at points by bilinear interpolation between its samples' centres.
+    """Return an image (y, x) at points (..., 2) in m, bilinear between its samples' centres.
 
-    Parameters
-    ----------
-    image : array_like
-        Values on the raster, shape (y, x); NaN where there are none.
-    raster : Raster
-        Where the image's samples are.
-    points : array_like
-        x and y in m, shape (..., 2).
-
-    Returns
-    -------
-    ndarray
-        Values, shape (...); NaN outside the outermost centres and beside a NaN.
+    NaN outside the outermost centres and beside a NaN.
     """
     places = np.asarray(points, dtype=np.float64)
     column = (places[..., 0] - raster.left) / raster.spacing - 0.5
@@ -90,22 +57,7 @@ def sample(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.fl
 
 
 def nearest(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.float64]:
-    """Image read at points from the sample that holds each.
-
-    Parameters
-    ----------
-    image : array_like
-        Values on the raster, shape (y, x).
-    raster : Raster
-        Where the image's samples are.
-    points : array_like
-        x and y in m, shape (..., 2).
-
-    Returns
-    -------
-    ndarray
-        Values, shape (...); NaN outside the raster.
-    """
+    """Return an image (y, x) at points (..., 2) in m: the sample that holds each; NaN outside."""
     places = np.asarray(points, dtype=np.float64)
     column = np.floor((places[..., 0] - raster.left) / raster.spacing).astype(np.int64)
     row = np.floor((raster.top - places[..., 1]) / raster.spacing).astype(np.int64)

@@ -19,26 +19,9 @@ def strain_rate_along(
     interval: float,
     spacing: float,
 ) -> NDArray[np.float32]:
-    """Rate of the plastic strain of the material, from two instants.
+    """Return (strain(x) - before(x - v interval)) / interval in 1/s, shape (y, x), 0 or more.
 
-    Parameters
-    ----------
-    strain, before : ndarray
-        Plastic strain now and `interval` earlier (later if it is negative), shape (y, x); NaN where
-        there is no material.
-    velocity : tuple of ndarray
-        Velocity along x and up now in m/s, shape (y, x) each.
-    interval : float
-        Time between both in s.
-    spacing : float
-        Side of a sample in m.
-
-    Returns
-    -------
-    ndarray
-        ``(strain(x) - before(x - v interval)) / interval`` in 1/s, shape (y, x), 0 or more as
-        plastic strain cannot fall; 0 where there was no material, NaN where there is none. Between
-        samples `before` is a cubic spline.
+    Strains are NaN without material, where the rate is NaN too; 0 where there was none before.
     """
     rows, columns = np.indices(strain.shape, dtype=np.float32)
     shift = np.float32(interval / spacing)
@@ -54,25 +37,11 @@ def strain_rate_along(
 def optical_flow(
     before: NDArray[np.float32], after: NDArray[np.float32], interval: float, spacing: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Velocity along x and up in m/s by which a pattern moved, shape (y, x) each.
+    """Return the velocity along x and up in m/s by which a pattern moved, shape (y, x) each.
 
     Total variation with the L1 norm (Zach, Pock and Bischof 2007) by scikit-image, on a picture of
     a few hundred samples. It sees only what has a pattern: a region without one takes on the
     motion of its surroundings.
-
-    Parameters
-    ----------
-    before, after : ndarray
-        The pattern at two instants, shape (y, x), finite.
-    interval : float
-        Time between both in s.
-    spacing : float
-        Side of a sample in m.
-
-    Raises
-    ------
-    ImportError
-        If scikit-image is missing.
     """
     from skimage import registration
 

@@ -11,16 +11,9 @@ _REACH: Final = 8
 
 
 def nearest(known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
-    """Rows and columns of the known samples that are nearest to the wanted ones, shape (n,) each.
+    """Return rows and columns of the known samples nearest to the n wanted ones, shape (n,) each.
 
     It is quick where the known ones are near, as around holes and lines.
-
-    Parameters
-    ----------
-    known : ndarray
-        Samples to choose from, one or more, shape (y, x), bool.
-    wanted : ndarray
-        Samples to find the nearest for, n of them, shape (y, x), bool.
     """
     at = np.argwhere(wanted)
     found = np.full(at.shape, -1, np.intp)

@@ -20,19 +20,7 @@ _NOTHING: Final = "#e5e7eb"
 def frames_text(
     times: NDArray[np.float64], raster: Raster, values: str, celsius: NDArray[Any]
 ) -> str:
-    """Number, shape, times and range of frames, in a line.
-
-    Parameters
-    ----------
-    times : ndarray
-        Times of the frames in s.
-    raster : Raster
-        Their grid.
-    values : str
-        What its values are called, such as ``samples``.
-    celsius : ndarray
-        The first frame in °C, shape (y, x), NaN where there is none.
-    """
+    """Return number, shape, times in s and range of frames in °C in a line of text."""
     count, first, last = times.size, 1e6 * times[0], 1e6 * times[-1]
     known = celsius[np.isfinite(celsius)]
     parts = (
@@ -54,23 +42,7 @@ def plot_image(
     time: float,
     axes: "Axes | None",
 ) -> "Axes":
-    """Draw temperatures on micrometre axes, with the tool's outline and a colour bar.
-
-    Parameters
-    ----------
-    celsius : ndarray
-        Temperature in °C, shape (y, x), NaN where there is none.
-    raster : Raster
-        Its grid.
-    tool : Tool, optional
-        The tool.
-    label : str
-        Of the colour bar, with its unit.
-    time : float
-        In s, for the title.
-    axes : matplotlib.axes.Axes, optional
-        Where to draw; a new figure by default.
-    """
+    """Draw temperatures in °C on micrometre axes, with the tool's outline and a colour bar."""
     import matplotlib
 
     if axes is None:

@@ -11,24 +11,12 @@ from chipglow.scene.tool import Tool
 
 @dataclass(frozen=True)
 class PlacedTool(Tool):
-    """A tool whose tip is where a measurement's coordinates have it.
-
-    Parameters
-    ----------
-    tool : Tool
-        The tool with its tip at the origin, as scenes have it.
-    tip : tuple of float
-        Where that origin is, x and y in m: the x of the edge's leftmost point and the y of its
-        lowest one.
-
-    Raises
-    ------
-    ValueError
-        If the tip is not finite, or the tool is one that was placed before.
-    """
+    """A tool whose tip is where a measurement's coordinates have it."""
 
     tool: Tool
+    """The tool with its tip at the origin, as scenes have it."""
     tip: tuple[float, float]
+    """Place of that origin in m: x of the edge's leftmost point and y of its lowest one."""
 
     def __post_init__(self) -> None:
         if isinstance(self.tool, PlacedTool):

@@ -9,20 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 def in_polygon(
     corners: Sequence[tuple[float, float]], x: ArrayLike, y: ArrayLike
 ) -> NDArray[np.bool_]:
-    """Which points lie in a polygon, by the number of edges that a ray from them crosses.
-
-    Parameters
-    ----------
-    corners : sequence of tuple
-        The polygon's corners in order; the last is joined to the first.
-    x, y : array_like
-        The points, in the unit of the corners, broadcast against each other.
-
-    Returns
-    -------
-    ndarray of bool
-        Of the points' shape. Where a polygon overlaps itself, what is twice in it is out.
-    """
+    """Tell which points lie in a polygon; where it overlaps itself, those twice in it do not."""
     x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
     inside = np.zeros(x.shape, np.bool_)
     for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):

@@ -21,19 +21,12 @@ SMALLEST: Final = 1e-200
 
 @dataclass(frozen=True)
 class Rasterised:
-    """What a mesh is at the samples of a raster.
-
-    Parameters
-    ----------
-    fields : ndarray
-        Those of the nodes, then those of the elements, shape (fields, y, x), float32; NaN where
-        there is no element.
-    element : ndarray
-        Number of the triangle at each sample, shape (y, x), int32; -1 where there is none.
-    """
+    """The fields and elements of a mesh at the samples of a raster."""
 
     fields: NDArray[np.float32]
+    """Those of nodes, then of elements, float32 of shape (fields, y, x); NaN without an element."""
     element: NDArray[np.int32]
+    """Number of the triangle at each sample, int32 of shape (y, x); `NOTHING` without one."""
 
 
 def rasterise(
@@ -46,30 +39,10 @@ def rasterise(
 ) -> Rasterised:
     """Sample the fields of a mesh of triangles at the centres of a raster's samples.
 
-    A sample takes the value of the linear function through the triangle's three nodes, or the
-    triangle's own. A sample on an edge that two triangles share belongs to one of them: rows are
-    cut at the same crossing of the edge for both, and a triangle takes the samples from its left
-    crossing on, up to but without its right one. Orientation does not matter. A triangle without
-    area, or with a position that is not finite or absurdly far away, covers nothing. Where
-    triangles lie over one another the highest is taken, of those as high the last.
-
-    Parameters
-    ----------
-    raster : Raster
-        Where the samples are.
-    points : array_like
-        Positions of the nodes in m, shape (nodes, 2).
-    triangles : array_like
-        Numbers of the nodes of each triangle, shape (triangles, 3).
-    node_values, element_values : array_like, optional
-        Values of nodes and of triangles, shape (nodes, fields) and (triangles, fields).
-    height : array_like, optional
-        Height of the nodes toward the viewer in m, shape (nodes,); all alike if left out.
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit together or a triangle has a node that does not exist.
+    Points (nodes, 2) and `height` in m; values of nodes and elements have shape (n, fields). A
+    sample on an edge that two triangles share belongs to one of them. A triangle without area, or
+    with a position that is not finite or absurdly far away, covers nothing. Where triangles lie
+    over one another the highest is taken, of those as high the last.
     """
     points = np.ascontiguousarray(points, np.float64)
     triangles = np.ascontiguousarray(triangles, np.int64)

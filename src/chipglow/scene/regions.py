@@ -20,18 +20,7 @@ _BEYOND: Final = 1e-6
 
 @dataclass(frozen=True)
 class Polygon:
-    """A polygon.
-
-    Parameters
-    ----------
-    corners : tuple of tuple
-        Its corners in order, three or more.
-
-    Raises
-    ------
-    ValueError
-        If a corner is not finite, or there are fewer than three.
-    """
+    """A polygon."""
 
     corners: tuple[Point, ...]
 
@@ -59,13 +48,7 @@ class Polygon:
 
 @dataclass(frozen=True)
 class Circle:
-    """A circle.
-
-    Raises
-    ------
-    ValueError
-        If the centre is not finite or the radius is not over 0.
-    """
+    """A circle."""
 
     centre: Point
     radius: float
@@ -90,31 +73,14 @@ class Circle:
 
 @dataclass(frozen=True)
 class Region:
-    """A part of an image with a name.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    shape : Polygon or Circle
-        What it covers.
-    feature : str, optional
-        What it is a part of, such as "chip body"; regions of one feature are taken together.
-        By default the region's own name.
-    unit : {"pixel", "m"}
-        "pixel": points are column and row, counted from the upper left corner of the image, so that
-        the middle of the first pixel is (0.5, 0.5). "m": points are x and y of the measurement.
-
-    Raises
-    ------
-    ValueError
-        If the name is empty or the unit is unknown.
-    """
+    """A part of an image with a name."""
 
     name: str
     shape: Polygon | Circle
     feature: str = ""
+    """Regions of one feature, such as "chip body", are taken together; by default its own name."""
     unit: Literal["pixel", "m"] = "pixel"
+    """Unit of the points: column and row from the image's upper left corner, or x and y in m."""
 
     def __post_init__(self) -> None:
         if not self.name.strip():
@@ -125,23 +91,7 @@ class Region:
             object.__setattr__(self, "feature", self.name)
 
     def mask(self, raster: Raster) -> NDArray[np.bool_]:
-        """Which pixels have their middle in the region.
-
-        Parameters
-        ----------
-        raster : Raster
-            The image's pixels.
-
-        Returns
-        -------
-        ndarray of bool
-            Shape (y, x).
-
-        Raises
-        ------
-        ValueError
-            If the region reaches beyond the image, or holds the middle of no pixel.
-        """
+        """Tell which pixels have their middle in the region, shape (y, x)."""
         self._check_inside(raster)
         columns, rows = np.arange(raster.columns) + 0.5, np.arange(raster.rows) + 0.5
         x, y = (columns, rows) if self.unit == "pixel" else (raster.x, raster.y)
@@ -153,7 +103,7 @@ class Region:
         return mask
 
     def outline(self, raster: Raster) -> NDArray[np.float64]:
-        """Points along its edge as x and y in m, shape (n, 2)."""
+        """Return points along its edge as x and y in m, shape (n, 2)."""
         points = self.shape.outline
         if self.unit == "m":
             return points
@@ -175,22 +125,13 @@ class Region:
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """Pixels of an image that a table has a row for: a region, or all regions of a feature.
-
-    Parameters
-    ----------
-    name, feature : str
-        Its name, and the feature that it belongs to.
-    mask : ndarray of bool
-        Its pixels, shape (y, x).
-    whole : bool
-        Whether it is all that there is of the feature.
-    """
+    """Pixels of an image that a table has a row for: a region, or all regions of a feature."""
 
     name: str
     feature: str
     mask: NDArray[np.bool_]
     whole: bool
+    """Whether it is all that there is of the feature."""
 
 
 def areas(regions: Sequence[Region], raster: Raster) -> tuple[Area, ...]:
@@ -239,10 +180,7 @@ def areas(regions: Sequence[Region], raster: Raster) -> tuple[Area, ...]:
 
 
 def shared_pixels(regions: Sequence[Region], raster: Raster) -> dict[tuple[str, str], int]:
-    """How many pixels two regions of different features share, by their names.
-
-    Regions may overlap: a pixel then counts in each.
-    """
+    """Count the pixels that two regions of different features share, by their names."""
     masks = {region.name: region.mask(raster) for region in regions}
     shared = {
         (one.name, other.name): int((masks[one.name] & masks[other.name]).sum())

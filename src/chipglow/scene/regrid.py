@@ -11,27 +11,10 @@ _KINDS = len(Material)
 
 
 def taps(centres: NDArray[np.float64], spacing: float, wanted: NDArray[np.float64]) -> Taps:
-    """Which samples of a grid make those of another, along one axis.
+    """Return the first sample of each wanted one, and weights (wanted, taps), along one axis.
 
-    Parameters
-    ----------
-    centres : ndarray
-        Centres of the grid's samples in m, evenly spaced, ascending, shape (samples,).
-    spacing : float
-        Distance of the wanted samples in m.
-    wanted : ndarray
-        Centres of the wanted samples in m, shape (wanted,).
-
-    Returns
-    -------
-    first, weights : ndarray
-        Number of the first sample that counts, shape (wanted,), and weights of it and of those
-        that follow, shape (wanted, taps). Weights add up to 1; they are 0 off the grid.
-
-    Notes
-    -----
-    A wanted sample that is larger than one of the grid is the mean over the area it covers; a
-    smaller one is interpolated linearly, and constant in the outer half of the last sample.
+    A wanted sample larger than one of the grid is the mean over its area; a smaller one is
+    interpolated linearly, constant in the outer half of the last sample; 0 off the grid.
     """
     step = (centres[-1] - centres[0]) / (centres.size - 1)
     place = (wanted - centres[0]) / step
@@ -57,23 +40,9 @@ def taps(centres: NDArray[np.float64], spacing: float, wanted: NDArray[np.float6
 def regrid(
     values: NDArray[np.float32], material: NDArray[np.uint8], across: Taps, down: Taps
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Fields of one grid on another.
+    """Return values (fields, y, x) and material of one grid on another, by the `taps` of its axes.
 
-    Parameters
-    ----------
-    values : ndarray
-        Fields, shape (fields, rows, columns); NaN where a field is not known.
-    material : ndarray
-        `Material` of the samples, shape (rows, columns).
-    across, down : tuple of ndarray
-        What `taps` gives for the columns and for the rows.
-
-    Returns
-    -------
-    values, material : ndarray
-        Shapes (fields, wanted rows, wanted columns) and (wanted rows, wanted columns). A sample
-        shows the material that has most of it, and the mean of that material alone; NaN in voids
-        and where the field is not known.
+    A sample shows the material that has most of it, and the mean of that material alone.
     """
     return _regrid(values, material, *across, *down)  # type: ignore[no-any-return]
 

@@ -17,21 +17,11 @@ READABLE: Final = tuple(
 
 @dataclass(frozen=True)
 class SampledFrame:
-    """Fields of a source at one time, sampled on a raster.
-
-    Parameters
-    ----------
-    time : float
-        Time in s.
-    fields : mapping
-        Fields by the names of `READABLE` in SI units, shape (y, x); NaN where there is no material.
-    material : ndarray
-        `chipglow.scene.Material` of each sample, shape (y, x), uint8.
-    quality : ndarray, optional
-        How far each sample can be trusted, shape (y, x), uint8: see `chipglow.scene.QUALITY`.
-    """
+    """Fields of a source at one time, sampled on a raster."""
 
     time: float
     fields: Mapping[str, NDArray[np.float32]]
+    """By the names of `READABLE` in SI units, shape (y, x); NaN where there is no material."""
     material: NDArray[np.uint8]
     quality: NDArray[np.uint8] | None = None
+    """See `chipglow.scene.QUALITY`."""

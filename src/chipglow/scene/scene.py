@@ -75,15 +75,7 @@ _LONGEST_STEP: Final = 2.0
 
 
 def is_gap(steps: NDArray[np.float64], frame_spacing: float) -> NDArray[np.bool_]:
-    """Which times between frames are gaps: those of over twice the usual time between frames.
-
-    Parameters
-    ----------
-    steps : ndarray
-        Times between frames in s.
-    frame_spacing : float
-        Usual time between frames in s.
-    """
+    """Tell which times between frames are gaps: those of over twice the usual one."""
     return np.asarray(steps > _LONGEST_STEP * frame_spacing)
 
 
@@ -116,18 +108,7 @@ class Frame:
     splines: "SplineFrame | None" = declared(default=None, repr=False)
 
     def needed(self, name: str) -> NDArray[np.float32]:
-        """A field that what follows cannot do without.
-
-        Parameters
-        ----------
-        name : str
-            One of `FIELD_UNITS`.
-
-        Raises
-        ------
-        SceneError
-            If the scene does not have it.
-        """
+        """Return a field of `FIELD_UNITS` or raise a SceneError."""
         values: NDArray[np.float32] | None = getattr(self, name)
         if values is None:
             raise SceneError(f"scene: has no {name}, expected it: this needs it")
@@ -231,35 +212,11 @@ class Scene:
         return f"<Scene: {told}; {'with' if self.tool else 'without'} tool>"
 
     def celsius(self, frame: int = 0) -> NDArray[np.float64]:
-        """Temperature of one frame in °C.
-
-        Parameters
-        ----------
-        frame : int
-            Number of the frame.
-
-        Returns
-        -------
-        ndarray
-            Shape (y, x). Where there is no material it means nothing.
-        """
+        """Return the temperature of one frame in °C, shape (y, x); meaningless without material."""
         return np.asarray(self._read("temperature", frame), np.float64) - ZERO_CELSIUS
 
     def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
-        """Draw the temperature of one frame in °C over x and y in µm, with the tool's outline.
-
-        Parameters
-        ----------
-        frame : int
-            Number of the frame.
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; a new figure by default.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture; grey where there is no material.
-        """
+        """Draw the temperature of one frame in °C over x and y in µm, with the tool's outline."""
         time = float(self.times[frame])
         shown = self._shown(frame)
         return plot_image(shown, self.raster, self.tool, "temperature / °C", time, axes)
@@ -303,13 +260,7 @@ class Scene:
         return stored_tool(self.data.attrs)
 
     def with_tool(self, tool: Tool) -> Self:
-        """The same scene with this tool's outline.
-
-        Parameters
-        ----------
-        tool : Tool
-            The tool.
-        """
+        """Return the scene with this tool's outline."""
         scene = copy(self)
         scene.data = self.data.assign_attrs(tool_attributes(tool))
         return scene
@@ -320,20 +271,7 @@ class Scene:
         return "material_x" in self.data
 
     def frame(self, index: int, names: Collection[str] | None = None) -> Frame:
-        """Read and check one frame.
-
-        Parameters
-        ----------
-        index : int
-            Number of the frame.
-        names : collection of str, optional
-            The fields to read beside temperature and material; all by default.
-
-        Raises
-        ------
-        SceneError
-            If a value of the frame breaks the contract.
-        """
+        """Read and check one frame: temperature, material and the named fields, by default all."""
         frame = self._unchecked(index, names)
         if not self._whole:
             check_frame(frame)
@@ -349,35 +287,16 @@ class Scene:
     def frames(
         self, indices: range | None = None, names: Collection[str] | None = None
     ) -> Iterator[Frame]:
-        """Read frames one after the other; `names` as for `frame`."""
+        """Yield frames one after the other; `names` as for `frame`."""
         for index in range(len(self.times)) if indices is None else indices:
             yield self.frame(index, names)
 
     def splines(self, index: int) -> "SplineFrame | None":
-        """What a frame's fields are sampled from; None for a scene of samples.
-
-        Parameters
-        ----------
-        index : int
-            Number of the frame.
-        """
+        """Return the splines that a frame is sampled from; None for a scene of samples."""
         return None
 
     def field(self, name: str, index: int) -> NDArray[Any]:
-        """One field of one frame, unchecked: float32, or uint8 of the material and the quality.
-
-        Parameters
-        ----------
-        name : str
-            One of `fields`, or ``material``.
-        index : int
-            Number of the frame.
-
-        Raises
-        ------
-        SceneError
-            If the scene does not have it.
-        """
+        """Return a field of one frame, unchecked: float32, or uint8 of material and quality."""
         if name == "material" and name not in self.data:
             return self._workpiece
         if name not in self.data:
@@ -431,13 +350,7 @@ def _as_stored(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> NDArr
 
 
 def check_frame(frame: Frame) -> None:
-    """Check the values of a frame against the contract of a scene.
-
-    Raises
-    ------
-    SceneError
-        If a value breaks it; the message names the field, the value and what was expected.
-    """
+    """Check the values of a frame; raise a SceneError that names field, value and expectation."""
     for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS):
         values = getattr(frame, name)
         if name == "material":
@@ -451,7 +364,7 @@ def check_frame(frame: Frame) -> None:
 
 
 def raster_of(data: xr.Dataset) -> Raster:
-    """The grid of the samples of a scene's dataset."""
+    """Return the grid of the samples of a scene's dataset."""
     x, y = data["x"].values, data["y"].values
     spacing = float((x[-1] - x[0]) / (len(x) - 1))
     return Raster(
@@ -464,7 +377,7 @@ def raster_of(data: xr.Dataset) -> Raster:
 
 
 def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
-    """Coordinates of a scene's or a measurement's dataset, with units."""
+    """Return the coordinates of a scene's or a measurement's dataset, with units."""
     return {
         "time": ("time", times, {"units": "s", "long_name": "time"}),
         "y": ("y", raster.y, {"units": "m", "long_name": "height above the cut surface"}),

@@ -1,8 +1,4 @@
-"""Frames as quadratic B-splines on a grid that is coarser than the samples.
-
-A cut's picture is such splines on the grid of its simulation: their coefficients hold all of it, in
-a small part of the numbers that its samples are.
-"""
+"""Frames as quadratic B-splines on a grid coarser than the samples: a cut's, as it is stored."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -39,37 +35,20 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Where the nodes of the splines are, and which samples they give.
-
-    Parameters
-    ----------
-    raster : Raster
-        The samples.
-    left, top : float
-        Place of the first node in m.
-    cell : float
-        Distance between nodes in m.
-    rows, columns : int
-        Number of nodes down and across; row 0 is at the top.
-    in_tool : ndarray
-        Which samples show the tool, bool of shape `raster.shape`.
-    ambient : float
-        Temperature in K of samples that show nothing.
-
-    Raises
-    ------
-    ValueError
-        If the nodes do not reach three beyond every sample, or `in_tool` has another shape.
-    """
+    """The nodes of splines, and the samples that they give; row 0 is at the top."""
 
     raster: Raster
     left: float
     top: float
+    """Place of the first node in m."""
     cell: float
+    """Distance between nodes in m."""
     rows: int
     columns: int
     in_tool: NDArray[np.bool_]
+    """Which samples show the tool, bool of shape `raster.shape`."""
     ambient: float
+    """Temperature in K of samples that show nothing."""
 
     def __post_init__(self) -> None:
         if self.in_tool.shape != self.raster.shape:
@@ -94,17 +73,7 @@ class Lattice:
         in_tool: NDArray[np.bool_],
         ambient: float,
     ) -> "Lattice":
-        """The part of a larger grid that a raster needs.
-
-        Parameters
-        ----------
-        raster : Raster
-            The samples.
-        corner : tuple of float
-            x and y of the grid's lower left node in m.
-        cell, in_tool, ambient
-            As for the class.
-        """
+        """Return the part of a larger grid, of this lower left node in m, that a raster needs."""
         left, bottom = corner
         # A node more on each side, so that rounding takes none away.
         beyond = np.array((-1.0, 3.0))
@@ -122,18 +91,7 @@ class Lattice:
         )
 
     def coarser(self, step: int) -> "Lattice":
-        """The same nodes with fewer samples: larger ones, each as its middle shows.
-
-        Parameters
-        ----------
-        step : int
-            How many samples, in either direction, become one.
-
-        Raises
-        ------
-        ValueError
-            If there are not two samples of that size in either direction.
-        """
+        """Return the same nodes with samples `step` times as large, each as its middle shows."""
         fine = self.raster
         rows, columns = fine.rows // step, fine.columns // step
         if step < 1 or min(rows, columns) < 2:
@@ -165,20 +123,6 @@ class Lattice:
 class SplineFrame:
     """The splines of one frame.
 
-    Parameters
-    ----------
-    lattice : Lattice
-        Where their nodes are.
-    time : float
-        In s.
-    nodes : ndarray
-        Coefficients of `SPLINE_FIELDS`, float32 of shape `lattice.shape`.
-    limits : ndarray
-        Least and greatest value that the workpiece's fields may have, which splines can overshoot:
-        float32 of shape (fields, 2), of the fields before ``filled``.
-
-    Notes
-    -----
     A sample has the value Σ w_a(y) w_b(x) c_ab of the three by three nodes about it, with w the
     quadratic B-spline: (3/2 − d)²/2, 3/4 − d², (3/2 − d)²/2 at the distances d in cells. It shows
     the workpiece where ``filled`` is over one half and the tool is not there; there the value is
@@ -189,16 +133,13 @@ class SplineFrame:
     lattice: Lattice
     time: float
     nodes: NDArray[np.float32]
+    """Coefficients of `SPLINE_FIELDS`, float32 of shape `lattice.shape`."""
     limits: NDArray[np.float32]
+    """Least and greatest value of the fields before ``filled``, which splines can overshoot:
+    float32 of shape (fields, 2)."""
 
     def frame(self, names: Collection[str] | None = None) -> Frame:
-        """The samples.
-
-        Parameters
-        ----------
-        names : collection of str, optional
-            Which fields beside the material; all by default.
-        """
+        """Return the samples of temperature, material and the named fields, by default all."""
         material = self.material()
         fields: dict[str, Any] = {
             name: self.values(name, material)
@@ -208,7 +149,7 @@ class SplineFrame:
         return Frame(time=self.time, material=material, splines=self, **fields)
 
     def material(self) -> NDArray[np.uint8]:
-        """What each sample shows, shape (y, x)."""
+        """Return what each sample shows, shape (y, x)."""
         filled = np.empty(self.lattice.raster.shape, np.float32)
         self._evaluate(FILLED_SPLINE, filled)
         seen = np.where(filled > 0.5, np.uint8(_WORKPIECE), np.uint8(_VOID))
@@ -216,15 +157,7 @@ class SplineFrame:
         return seen
 
     def values(self, name: str, material: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """One field, shape (y, x).
-
-        Parameters
-        ----------
-        name : str
-            One of `SPLINE_FIELDS` before ``filled``.
-        material : ndarray
-            What each sample shows, as of `material`.
-        """
+        """Return one field of `SPLINE_FIELDS` before ``filled``, shape (y, x)."""
         number = _SAMPLED.index(name)
         result = np.empty(self.lattice.raster.shape, np.float32)
         self._evaluate(number, result)

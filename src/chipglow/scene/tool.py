@@ -85,42 +85,19 @@ class Tool(ABC):
         )
 
     def rake_point(self, distance: ArrayLike) -> NDArray[np.float64]:
-        """Points on the rake face.
-
-        Parameters
-        ----------
-        distance : array_like
-            Distance in m up the straight rake face from its lower end, `rake_foot`, shape (...).
-
-        Returns
-        -------
-        ndarray
-            x and y in m, shape (..., 2).
-        """
+        """Return x and y in m, shape (..., 2), at distances in m up the rake face from its foot."""
         along = np.asarray(distance, dtype=np.float64)[..., None]
         return np.asarray(self.rake_foot + along * np.array(self.rake_direction), dtype=np.float64)
 
     def face_coordinates(
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Distance of points up the rake face from `rake_foot`, and from the face into the chip.
-
-        Parameters
-        ----------
-        points : ndarray
-            x and y in m, shape (..., 2).
-        """
+        """Return distances of points (..., 2) up the rake face from its foot, and into the chip."""
         offset = points - self.rake_foot
         return offset @ np.array(self.rake_direction), offset @ np.array(self.rake_normal)
 
     def signed_distance(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-        """Distance to the tool's surface in m, negative inside the tool.
-
-        Parameters
-        ----------
-        x, y : array_like
-            Positions in m, broadcast against each other.
-        """
+        """Return the distance of places in m to the tool's surface, negative inside the tool."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
         distance = surface_distances(
             np.ascontiguousarray(x).ravel(), np.ascontiguousarray(y).ravel(), self.surface
@@ -128,18 +105,7 @@ class Tool(ABC):
         return np.asarray(distance, dtype=np.float64).reshape(x.shape)
 
     def outline(self, length: float) -> NDArray[np.float64]:
-        """Polyline from the rake face round the edge to the flank face.
-
-        Parameters
-        ----------
-        length : float
-            Length of either face beyond the first and the last corner in m.
-
-        Returns
-        -------
-        ndarray
-            x and y in m, shape (n, 2).
-        """
+        """Return points (n, 2) round the edge, and on the faces this far beyond it, in m."""
         rake, clearance = np.array(self.rake_direction), np.array(self.clearance_direction)
         pieces = np.concatenate([[-rake], np.diff(self.corners, axis=0), [clearance]])
         heading = np.unwrap(np.arctan2(pieces[:, 1], pieces[:, 0]))
@@ -330,13 +296,7 @@ class ToolGeometry(Tool, Part):
 
 
 def check_angles(rake_angle: float, clearance_angle: float) -> None:
-    """Check the angles of a tool's faces, in rad.
-
-    Raises
-    ------
-    ValueError
-        If an angle is impossible; the message names it, its value and what was expected.
-    """
+    """Raise a ValueError if the angles of a tool's faces, in rad, are impossible."""
     if not abs(rake_angle) < STEEPEST_RAKE:
         raise ValueError(
             f"rake_angle: expected -60 to 60 degrees, got {degrees(rake_angle):g} degrees"

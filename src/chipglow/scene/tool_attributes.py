@@ -15,11 +15,7 @@ _HONE: Final = ("tool_hone_rake", "tool_hone_clearance")
 
 
 def tool_attributes(tool: Tool) -> dict[str, Any]:
-    """The tool as attributes of a dataset: angles in rad, lengths in m.
-
-    An outline is one row of numbers, x and y in turn; the tip of a tool that is not at the origin
-    is x and y.
-    """
+    """Return the tool as attributes of a dataset: angles in rad, lengths in m."""
     if isinstance(tool, PlacedTool):
         return {**tool_attributes(tool.tool), "tool_tip": np.array(tool.tip)}
     if isinstance(tool, ToolOutline):
@@ -34,13 +30,7 @@ def tool_attributes(tool: Tool) -> dict[str, Any]:
 
 
 def stored_tool(attributes: Mapping[str, Any]) -> Tool | None:
-    """The tool that attributes of a dataset describe, if they do.
-
-    Raises
-    ------
-    ValueError
-        If they describe a tool that cannot be.
-    """
+    """Return the tool that attributes of a dataset describe, if they do."""
     tool = _tool_at_origin(attributes)
     if tool is None or "tool_tip" not in attributes:
         return tool

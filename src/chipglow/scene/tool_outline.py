@@ -24,15 +24,7 @@ _ORDER: Final = (
 
 
 class ToolOutlineError(ValueError):
-    """An outline that no tool can have.
-
-    Parameters
-    ----------
-    message : str
-        Value and expectation.
-    point : int
-        Number of the point that is to blame, from 0.
-    """
+    """An outline that no tool can have; `point` is the number of the first wrong point, from 0."""
 
     def __init__(self, message: str, point: int = 0) -> None:
         super().__init__(message)
@@ -43,21 +35,6 @@ class ToolOutlineError(ValueError):
 class ToolOutline(Tool):
     """A tool with straight lines between given points and straight faces beyond the outer ones.
 
-    Parameters
-    ----------
-    points : tuple of (float, float)
-        x and y in m, from the rake face round the edge to the flank face, so that the tool is
-        on the left of one who walks along; the axes are those of the scene, the lowest point is on
-        y = 0. `ToolOutline.placed` moves an outline there.
-
-    Raises
-    ------
-    ToolOutlineError
-        If a value is not finite, the points are too few, too many, too far apart or the same, the
-        line crosses itself or turns back, or a face has an impossible angle.
-
-    Notes
-    -----
     The straight rake face is the longest stretch from the first point on that stays within 0.2 um
     of the line through its ends; the flank face is the same from the last point back. They
     give rake and clearance angle and go on straight beyond the outer points. What is between them
@@ -65,6 +42,8 @@ class ToolOutline(Tool):
     """
 
     points: tuple[tuple[float, float], ...]
+    """x and y in m from the rake face round the edge to the flank face, the tool on their left, the
+    lowest point on y = 0; `placed` moves an outline there."""
 
     def __post_init__(self) -> None:
         _check_points(self.corners)
@@ -76,21 +55,7 @@ class ToolOutline(Tool):
 
     @classmethod
     def placed(cls, points: ArrayLike) -> "ToolOutline":
-        """Outline moved to where the cut is.
-
-        Its lowest point comes to y = 0; the leftmost point of the edge, between the straight faces,
-        comes to x = 0.
-
-        Parameters
-        ----------
-        points : array_like
-            x and y in m, shape (n, 2), in the order of `ToolOutline`.
-
-        Raises
-        ------
-        ToolOutlineError
-            As `ToolOutline`.
-        """
+        """Move an outline: its lowest point to y = 0, the leftmost of the edge to x = 0."""
         line = np.asarray(points, dtype=np.float64)
         _check_points(line)
         edge = line[_straight_end(line) : len(line) - _straight_end(line[::-1])]

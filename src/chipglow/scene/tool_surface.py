@@ -46,17 +46,9 @@ def surface_of(
     rake: tuple[float, float],
     clearance: tuple[float, float],
 ) -> ToolSurface:
-    """ToolSurface at a distance from a chain of corners between two straight faces.
+    """Return the surface at a distance in m from a chain of corners between two straight faces.
 
-    Parameters
-    ----------
-    corners : ndarray
-        x and y in m from the rake face round the edge to the flank face, shape (n, 2). One
-        corner is the rounded wedge.
-    radius : float
-        Distance of the surface from the chain in m: the radius of the rounded corners.
-    rake, clearance : tuple of float
-        Unit vectors along the faces, away from the edge.
+    Corners (n, 2) go from the rake face round the edge; faces are unit vectors away from it.
     """
     normals = (-rake[1], rake[0]), (clearance[1], -clearance[0])
     offsets = ((corners - corners[-1]) @ np.array(normals).T).max(axis=0)
@@ -104,7 +96,7 @@ def _chain(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @njit(cache=True)
 def surface_distance(x, y, tool):  # type: ignore[no-untyped-def]
-    """Signed distance to a `ToolSurface`, negative inside, and its outward normal."""
+    """Return the signed distance to a `ToolSurface`, negative inside, and its outward normal."""
     if tool.chain.shape[0] == 0:
         return _wedge_distance(x, y, tool)
     return _chain_distance(x, y, tool)
@@ -112,7 +104,7 @@ def surface_distance(x, y, tool):  # type: ignore[no-untyped-def]
 
 @njit
 def surface_bound(x, y, tool):  # type: ignore[no-untyped-def]
-    """Lower bound of the signed distance, cheaper than it: all that is far is told by it."""
+    """Return a lower bound of the signed distance, cheaper than it."""
     px, py = x - tool.x, y - tool.y
     rake = tool.rake_normal_x * px + tool.rake_normal_y * py - tool.rake_offset
     clearance = tool.clearance_normal_x * px + tool.clearance_normal_y * py - tool.clearance_offset
@@ -189,7 +181,7 @@ def _side(x, y, tool, piece, place):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def surface_distances(x, y, tool):  # type: ignore[no-untyped-def]
-    """Signed distances of many places, shape (n,)."""
+    """Return the signed distances of many places, shape (n,)."""
     result = np.empty(x.size)
     for i in range(x.size):
         result[i] = surface_distance(x[i], y[i], tool)[0]

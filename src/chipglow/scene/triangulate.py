@@ -20,24 +20,13 @@ DIVISIONS: Final = 4
 
 @dataclass(frozen=True)
 class Triangulated:
-    """Elements as triangles.
-
-    Parameters
-    ----------
-    points : ndarray
-        Positions of the nodes, shape (nodes, axes).
-    values : ndarray
-        Fields of the nodes, shape (nodes, fields).
-    triangles : ndarray
-        Numbers of the nodes, shape (triangles, 3).
-    element : ndarray
-        Number of the element that each triangle is a piece of, shape (triangles,).
-    """
+    """Elements as triangles (n, 3) of nodes (nodes, axes) with values (nodes, fields)."""
 
     points: NDArray[np.float64]
     values: NDArray[np.float64]
     triangles: NDArray[np.int64]
     element: NDArray[np.int64]
+    """Number of the element that each triangle is a piece of, shape (triangles,)."""
 
 
 def triangulate(
@@ -53,15 +42,6 @@ def triangulate(
     element is mapped by its own shape functions, edges too, and cut into pieces of a quarter of
     its edges: a field with second derivative f'' along an edge of length h is off by up to
     f'' h^2 / 128 in a triangle's edge, a quarter of that for every doubling of the mesh.
-
-    Parameters
-    ----------
-    shape : str
-        Shape of the elements, a key of `NODES`.
-    points, values : ndarray
-        Positions and fields of the nodes, shape (nodes, axes) and (nodes, fields).
-    elements : ndarray
-        Numbers of the nodes of each element, shape (elements, `NODES`).
     """
     if shape == "triangle":
         return Triangulated(points, values, elements, np.arange(len(elements)))

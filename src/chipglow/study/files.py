@@ -36,10 +36,7 @@ def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
 
 
 def study_text(study: Study) -> str:
-    """A study as YAML, every field with a comment; `load_study` reads the same study from it.
-
-    The section of the cut is left out where a scene takes its place and nothing was said of it.
-    """
+    """Return a study as YAML, every field with a comment; `load_study` reads it back."""
     unused = {"cutting"} if study.scene and "cutting" not in study.given else set()
     return commented_yaml(_HEADER, study, unused)
 

@@ -32,11 +32,7 @@ class Fitted:
 
 
 def fit(study: Study, scene: Scene) -> Fitted:
-    """Fit a study to a scene that lacks material coordinates or a tool, as imports often do.
-
-    Textures then move by the mean velocities of their features, as the paper's did, and the tool
-    is that of the study's section cutting.tool, if it is given there.
-    """
+    """Fit a study to a scene that lacks material coordinates or a tool, as imports often do."""
     surfaces = surfaces_of(study.surface, study.seed)
     notes = Notes()
     assumed = notes.assumed

@@ -7,12 +7,13 @@ from functools import partial
 from json import dumps
 from pathlib import Path
 from time import monotonic
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import xarray as xr
 
 from chipglow.analysis import (
     Analysis,
+    Progress as Progress,
     analyse,
     cut_spots,
     lacking,
@@ -34,9 +35,6 @@ from chipglow.study.cache import scene_path
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
-
-Progress: TypeAlias = Callable[[str, float], None]
-"""Told which step is under way and how much of it is done, 0 to 1."""
 
 CUTTING_STEP: Final = "cutting simulation"
 PREVIEW_STEP: Final = "preview"
@@ -91,22 +89,22 @@ def cut(
 
 
 def _silent(step: str, fraction: float) -> None:
-    """Tell nobody."""
+    pass
 
 
 def is_cut(study: Study) -> bool:
-    """Whether the study's scene is in the cache."""
+    """Return whether the study's scene is in the cache."""
     return _is_whole(scene_path(_inputs(study)))
 
 
 def is_damaged(study: Study) -> bool:
-    """Whether the study's scene in the cache is damaged; `cut` computes it again."""
+    """Return whether the study's scene in the cache is damaged; `cut` computes it again."""
     path = scene_path(_inputs(study))
     return path.exists() and not _is_whole(path)
 
 
 def kept_progress(study: Study) -> float:
-    """Fraction of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
+    """Return the fraction of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
     return max((left.progress for left in unfinished_scenes(scene_path(_inputs(study)))), default=0)
 
 
@@ -152,10 +150,7 @@ def errors(
     resume: bool = False,
     assume: Callable[[str], None] | None = None,
 ) -> Analysis:
-    """Measurement error of any scene, exposure by exposure, at the study's places; see `run`.
-
-    The scene needs no more than its temperature; it need not show a cut.
-    """
+    """Return the measurement error of any scene, exposure by exposure, at the study's places."""
     any_scene = unchecked(study, analysis=replace(study.analysis, cut=False))
     return run(any_scene, progress, resume, assume)
 
@@ -212,7 +207,7 @@ def _fitted(
     resume: bool,
     assume: Callable[[str], None] | None,
 ) -> Iterator[Fitted]:
-    """The scene and the surfaces of a study; what is wrong with them names the scene's file."""
+    """Yield the scene and the surfaces of a study; errors name the scene's file."""
     path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
     try:
         fitted = fit(study, open_scene(path))
@@ -229,7 +224,7 @@ def _fitted(
 
 
 def _inputs(study: Study) -> dict[str, Any]:
-    """All that a scene depends on."""
+    """Return all that a scene depends on."""
     simulation = study.cutting.simulation()
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)

@@ -21,12 +21,7 @@ _SUB_FRAMES: Final = 10
 
 
 def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """A study's data with the defaults that follow from its feed, speed and camera.
-
-    Lengths of the cut, the window and the view go with the feed, the time between frames with the
-    time in which the chip moves as far; samples are a ninth of a pixel, and an exposure fits into
-    what is kept. What the study says itself stays. Data that are no study are refused later.
-    """
+    """Return a study's data with the defaults that follow from its feed, speed and camera."""
     cutting, camera = (study.get(name) or {} for name in ("cutting", "camera"))
     if study.get("scene", "none") not in ("none", None) or not isinstance(cutting, Mapping):
         return dict(study)
@@ -75,7 +70,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
 
 
 def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """A camera's data with the pitch on the scene that its data sheet makes."""
+    """Return a camera's data with the pitch on the scene that its data sheet makes."""
     detector, magnification = (camera.get(name) for name in ("detector_pitch", "magnification"))
     if detector in (None, "none"):
         return dict(camera)

@@ -71,15 +71,12 @@ class Study(Part):
         return replace(self.analysis, rake_chip=name, band_chip=name)
 
     def with_steady_tool(self) -> Self:
-        """The same study with a tool that has been cutting for long."""
+        """Return the same study with a tool that has been cutting for long."""
         return changed(self, {"cutting.tool.temperature": STEADY})
 
     @property
     def is_papers(self) -> bool:
-        """Whether it cuts, looks and reads as the paper does: its figures may stand beside it.
-
-        How finely it is computed, and how often drawn, does not matter.
-        """
+        """Whether it cuts, measures and reads as the paper does, finely or coarsely."""
         paper = type(self)()
         names = ("numerics", "window", "field_of_view", "cutting_length")
         finely = {name: getattr(paper.cutting, name) for name in names}
@@ -93,7 +90,7 @@ class Study(Part):
 
     @classmethod
     def quick(cls) -> Self:
-        """The paper's study on a coarse cell and coarse samples, for a first look and for tests."""
+        """Return the paper's study on a coarse cell and coarse samples."""
         title = "Quick look at the study of Heigel and Whitenton (2010)"
         cutting = {
             "numerics.cell": "20 um",
@@ -107,7 +104,7 @@ class Study(Part):
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
-        """The data with the surface's usual kind, and with what follows from feed and camera."""
+        """Return the data with the surface's usual kind, and what follows from feed and camera."""
         if not isinstance(data, Mapping):
             return data
         surface = data.get("surface")

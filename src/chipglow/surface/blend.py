@@ -43,42 +43,31 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 
 
 class Textures(NamedTuple):
-    """What `blend_row` needs of several surfaces that move alike.
-
-    Parameters
-    ----------
-    scale : numpy.float32
-        Nodes in a m.
-    maps : ndarray
-        `padded` deviates of workpiece, chip and shear band, shape (feature, seed, nodes).
-    seed_numbers : ndarray
-        Which of the seeds each surface has.
-    linear : ndarray
-        Mean and standard deviation of a surface's feature, shape (surface, feature, 2); the
-        deviation is NaN where the table says what a deviate stands for.
-    tables : ndarray
-        What a deviate stands for, shape (surface, feature, entry).
-    tool_maps : ndarray
-        Emissivity of the tool, shape (surface, y, x).
-    """
+    """Textures of several surfaces that move alike, for `blend_row`."""
 
     scale: np.float32
+    """Nodes per m."""
     maps: NDArray[np.float32]
+    """`padded` deviates of workpiece, chip and shear band, shape (feature, seed, nodes)."""
     seed_numbers: NDArray[np.int64]
+    """Number of each surface's seed."""
     linear: NDArray[np.float32]
+    """Mean and standard deviation, shape (surface, feature, 2); NaN where the table holds."""
     tables: NDArray[np.float32]
+    """Emissivity by deviate, shape (surface, feature, entry)."""
     tool_maps: NDArray[np.float32]
+    """Emissivity of the tool, shape (surface, y, x)."""
 
 
 def padded(nodes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A periodic map with the nodes about its border, so that no index wraps: one row, flat."""
+    """Return a periodic map with the nodes about its border, so that no index wraps, flat."""
     around = np.arange(-1, _WIDTH - 1) & _WRAP
     return np.ascontiguousarray(nodes[around[:, None], around]).ravel()
 
 
 @njit(forceinline=True, **_FAST)
 def fraction_between(value, none, full):  # type: ignore[no-untyped-def]
-    """How far a value has come from `none` to `full`, 0 to 1."""
+    """Return how far a value has come from `none` to `full`, 0 to 1."""
     result = (value - np.float32(none)) * np.float32(1.0 / (full - none))
     return min(max(result, np.float32(0.0)), np.float32(1.0))
 

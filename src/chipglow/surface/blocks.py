@@ -11,18 +11,7 @@ from numba import get_num_threads
 
 
 def in_blocks(count: int, work: Callable[[int, int], None], size: int = 16) -> None:
-    """Do work on all rows of an image, or all columns, a block in each call.
-
-    Parameters
-    ----------
-    count : int
-        How many there are.
-    work : callable
-        Works on those from the first number up to, not including, the second. What it does to one
-        of them must not depend on other blocks.
-    size : int
-        How many are in a block.
-    """
+    """Work on rows (or columns) from a first up to a last number, a block in each call."""
     firsts = range(0, count, size)
     with ThreadPoolExecutor(get_num_threads()) as pool:
         list(pool.map(work, firsts, (min(first + size, count) for first in firsts)))

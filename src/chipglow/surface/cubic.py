@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def cubic_convolution(distance: ArrayLike) -> NDArray[np.float64]:
-    """Kernel of Keys (1981) with a = −1/2: weight of a node over its distance in nodes."""
+    """Return the kernel of Keys (1981), a = −1/2: a node's weight by its distance in nodes."""
     u = np.abs(np.asarray(distance, dtype=np.float64))
     near = (1.5 * u - 2.5) * u**2 + 1.0
     far = ((-0.5 * u + 2.5) * u - 4.0) * u + 2.0
@@ -15,7 +15,7 @@ def cubic_convolution(distance: ArrayLike) -> NDArray[np.float64]:
 
 
 def autocorrelation() -> NDArray[np.float64]:
-    """Overlap of the kernel with itself, for lags of −3 to 3 nodes."""
+    """Return the overlap of the kernel with itself, for lags of −3 to 3 nodes."""
     # Between nodes the product is a polynomial of degree 6: four Gauss points are exact.
     node, weight = np.polynomial.legendre.leggauss(4)
     pieces = np.arange(-2.0, 2.0)[:, None] + (node + 1.0) / 2.0

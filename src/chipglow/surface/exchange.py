@@ -31,18 +31,6 @@ class Exchange:
     borders of bodies, whose inside no ray reaches. Every element has one temperature and
     emissivity, reflects grey and partly like a mirror, the rest diffusely.
 
-    Parameters
-    ----------
-    starts, ends : ndarray
-        Ends of the elements in m, shape (element, 2).
-    rays : int
-        Rays that leave each element, evenly over its length and the sine of their angle.
-
-    Raises
-    ------
-    ValueError
-        If there is no element, one has no length, or there are no rays.
-
     Notes
     -----
     In a cross-section a diffuse element sends (1/2) d(sin φ) of its radiation into the angle dφ
@@ -56,7 +44,9 @@ class Exchange:
 
     starts: NDArray[np.float64]
     ends: NDArray[np.float64]
+    """Ends of the elements in m, shape (element, 2)."""
     rays: int = RAYS
+    """Rays that leave each element, evenly over its length and the sine of their angle."""
 
     def __post_init__(self) -> None:
         shape = self.starts.shape
@@ -101,23 +91,10 @@ class Exchange:
         surroundings: float = 0.0,
         mirror: ArrayLike = 0.0,
     ) -> NDArray[np.float64]:
-        """What falls on every element from all sides, as the radiance of a hemisphere.
+        """Return the irradiation over π of each element, shape (..., element).
 
-        Parameters
-        ----------
-        radiance : array_like
-            Radiance of a blackbody of the element's temperature, shape (..., element).
-        emissivity : array_like
-            Emissivity of the elements, broadcast against it.
-        surroundings : float
-            Radiance of the surroundings.
-        mirror : array_like
-            Fraction of the reflected light that is reflected as by a mirror, of the elements.
-
-        Returns
-        -------
-        ndarray
-            Irradiation over π, in the unit of the radiance, shape (..., element).
+        Of blackbodies' radiance (..., element), emissivities, the surroundings' radiance, and
+        the fraction of reflected light that is reflected as by a mirror.
         """
         return self._incident(radiance, emissivity, surroundings, mirror, None)
 
@@ -129,22 +106,10 @@ class Exchange:
         surroundings: float = 0.0,
         mirror: ArrayLike = 0.0,
     ) -> NDArray[np.float64]:
-        """Incident radiance whose reflection an eye far off in one direction sees.
+        """Return the incident radiance whose reflection an eye far off in a direction (2,) sees.
 
         The eye sees ε L + (1 − ε) times it: the irradiation for the diffuse fraction of the
         reflected light, the radiance in the mirrored direction for the rest.
-
-        Parameters
-        ----------
-        direction : array_like
-            From the elements to the eye in the cross-section, shape (2,).
-        radiance, emissivity, surroundings, mirror
-            As for `irradiation`.
-
-        Returns
-        -------
-        ndarray
-            In the unit of the radiance, shape (..., element).
         """
         toward = np.asarray(direction, np.float64)
         return self._incident(radiance, emissivity, surroundings, mirror, toward)

@@ -31,18 +31,13 @@ class SideElements:
 
     Places are (depth, height) in m: depth from the rake face into the chip, height from the side of
     the tool to the camera.
-
-    Parameters
-    ----------
-    exchange : Exchange
-        The elements: those of the tool's side, of the rake face, then of the chip's side.
-    tool_side, rake_face : int
-        How many belong to the first two.
     """
 
     exchange: Exchange
+    """The elements: those of the tool's side, of the rake face, then of the chip's side."""
     tool_side: int
     rake_face: int
+    """Number of elements of the first two."""
 
     @property
     def depths(self) -> NDArray[np.float64]:
@@ -139,44 +134,16 @@ class SideShape(Part, ABC):
         emissivity: ArrayLike,
         surroundings: float = 0.0,
     ) -> NDArray[np.float64]:
-        """Incident radiance whose reflection the camera sees.
-
-        Parameters
-        ----------
-        radiance : array_like
-            Radiance of a blackbody as warm as each of the `elements`, shape (..., element).
-        emissivity : array_like
-            Emissivity of the elements, broadcast against it.
-        surroundings : float
-            Radiance of the surroundings.
-
-        Returns
-        -------
-        ndarray
-            In the unit of the radiance, shape (..., element).
-        """
+        """Return the incident radiance whose reflection the camera sees, as `Exchange.seen`."""
         seen = self.elements.exchange.seen
         return seen(TOWARD_CAMERA, radiance, emissivity, surroundings, self.mirror)
 
     def effective_emissivity(
         self, chip: float, tool: float, tool_radiance: float = 1.0, surroundings: float = 0.0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """What the camera sees of an isothermal chip, over the radiance of a blackbody as warm.
+        """Return depths in m into an isothermal chip, and what the camera sees there.
 
-        Parameters
-        ----------
-        chip, tool : float
-            Emissivities; `rake_emissivity` takes the place of the tool's on the rake face.
-        tool_radiance, surroundings : float
-            Radiance of a blackbody as warm as the tool and of the surroundings, over that of one as
-            warm as the chip.
-
-        Returns
-        -------
-        depths : ndarray
-            Depth into the chip in m, shape (n,).
-        emissivity : ndarray
-            Effective emissivity there; over 1 where more is reflected than a blackbody emits.
+        All radiances are over that of a blackbody as warm as the chip.
         """
         elements = self.elements
         count = len(elements.exchange.lengths)

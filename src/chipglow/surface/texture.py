@@ -24,21 +24,6 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinl
 class Texture:
     """A periodic map of emissivity: deviates, enlarged by cubic convolution.
 
-    Parameters
-    ----------
-    nodes : ndarray
-        Deviates at the nodes of the small map, float32 of shape (`MAP_SIZE`, `MAP_SIZE`); rows go
-        with y, columns with x.
-    grain : float
-        Distance between the nodes in m.
-    emissivity : Emissivity
-        What the enlarged deviates stand for.
-
-    Raises
-    ------
-    ValueError
-        If the shape is another, or the grain is not positive.
-
     Notes
     -----
     Heigel and Whitenton (2010) enlarge a small map of normal deviates with MATLAB's ``imresize``:
@@ -47,7 +32,9 @@ class Texture:
     """
 
     nodes: NDArray[np.float32]
+    """Deviates of the small map, float32, `MAP_SIZE` a side; rows go with y, columns with x."""
     grain: float
+    """Distance between the nodes in m."""
     emissivity: Emissivity
 
     def __post_init__(self) -> None:
@@ -67,20 +54,7 @@ class Texture:
         *,
         restore_standard_deviation: bool,
     ) -> "Texture":
-        """Texture of normal deviates.
-
-        Parameters
-        ----------
-        emissivity : Emissivity
-            Mean and standard deviation of the emissivity.
-        grain : float
-            Size of one deviate in m.
-        generator : numpy.random.Generator
-            Where the deviates come from.
-        restore_standard_deviation : bool
-            Widen the deviates so that the enlarged map has the standard deviation asked for;
-            without it the small map has it, and the enlarged one about a fifth less.
-        """
+        """Return a texture of normal deviates, widened or not for what enlarging takes away."""
         deviates = generator.standard_normal((MAP_SIZE, MAP_SIZE))
         if restore_standard_deviation:
             deviates /= _enlarged_standard_deviation(deviates)
@@ -108,13 +82,7 @@ class Texture:
         return self.at(along[None, :], along[:, None]).astype(np.float64)
 
     def at(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float32]:
-        """Emissivity of the enlarged map.
-
-        Parameters
-        ----------
-        x, y : array_like
-            Positions in m, broadcast against each other.
-        """
+        """Return the emissivity of the enlarged map at places in m."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
         result = np.empty(x.size, dtype=np.float32)
         _look_up(
@@ -145,10 +113,7 @@ def _enlarged_standard_deviation(nodes: NDArray[np.float64]) -> float:
 
 @njit(**_FAST)
 def cubic_taps(position):  # type: ignore[no-untyped-def]
-    """Number of the node before a position and the weights, float32, of the four around it.
-
-    Of a position in float32, which is faster, the weights are good to 1e-5 up to 150 nodes off.
-    """
+    """Return the node before a position and the weights, float32, of the four around it."""
     before = np.floor(position)
     s = np.float32(position - before)
     one, half = np.float32(1.0), np.float32(0.5)
@@ -160,7 +125,7 @@ def cubic_taps(position):  # type: ignore[no-untyped-def]
 
 @njit(**_FAST)
 def enlarged(nodes, down, across):  # type: ignore[no-untyped-def]
-    """Deviate of the enlarged map between the nodes of two `cubic_taps`."""
+    """Return the deviate of the enlarged map between the nodes of two `cubic_taps`."""
     i, e, f, g, h = down
     j, a, b, c, d = across
     wrap = MAP_SIZE - 1  # the size is a power of two, so the lower bits are the remainder
@@ -175,7 +140,7 @@ def enlarged(nodes, down, across):  # type: ignore[no-untyped-def]
 
 @njit(**_FAST)
 def emissivity_at(deviate, table):  # type: ignore[no-untyped-def]
-    """Emissivity at a normal deviate, by straight lines between the entries of its table."""
+    """Return the emissivity at a normal deviate, linear between the entries of its table."""
     position = (deviate + np.float32(REACH)) * np.float32(STEPS)
     inside = min(max(position, np.float32(0.0)), np.float32(_LAST))
     i = min(np.int32(inside), np.int32(_LAST - 1))

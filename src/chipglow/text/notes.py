@@ -7,10 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Notes:
-    """Assumptions, warnings and remarks on a result; each is a whole sentence.
-
-    The lists grow while a result is made. ``a + b`` holds each sentence of both once.
-    """
+    """Assumptions, warnings and remarks on a result in sentences; ``a + b`` holds each once."""
 
     assumed: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)

@@ -51,10 +51,7 @@ def parse_yaml(text: str) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """Loader that refuses duplicate keys and reads numbers as YAML 1.2.
-
-    So 1e-3 is a number, and 4:8 is not 248, which YAML 1.1 reads in base 60.
-    """
+    """Loader that refuses duplicate keys and reads numbers as YAML 1.2: 4:8 is not 248."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()
