@@ -25,7 +25,7 @@ from matplotlib.colors import hsv_to_rgb
 from PIL import Image
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap
+from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
 from chipglow.scene import Raster
 
 COLDEST, HOTTEST = 293.0, 1400.0
@@ -200,7 +200,7 @@ def read_with_legend(
 ) -> Reading:
     """Draw, encode and read a movie whose legend has to be found; SourceError if it is refused."""
     encode(path, (with_legend(number, colours, edges) for number in range(count)), codec)
-    movies = {"temperature": FieldMovie(path, (COLDEST, HOTTEST), Legend())}
+    movies = {"temperature": FieldMovie(path, (COLDEST, HOTTEST))}
     rows, columns = FIELD_SHAPE
     crop = (0, 0, columns, rows)
     source = MovieSource(movies, PIXEL, (0.0, rows), crop=crop, frame_interval=1e-6)

@@ -39,6 +39,7 @@ from chipglow.camera import (
     FittedCalibration,
     GainPattern,
     GaussianPSF,
+    LinearCalibration,
     MeasuredPSF,
     Measurement,
     OffsetPattern,
@@ -46,15 +47,15 @@ from chipglow.camera import (
     ReadNoise,
     Recording,
     ShotNoise,
-    fit_linear,
+    fit_calibration,
 )
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
     EmissivityLine,
-    ReflectedTemperature,
     determine_emissivity,
     load_regions,
+    reflected_temperature,
     true_temperature,
 )
 from chipglow.laboratory.emissivity.emissivity import Heating
@@ -363,7 +364,8 @@ class Evaluation:
             self.folder / "points.csv",
             lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
         )
-        fit = fit_linear(
+        fit = fit_calibration(
+            LinearCalibration,
             points["temperature"],
             points["counts"],
             BAND,
@@ -403,7 +405,7 @@ class Evaluation:
             self.images("unknown-*.hcc"),
             found["shear band"],
             EmissivityLine.constant(1.0),
-            ReflectedTemperature(293.0, ROOM),
+            reflected_temperature(293.0, ROOM),
         )
         return {
             "blackbody": Found.of(unknown.estimate),

@@ -27,8 +27,7 @@ from chipglow.io.cameras.binary import (
     text_of,
 )
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import reading
-from chipglow.io.sources.source import required
+from chipglow.io.sources.source import reading, required
 from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes
 

@@ -14,8 +14,8 @@ from chipglow.io.cameras.ptw import is_ptw, read_ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import reading
 from chipglow.io.sources.file_order import files_of
+from chipglow.io.sources.source import reading
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520

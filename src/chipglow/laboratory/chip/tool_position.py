@@ -1,10 +1,9 @@
-"""How uncertain the place of a tool is, and what that makes uncertain."""
+"""Uncertainty of the place of a tool, and of what is read by the tool."""
 
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import isfinite
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,8 @@ from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.band_ridge import ThermalImage
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities.units import ANGLE, LENGTH, POSITION
 from chipglow.scene import Tool
 from chipglow.uncertainty import Cause, Component
 
@@ -24,7 +24,7 @@ TOOL_BUDGET: Final = ("tool along", "tool across", "tool angle")
 
 
 def tool_of(measurement: Measurement, given: Tool | None = None) -> Tool:
-    """The given tool, or else the measurement's own."""
+    """Return the given tool, or else the measurement's own."""
     tool = measurement.tool if given is None else given
     if tool is None:
         raise ValueError(
@@ -35,52 +35,42 @@ def tool_of(measurement: Measurement, given: Tool | None = None) -> Tool:
 
 
 @dataclass(frozen=True)
-class ToolUncertainty:
+class ToolUncertainty(Part):
     """Standard uncertainties of the place of a tool, independent of each other."""
 
-    along: float
-    """Of the tip along the rake face in m."""
-    across: float
-    """Of the rake face across itself in m, where `pivot` is."""
-    angle: float = 0.0
-    """Of the rake angle in rad."""
-    pivot: float = 0.0
-    """Where on the rake face its place and its angle are independent: the distance in m up the
-    straight face from its lower end.
-    """
-
-    def __post_init__(self) -> None:
-        for name in ("along", "across", "angle"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0):
-                raise ValueError(f"tool uncertainty: {name} is {value!r}, expected 0 or more")
-        if not isfinite(self.pivot):
-            raise ValueError(f"tool uncertainty: pivot is {self.pivot!r} m, expected a finite one")
+    along: Annotated[float, Parameter("Of the tip along the rake face.", LENGTH, least=0.0)]
+    across: Annotated[
+        float, Parameter("Of the rake face across itself, at `pivot`.", LENGTH, least=0.0)
+    ]
+    angle: Annotated[float, Parameter("Of the rake angle.", ANGLE, least=0.0)] = 0.0
+    pivot: Annotated[
+        float,
+        Parameter(
+            "Distance up the straight face at which place and angle are independent.", POSITION
+        ),
+    ] = 0.0
 
     def displacements(self, tool: Tool, points: Array) -> Array:
-        """How far points that are fixed to the tool move, one standard uncertainty at a time."""
+        """Return the moves of points fixed to the tool by each standard uncertainty, in m."""
         direction, normal = np.array(tool.rake_direction), np.array(tool.rake_normal)
         offset = points - tool.rake_point(self.pivot)
         up, out = offset @ direction, offset @ normal
         turned = out[..., None] * direction - up[..., None] * normal
-        moved = np.broadcast_to(self.along * direction, points.shape)
-        return np.stack(
-            [moved, np.broadcast_to(self.across * normal, points.shape), self.angle * turned]
-        )
+        moves = (self.along * direction, self.across * normal, self.angle * turned)
+        return np.stack([np.broadcast_to(move, points.shape) for move in moves])
 
     def component(self, tool: Tool, effects: Iterable[Array]) -> Component:
-        """The component that the place of a tool makes."""
+        """Return the component ``tool`` with the effects of each standard uncertainty."""
         columns = np.stack([one.ravel() for one in effects], axis=1)
         identity = hashlib.sha256(repr((tool, self)).encode()).hexdigest()[:16]
         return Component(Cause(TOOL, identity, len(TOOL_BUDGET), parts=TOOL_BUDGET), columns)
 
 
 def contribution(image: ThermalImage, points: Array, displacement: Array) -> Array:
-    """What a displacement by one standard uncertainty changes in what is read.
+    """Return the change of the temperature by a displacement of one standard uncertainty.
 
-    Half the difference between the temperatures on either side: the uncertainty of the position
-    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one side is
-    outside the image, the difference from the other.
+    It is half the difference between the temperatures on either side (JCGM 100, 5.1.3, note 2);
+    where one side is outside the image, the difference to the other.
     """
     (behind, no_behind), (here, _), (ahead, no_ahead) = (
         _read(image, points + side * displacement) for side in (-1, 0, 1)
@@ -90,7 +80,7 @@ def contribution(image: ThermalImage, points: Array, displacement: Array) -> Arr
 
 
 def _read(image: ThermalImage, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Temperatures in K, of the nearest pixel outside the image, and which are outside."""
+    """Return temperatures in K, of the nearest pixel outside the image, and which are outside."""
     row, column = image.index(points)
     rows, columns = image.temperature.shape
     outside = (row < 0) | (row > rows - 1) | (column < 0) | (column > columns - 1)

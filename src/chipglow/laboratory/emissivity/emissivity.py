@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot, inf, isfinite, nan, sqrt
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +23,14 @@ from chipglow.laboratory.emissivity.observations import (
     used_pixels,
     with_drift,
 )
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
+from chipglow.quantities.units import KELVINS, TEMPERATURE_DIFFERENCE
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
 from chipglow.uncertainty import Estimate, propagate
 
 COMMON: Final = ("reference", "reflected", "calibration")
-"""Causes of error that are the same for all pixels, frames and images."""
+"""Causes of error common to all pixels, frames and images."""
 
 BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
 """Lines of the budget of an emissivity."""
@@ -41,63 +42,53 @@ CONSTANT: Final = np.array([[1.0], [0.0]])
 """Design of a line from its constant."""
 
 _CLEARLY: Final = 5.0
+"""Standard uncertainties by which a heated object is hotter than its surroundings, at least."""
 
 
 @dataclass(frozen=True)
-class Heating:
-    """How an object was heated, and how well that is known; all in K.
+class Heating(Part):
+    """Temperatures of a heated object and of the surroundings that it reflects."""
 
-    Parameters
-    ----------
-    reference : float
-        True temperature of the object, as of a thermocouple.
-    reflected : float
-        Temperature of the surroundings that it reflects; the paper's 293 K by default.
-    reference_uncertainty, reflected_uncertainty : float
-        Standard uncertainties.
-    camera_uncertainty : float, optional
-        Standard uncertainty of the radiance temperature from the camera's calibration, common to
-        all pixels; by default that which the measurement states.
-    drift : float, optional
-        Relative standard uncertainty of the radiance from one recording to the next, such as 0.01
-        of a camera that warms up. By default it is what several recordings show; of one it is not
-        known, and not in the uncertainty.
-
-    Raises
-    ------
-    ValueError
-        If a temperature is not over 0 K, the reference is not over what is reflected, or an
-        uncertainty is negative.
-    """
-
-    reference: float
-    reflected: float = LABORATORY
-    reference_uncertainty: float = 0.0
-    reflected_uncertainty: float = 0.0
-    camera_uncertainty: float | None = None
-    drift: float | None = None
+    reference: Annotated[
+        float, Parameter("True temperature of the object, as of a thermocouple.", KELVINS, over=0.0)
+    ]
+    reflected: Annotated[
+        float, Parameter("Temperature of the surroundings.", KELVINS, over=0.0)
+    ] = LABORATORY
+    reference_uncertainty: Annotated[
+        float, Parameter("Standard uncertainty of `reference`.", TEMPERATURE_DIFFERENCE, least=0.0)
+    ] = 0.0
+    reflected_uncertainty: Annotated[
+        float, Parameter("Standard uncertainty of `reflected`.", TEMPERATURE_DIFFERENCE, least=0.0)
+    ] = 0.0
+    camera_uncertainty: Annotated[
+        float | None,
+        Parameter(
+            "Standard uncertainty of the radiance temperature by the camera's calibration, common "
+            "to all pixels; by default as the measurement states.",
+            TEMPERATURE_DIFFERENCE,
+            least=0.0,
+        ),
+    ] = None
+    drift: Annotated[
+        float | None,
+        Parameter(
+            "Relative standard uncertainty of the radiance from one recording to the next, by "
+            "default as several recordings show; of one it is not in the uncertainty.",
+            least=0.0,
+            under=1.0,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
-        for name in ("reference", "reflected"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise ValueError(f"{name}: is {value!r} K, expected over 0 K")
-        if self.reference <= self.reflected:
-            raise ValueError(
-                f"reference: {_celsius(self.reference)} is not hotter than what is reflected, "
-                f"{_celsius(self.reflected)}, expected a heated object"
-            )
-        for name in ("reference_uncertainty", "reflected_uncertainty", "camera_uncertainty"):
-            value = getattr(self, name)
-            if value is not None and not 0 <= value < inf:
-                raise ValueError(f"{name}: is {value!r} K, expected 0 K or more")
-        if self.drift is not None and not 0 <= self.drift < 1:
-            raise ValueError(f"drift: is {self.drift!r}, expected 0 to 1")
+        super().__post_init__()
         spread = hypot(self.reference_uncertainty, self.reflected_uncertainty)
-        if self.reference - self.reflected < _CLEARLY * spread:
+        hotter = self.reference - self.reflected
+        if hotter <= 0 or hotter < _CLEARLY * spread:
             raise ValueError(
-                f"reference: {_celsius(self.reference)} is over what is reflected by less than "
-                f"{_CLEARLY:g} standard uncertainties of {spread:.3g} K, expected a hotter object"
+                f"reference: {_celsius(self.reference)} must be over what is reflected, "
+                f"{_celsius(self.reflected)}, by {_CLEARLY:g} standard uncertainties of "
+                f"{spread:.3g} K or more"
             )
 
 
@@ -106,23 +97,20 @@ class EmissivityMap:
     """Emissivity of every pixel; made by `determine_emissivity`."""
 
     heating: Heating
-    """How the object was heated."""
     band: Band
-    """The camera's band."""
     raster: Raster
     radiance: Array
-    """Radiance in W/(m² sr) of every observation, shape (observation, y, x): the frames of one
-    image, or the means of several images. NaN where a frame is flagged.
+    """Radiance in W/(m² sr) of the frames of one image, or the means of several images, shape
+    (observation, y, x); NaN where flagged.
     """
     flags: NDArray[np.uint8]
     """All `Flag` that a pixel has in any frame, uint8, shape (y, x)."""
     calibration: Array | None
     """Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x)."""
     lower_limit: float = 0.0
-    """Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
-    """
+    """Lower range limit of the camera in K; 0 without one."""
     recordings: int = 1
-    """From how many recordings the observations are."""
+    """Number of recordings that the observations are from."""
 
     @property
     def hidden(self) -> float:
@@ -139,12 +127,12 @@ class EmissivityMap:
 
     @cached_property
     def identity(self) -> str:
-        """Tells these observations from others, and is the same in another run."""
+        """Hash that tells these observations from others."""
         return hashlib.sha256(self.radiance.tobytes()).hexdigest()[:16]
 
     @cached_property
     def emissivity(self) -> Array:
-        """Emissivity, shape (y, x); NaN where flagged. Noise can take it out of 0 to 1."""
+        """Emissivity, shape (y, x), not limited to 0 to 1; NaN where flagged."""
         return emissivity_of_radiance(self.mean_radiance, self.heating, self.band)
 
     @cached_property
@@ -152,17 +140,14 @@ class EmissivityMap:
         """Mean radiance over the observations in W/(m² sr), shape (y, x); NaN where flagged."""
         return np.asarray(self.radiance.mean(axis=0))
 
-    @cached_property
+    @property
     def radiance_temperature(self) -> Array:
         """Radiance temperature of the mean radiance in K, shape (y, x); NaN where flagged."""
         return np.asarray(self.band.temperature(self.mean_radiance), np.float64)
 
     @cached_property
     def estimate(self) -> Estimate:
-        """Emissivity with its uncertainty, shape (y, x); NaN where flagged.
-
-        Of one observation it is without the pixel's noise, of which then nothing is known.
-        """
+        """Emissivity, shape (y, x); its uncertainty omits the noise of a single observation."""
         relative = self.heating.drift
         effect = self.mean_radiance / self._contrast / sqrt(self.recordings)
         drift = None if relative is None else relative * effect
@@ -181,7 +166,7 @@ class EmissivityMap:
         )
 
     def of(self, area: Area) -> "RegionEmissivity":
-        """Mean emissivity of an area, and what makes it uncertain."""
+        """Compute the mean emissivity of an area."""
         used = used_pixels(area, self.mean_radiance, self.flags)
         values = emissivity_of_radiance(self.radiance[:, used.mask], self.heating, self.band)
         mean_radiance = float(self.mean_radiance[used.mask].mean())
@@ -194,22 +179,40 @@ class EmissivityMap:
             self.heating.drift, mean_radiance / self._contrast, self.recordings, repeatability
         )
         estimate = self._systematic(np.array(mean), mean_radiance, calibration)
-        result = RegionEmissivity(
+        estimate = with_drift(estimate, drift, self.identity) + (random - mean)
+        outside = (int((pixels < 0).sum()), int((pixels > 1).sum()))
+        return RegionEmissivity(
             name=area.name,
             feature=area.feature,
             whole=area.whole,
             heating=self.heating,
             used=used,
-            hidden=self.hidden,
             standard_deviation=float(pixels.std(ddof=1)),
-            outside=(int((pixels < 0).sum()), int((pixels > 1).sum())),
+            outside=outside,
             observed=values.mean(axis=1),
-            estimate=with_drift(estimate, drift, self.identity) + (random - mean),
+            estimate=estimate.with_warnings(*self._warnings(used, outside, mean)),
         )
-        return replace(result, estimate=result.estimate.with_warnings(*result._warnings()))
+
+    def _warnings(self, used: UsedPixels, outside: tuple[int, int], mean: float) -> Iterator[str]:
+        for text in used.warnings():
+            if used.flagged[Flag.UNDER_RANGE]:
+                text += (
+                    " The remaining pixels are brighter than the region, as the camera's range "
+                    f"hides emissivities below {self.hidden:.3g}."
+                )
+            elif used.flagged[Flag.SATURATED]:
+                text += " The remaining pixels are darker than the region."
+            yield text
+        darker = "under 0: they are darker than the stated surroundings."
+        brighter = "over 1: they are brighter than a blackbody of the true temperature."
+        for count, text in zip(outside, (darker, brighter), strict=True):
+            if count:
+                yield f"{used.name}: {count} of {used.count} pixels have an emissivity {text}"
+        if not 0 <= mean <= 1:
+            yield f"{used.name}: the mean emissivity is not within 0 to 1."
 
     def _systematic(self, values: Array, radiance: Any, calibration: Any) -> Estimate:
-        """Emissivities with what is common to all pixels, frames and images."""
+        """Return emissivities with the components of `COMMON`."""
 
         def found(reference: Any, reflected: Any) -> Any:
             ends = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
@@ -230,7 +233,7 @@ class EmissivityMap:
 
     @property
     def _contrast(self) -> float:
-        """Radiance of a blackbody at the true temperature over that of the surroundings."""
+        """Difference of blackbody radiance between object and surroundings."""
         radiance = self.band.radiance(np.array([self.heating.reference, self.heating.reflected]))
         return float(radiance[0] - radiance[1])
 
@@ -241,26 +244,19 @@ class RegionEmissivity:
 
     name: str
     feature: str
-    """The area's name, and the feature that it belongs to."""
     whole: bool
     """Whether the area is all that there is of the feature."""
     heating: Heating
-    """How the object was heated."""
     used: UsedPixels
-    hidden: float
-    """Lowest emissivity that the camera's range measures; 0 without a lower limit."""
     standard_deviation: float
-    """Standard deviation over the pixels: how much the surface varies from place to place, with
-    the pixels' noise. It is no uncertainty of the mean.
-    """
+    """Standard deviation over the pixels, with their noise; no uncertainty of the mean."""
     outside: tuple[int, int]
-    """How many pixels have an emissivity under 0, and over 1."""
+    """Numbers of pixels with an emissivity under 0, and over 1."""
     observed: Array
     """Mean emissivity of each observation, shape (observation,)."""
     estimate: Estimate
-    """Mean emissivity, with the components of `COMMON`, the same in all areas and images;
-    ``drift`` from recording to recording over the repeatability, the same in all areas of a
-    map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """Mean emissivity, with the components of `COMMON`; ``drift`` over the repeatability, the same
+    in all areas of a map; and ``random`` with the parts ``repeatability`` and ``noise``.
     """
 
     @property
@@ -270,7 +266,7 @@ class RegionEmissivity:
 
     @property
     def line(self) -> "EmissivityLine":
-        """The emissivity as a line over the temperature that is constant."""
+        """The emissivity as a constant line over the temperature."""
         return EmissivityLine(
             self.name,
             self.feature,
@@ -281,30 +277,6 @@ class RegionEmissivity:
             standard_deviation=self.standard_deviation,
         )
 
-    def _warnings(self) -> Iterator[str]:
-        for text in self.used.warnings():
-            if self.used.flagged[Flag.UNDER_RANGE]:
-                text += (
-                    " The remaining pixels are brighter than the region, as the camera's range "
-                    f"hides emissivities below {self.hidden:.3g}."
-                )
-            elif self.used.flagged[Flag.SATURATED]:
-                text += " The remaining pixels are darker than the region."
-            yield text
-        (under, over), count = self.outside, self.used.count
-        if under:
-            yield (
-                f"{self.name}: {under} of {count} pixels have an emissivity under 0: they "
-                "are darker than the stated surroundings."
-            )
-        if over:
-            yield (
-                f"{self.name}: {over} of {count} pixels have an emissivity over 1: they "
-                "are brighter than a blackbody of the true temperature."
-            )
-        if not 0 <= self.mean <= 1:
-            yield f"{self.name}: the mean emissivity is not within 0 to 1."
-
 
 @dataclass(frozen=True)
 class EmissivityLine:
@@ -312,11 +284,10 @@ class EmissivityLine:
 
     name: str
     feature: str
-    """Name of the area and of the feature that it belongs to."""
     estimate: Estimate
     """Emissivity at `middle`, and its change with temperature in 1/K; shape (2,)."""
     heatings: tuple[Heating, ...] = ()
-    """Heating of the object for each true temperature; empty if known from elsewhere."""
+    """Heating for each true temperature; empty if the emissivity is known from elsewhere."""
     means: tuple[float, ...] = ()
     uncertainties: tuple[float, ...] = ()
     """Mean emissivity at each temperature, and its standard uncertainty."""
@@ -327,7 +298,7 @@ class EmissivityLine:
 
     @classmethod
     def constant(cls, mean: float, standard_uncertainty: float = 0.0) -> "EmissivityLine":
-        """An emissivity from elsewhere, whose error is independent of the measurement's."""
+        """Return an emissivity from elsewhere, whose error is independent of the measurement's."""
         if not 0 < mean <= 1:
             raise ValueError(f"emissivity: is {mean!r}, expected over 0 to 1")
         if not 0 <= standard_uncertainty < inf:
@@ -353,26 +324,26 @@ class EmissivityLine:
         return float(self.estimate.values[1])
 
     def at(self, temperature: Any) -> Estimate:
-        """Emissivity of the line at temperatures in K, of any shape."""
+        """Return the emissivity at temperatures in K of any shape."""
         away = np.asarray(temperature, np.float64) - self.middle
         design = np.stack([np.ones(away.size), away.ravel()], axis=1)
         return self.estimate.linear(design).reshape(*away.shape)
 
     def weights(self, temperature: float) -> Array:
-        """Weight of every mean in the emissivity at a temperature in K; their sum is 1."""
+        """Return the weight of every mean in the emissivity at a temperature in K."""
         away = np.array([1.0, temperature - self.middle])
         weights: Array = away @ np.linalg.pinv(_design(self.temperatures))
         return weights
 
 
 def _design(temperatures: Sequence[float]) -> Array:
-    """Design matrix of a line about the middle of the temperatures, shape (n, 2)."""
+    """Return the design matrix of a line about the middle of the temperatures, shape (n, 2)."""
     kelvins = np.array(temperatures)
     return np.stack([np.ones_like(kelvins), kelvins - kelvins.mean()], axis=1)
 
 
 def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
-    """Emissivity from in-band radiance in W/(m² sr), of any shape.
+    """Compute the emissivity from in-band radiance in W/(m² sr).
 
     ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
     """
@@ -388,7 +359,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
     measurements : sequence of Measurement
         Images of the object at one true temperature; several of them are repetitions.
     heating : Heating
-        Its temperature and that of its surroundings.
+        Temperatures of the object and its surroundings.
 
     Raises
     ------
@@ -418,7 +389,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
 
 
 def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
-    """Covariance of the mean emissivities of several areas of one map."""
+    """Compute the covariance of the mean emissivities of several areas of one map."""
     observed = np.stack([row.observed for row in rows])
     chance = np.zeros((len(rows), len(rows)))
     if observed.shape[1] > 1:
@@ -429,12 +400,11 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
 
 
 def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
-    """Straight line through an area's emissivity at several temperatures, by least squares.
+    """Fit a line to an area's emissivity at several temperatures by ordinary least squares.
 
-    The line is that of ordinary least squares, a linear function of the means, through which
-    their covariance is propagated (JCGM 100:2008, Equation 13). The errors of `COMMON` are the
-    same at all temperatures. The random error is that of the means, or the scatter about the line
-    if that is larger. At one temperature the line is a constant.
+    The covariance of the means is propagated (JCGM 100:2008, Equation 13); the errors of `COMMON`
+    are the same at all temperatures. The random error is that of the means, or the scatter about
+    the line if that is larger. At one temperature the line is a constant.
     """
     if len(areas) == 1:
         return areas[0]
@@ -447,7 +417,8 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     design = _design(temperatures)
     solve = np.linalg.pinv(design)
     line = solve @ means
-    residual = _residual(means - design @ line)
+    freedom = means.size - 2
+    residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
     random = np.array([_of_one_image(one) for one in estimates])
     if isfinite(residual):
         random = np.maximum(random, residual)
@@ -479,7 +450,7 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
 
 
 def _of_one_image(estimate: Estimate) -> float:
-    """Standard uncertainty by what is not the same at another temperature."""
+    """Return the standard uncertainty without the causes of `COMMON`."""
     for cause in COMMON:
         estimate = estimate.without(cause)
     return float(estimate.standard_uncertainty)
@@ -496,18 +467,13 @@ def _floor(measurement: Measurement) -> float:
 def _calibration(
     measurements: Sequence[Measurement], radiance: Array, heating: Heating
 ) -> Array | None:
-    """Standard uncertainty of the mean radiance from the calibration, shape (y, x)."""
+    """Return the standard uncertainty of the mean radiance by the calibration, shape (y, x)."""
     if heating.camera_uncertainty is not None:
         band, spread = measurements[0].band, heating.camera_uncertainty
         temperature = np.asarray(band.temperature(radiance), np.float64)
         ends = [band.radiance(temperature + sign * spread) for sign in (-1.0, 1.0)]
         return np.asarray((ends[1] - ends[0]) / 2, np.float64)
     return stated_calibration(measurements)
-
-
-def _residual(about_line: Array) -> float:
-    freedom = about_line.size - 2
-    return sqrt(float((about_line**2).sum()) / freedom) if freedom else nan
 
 
 def _celsius(temperature: float) -> str:
