@@ -30,7 +30,7 @@ PROGRAMS = {
         {"| none |": 5, "| none, sakuma": 5, "| 15 counts": 6, "| 3 points": 6},
     ),
     "camera_pass.py": (
-        "--rounds 1 --instants 1",
+        "--rounds 1 --instants 1 --sub-frames 4",
         {
             **dict.fromkeys(("given: ", "in memory: ", "stored: ", "inverse"), 3),
             **dict.fromkeys(("study: ", "new image: ", "image: chipglow", "counts: chipglow"), 2),
@@ -43,7 +43,7 @@ PROGRAMS = {
         f"--cell {COARSEST} --length 0.6 paper",
         {"paper  cutting force": 1, "paper  thickness": 1, "paper  contact": 1, "paper  250": 7},
     ),
-    "fuzz/fuzz.py": ("--cases 30 --only .npz", {"| grid.npz |": 7, "| all |": 6, "30 cases": 2}),
+    "fuzz/fuzz.py": ("--cases 10 --only .npz", {"| grid.npz |": 7, "| all |": 6, "10 cases": 2}),
     "knife_edge.py": (
         "--repeats 1 diffraction Gaussian,",
         {"diffraction, noise 0.03": 3, "Gaussian, clipped at 90 %": 4, "| diffraction": 5},
@@ -57,10 +57,7 @@ PROGRAMS = {
             "0 cases": 1,
         },
     ),
-    "optics.py": (
-        "--samples 128",
-        {"| OTF, defocus 2.0 mm |": 1, "| OTF, vibration |": 1, "| PSF, defocus 30 um |": 2},
-    ),
+    "optics.py": ("--samples 128", {"| clear |": 1, "| obscuration 0.35, aberrations": 2}),
     "rasterise.py": (
         "--file --fine 60",
         {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
@@ -73,7 +70,7 @@ PROGRAMS = {
         "--pairs 1 --only 'scikit-image, correlation'",
         {"| scikit-image, correlation |": 5},
     ),
-    "softening.py": (f"--cell {COARSEST} --length 1.96 default", {"| default": 9}),
+    "softening.py": (f"--cell {COARSEST} --length 1 johnson-cook", {"| johnson-cook": 4}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 6}),
     "synthetic_laboratory.py": (
         "--repeats 1",
