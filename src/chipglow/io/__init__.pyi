@@ -2,7 +2,6 @@ from .atomic import (
     atomic_folder as atomic_folder,
     atomic_path as atomic_path,
 )
-from .example_scene import example_scene as example_scene
 from .import_file import (
     IMPORT_SOURCES as IMPORT_SOURCES,
     ImportDescription as ImportDescription,
@@ -31,6 +30,7 @@ from .scene_file import (
     SCENE_FORMAT as SCENE_FORMAT,
     SceneWriter as SceneWriter,
     StoredScene as StoredScene,
+    example_scene as example_scene,
     is_scene as is_scene,
     open_scene as open_scene,
     write_scene as write_scene,
