@@ -269,7 +269,7 @@ def test_the_borders_warning_is_not_of_the_noise():
 def test_lag_without_a_frame_before_is_said():
     made = camera(Lag(0.3))
     at = PLAIN.frame_times(0.0, 2)
-    assert "Lag: no frame" in made.form_measurement(exposure()).notes.warnings[0]
+    assert "Lag: no two frames" in made.form_measurement(exposure()).notes.warnings[0]
     assert made.form_measurement([exposure(float(start)) for start in at]).notes.warnings == []
 
 

@@ -8,6 +8,9 @@ The kernels are functions of arrays alone and work on one block each: a graphics
 take them block by block, with the loops over columns as its threads.
 """
 
+# Kernels have no types: Numba finds them.
+# mypy: allow-untyped-defs
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
@@ -180,7 +183,7 @@ def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
 
 
 @njit(**_FAST)
-def _find(temperature, last, number, past):  # type: ignore[no-untyped-def]
+def _find(temperature, last, number, past):
     """Find the table's entry before a temperature, and how far past it that is, or NaN."""
     for i in range(temperature.size):
         position = (temperature[i] - np.float32(TABLE_COLDEST)) * np.float32(STEPS_PER_KELVIN)
@@ -192,21 +195,21 @@ def _find(temperature, last, number, past):  # type: ignore[no-untyped-def]
 
 
 @njit(**_FAST)
-def _look_up(table, number, past, black):  # type: ignore[no-untyped-def]
+def _look_up(table, number, past, black):
     for i in range(black.size):
         k = np.uint32(number[i])
         black[i] = table[k, 0] + past[i] * table[k, 1]
 
 
 @njit(**_FAST)
-def _heat(temperature, kind, hottest):  # type: ignore[no-untyped-def]
+def _heat(temperature, kind, hottest):
     for i in range(hottest.size):
         there = temperature[i] if kind[i] != _VOID else np.float32(0.0)
         hottest[i] = max(hottest[i], there)
 
 
 @njit(**_FAST)
-def _apparent(emissivity, black, kind, environment, most, apparent):  # type: ignore[no-untyped-def]
+def _apparent(emissivity, black, kind, environment, most, apparent):
     for i in range(apparent.size):
         e = emissivity[i]
         radiance = environment + e * (black[i] - environment)
@@ -215,21 +218,19 @@ def _apparent(emissivity, black, kind, environment, most, apparent):  # type: ig
 
 
 @njit(**_FAST)
-def _sum(apparent, weight, mean):  # type: ignore[no-untyped-def]
+def _sum(apparent, weight, mean):
     for i in range(mean.size):
         mean[i] += weight * np.float64(apparent[i])
 
 
 @njit(**_FAST)
-def _raise(apparent, peak):  # type: ignore[no-untyped-def]
+def _raise(apparent, peak):
     for i in range(peak.size):
         peak[i] = max(peak[i], apparent[i])
 
 
 @njit(**_FAST)
-def _add_row(  # type: ignore[no-untyped-def]
-    temperature, kind, emissivity, weight, is_middle, row, work, number, own
-):
+def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number, own):
     """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
     tables, environments, most, mean, centre, peak, hottest, views = own
     past, black, apparent = work[0], work[1], work[2]
@@ -249,9 +250,7 @@ def _add_row(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, **_FAST)
-def _add_given(  # type: ignore[no-untyped-def]
-    temperature, material, emissivities, weights, middles, first, last, own
-):
+def _add_given(temperature, material, emissivities, weights, middles, first, last, own):
     columns = own[_MEAN].shape[2]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
@@ -266,9 +265,7 @@ def _add_given(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, **_FAST)
-def _add_features(  # type: ignore[no-untyped-def]
-    fields, shifts, textures, weights, middles, first, last, own
-):
+def _add_features(fields, shifts, textures, weights, middles, first, last, own):
     temperature, material, strain, rate, x, y = fields
     surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
@@ -291,39 +288,37 @@ def _add_features(  # type: ignore[no-untyped-def]
 
 
 @njit(**_FAST)
-def _weighted(upper, middle, lower, u, v, w, result):  # type: ignore[no-untyped-def]
+def _weighted(upper, middle, lower, u, v, w, result):
     for i in range(result.size):
         result[i] = u * upper[i] + v * middle[i] + w * lower[i]
 
 
 @njit(**_FAST)
-def _combine(wide, base, u, v, w, result):  # type: ignore[no-untyped-def]
+def _combine(wide, base, u, v, w, result):
     _weighted(wide[base], wide[base + 1], wide[base + 2], u, v, w, result)
 
 
 @njit(**_FAST)
-def _tell(filled, in_tool, kind):  # type: ignore[no-untyped-def]
+def _tell(filled, in_tool, kind):
     for i in range(kind.size):
         seen = np.uint8(_WORKPIECE) if filled[i] > np.float32(0.5) else np.uint8(_VOID)
         kind[i] = np.uint8(_TOOL) if in_tool[i] else seen
 
 
 @njit(**_FAST)
-def _keep_within(values, least, most):  # type: ignore[no-untyped-def]
+def _keep_within(values, least, most):
     for i in range(values.size):
         values[i] = min(max(values[i], least), most)
 
 
 @njit(**_FAST)
-def _take(tool, kind, temperature):  # type: ignore[no-untyped-def]
+def _take(tool, kind, temperature):
     for i in range(kind.size):
         temperature[i] = tool[i] if kind[i] == _TOOL else temperature[i]
 
 
 @njit(cache=True, **_FAST)
-def _add_splines(  # type: ignore[no-untyped-def]
-    nodes, limits, grid, fixed, shifts, textures, weights, middles, first, last, own
-):
+def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles, first, last, own):
     first_down, down, first_across, across, in_tool = grid
     surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
