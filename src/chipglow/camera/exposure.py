@@ -89,7 +89,7 @@ def expose(
     bands = list(dict.fromkeys(view.band for view in views))
     places = {id(one): number for number, one in enumerate(fields)}
     stack = fields[0].beside(fields[1:])
-    sums = Sums.zero(
+    sums = Sums(
         np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
         np.stack([_fine_table(band) for band in bands]),
         np.array([view.environment for view in views], np.float32),
@@ -196,19 +196,14 @@ def _sweep(
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
     features = stack if isinstance(stack, FeatureFields) else None
     if features is not None and (splines := _splines(scene, indices)):
-        shifts = np.stack([features.shifts(frame.time) for frame in splines])
-        textures, fixed = features.textures, features.fixed_positions
-        sums.add_splines(splines, fixed, shifts, textures, weights, middles)
+        sums.add_splines(splines, features, weights, middles)
         return
     for begin, frames in _batches(scene, indices, stack.needs):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
-        inside = middles - begin
         if features is None:
-            sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
+            sums.add_given(frames, stack, part, middles - begin)
         else:
-            positions = [features.positions(frame) for frame in frames]
-            shifts = np.stack([features.shifts(frame.time) for frame in frames])
-            sums.add_features(frames, positions, shifts, features.textures, part, inside)
+            sums.add_features(frames, features, part, middles - begin)
 
 
 def _splines(scene: Scene, indices: range) -> list[SplineFrame]:

@@ -12,7 +12,6 @@ take them block by block, with the loops over columns as its threads.
 # mypy: allow-untyped-defs
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -23,7 +22,8 @@ from chipglow.quantities import Array
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
-from chipglow.surface.blend import SCRATCH, Textures, blend_row
+from chipglow.surface import EmissivityStack, FeatureFields
+from chipglow.surface.blend import SCRATCH, blend_row
 from chipglow.surface.blocks import in_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
@@ -39,135 +39,88 @@ _STRAIN, _RATE, _X, _Y = (
 )
 _MEAN: Final = 3
 _VIEWS: Final = 7
-"""Places of the mean and of the views among what the kernels get of their sums: `Sums._own`."""
+"""Places of the mean and of the views among what the kernels get of their sums: `Sums`."""
 
+Indices: TypeAlias = NDArray[np.intp]
 Check: TypeAlias = Callable[[], None]
 """Called now and then in a long pass, which it ends by raising an error."""
 
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
 
-@dataclass(frozen=True, eq=False)
 class Sums:
-    """Sums over the sub-frames; see `Exposure`."""
+    """Sums over the sub-frames; see `Exposure`.
 
-    views: NDArray[np.int64]
-    """Numbers of the surface and of the band of every view, int64, shape (view, 2)."""
-    tables: NDArray[np.float32]
-    """Radiance in every band from 200 K on and its change to the next value, (band, n, 2)."""
-    environments: NDArray[np.float32]
-    """Radiance of every view's surroundings in W/(m² sr), shape (view,)."""
-    most: float
-    """Largest emissivity that is possible."""
-    mean: Array
-    """Shape (view, y, x), as `centre` and `peak`."""
-    centre: Array
-    peak: NDArray[np.float32]
-    hottest: NDArray[np.float32]
-    """Shape (y, x)."""
-    check: Check | None
-    """Called before every block of rows; an error that it raises ends the pass."""
+    `views` are numbers of the surface and of the band of every view, shape (view, 2); `tables` hold
+    radiance in every band from 200 K on and its change to the next value, (band, n, 2);
+    `environments` is the radiance of every view's surroundings in W/(m² sr). `mean`, `centre` and
+    `peak` are of shape (view, y, x), `hottest` of (y, x).
+    """
 
-    @classmethod
-    def zero(
-        cls,
+    def __init__(
+        self,
         views: NDArray[np.int64],
         tables: NDArray[np.float32],
         environments: NDArray[np.float32],
-        most: float,
+        max_emissivity: float,
         shape: tuple[int, int],
         check: Check | None,
-    ) -> "Sums":
-        """Return sums of nothing."""
-        mean, centre = (np.zeros((len(views), *shape)) for _ in range(2))
-        peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
-        return cls(views, tables, environments, most, mean, centre, peak, hottest, check)
+    ) -> None:
+        self.mean, self.centre = (np.zeros((len(views), *shape)) for _ in range(2))
+        self.peak, self.hottest = (np.zeros(of, np.float32) for of in (self.mean.shape, shape))
+        sums = self.mean, self.centre, self.peak, self.hottest
+        self._own = tables, environments, np.float32(max_emissivity), *sums, views
+        self._check = check
 
     def add_given(
-        self,
-        frames: Sequence[Frame],
-        emissivities: Sequence[NDArray[np.float32]],
-        weights: Array,
-        middles: NDArray[np.intp],
+        self, frames: Sequence[Frame], stack: EmissivityStack, weights: Array, middles: Indices
     ) -> None:
-        """Add up to `BATCH` frames with the emissivities (surface, y, x) of each.
+        """Add up to `BATCH` frames.
 
         `weights` (row, frame) are fractions of each row's exposure; `middles` (row,) is the frame
         in the middle of each row's exposure, if any is.
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
+        emissivities = [stack.emissivities(frame) for frame in frames]
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
-
-        def add(first: int, last: int) -> None:
-            _add_given(temperature, material, given, weights, middles, first, last, self._own)
-
-        self._in_blocks(add)
+        self._add(_add_given, temperature, material, given, weights, middles)
 
     def add_features(
-        self,
-        frames: Sequence[Frame],
-        positions: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]],
-        shifts: NDArray[np.float32],
-        textures: Textures,
-        weights: Array,
-        middles: NDArray[np.intp],
+        self, frames: Sequence[Frame], stack: FeatureFields, weights: Array, middles: Indices
     ) -> None:
-        """Add frames as `add_given`, with the emissivities of their features.
-
-        `positions` are where each frame's samples are looked up in the textures, and `shifts`
-        (frame, feature, 2) those of the textures.
-        """
+        """Add frames as `add_given`, whose emissivities are stored nowhere."""
         temperature, material, strain, rate = (
             _batch(frames, name)
             for name in ("temperature", "material", "plastic_strain", "plastic_strain_rate")
         )
+        positions = [stack.positions(frame) for frame in frames]
         x, y = (_filled([np.ascontiguousarray(p[k]) for p in positions]) for k in (0, 1))
         fields = (temperature, material, strain, rate, x, y)
-
-        def add(first: int, last: int) -> None:
-            _add_features(fields, shifts, tuple(textures), weights, middles, first, last, self._own)
-
-        self._in_blocks(add)
+        shifts = np.stack([stack.shifts(frame.time) for frame in frames])
+        self._add(_add_features, fields, shifts, tuple(stack.textures), weights, middles)
 
     def add_splines(
-        self,
-        frames: Sequence[SplineFrame],
-        positions: tuple[NDArray[np.float32], NDArray[np.float32]] | None,
-        shifts: NDArray[np.float32],
-        textures: Textures,
-        weights: Array,
-        middles: NDArray[np.intp],
+        self, frames: Sequence[SplineFrame], stack: FeatureFields, weights: Array, middles: Indices
     ) -> None:
-        """Add frames of splines on one lattice as `add_features`: their samples are stored nowhere.
-
-        Without `positions` textures are looked up by the material coordinates.
-        """
+        """Add any number of frames of splines on one lattice: their samples are stored nowhere."""
         lattice = frames[0].lattice
         nodes = np.stack([frame.nodes for frame in frames])
         limits = np.stack([frame.limits for frame in frames])
-        fixed = positions or (np.empty((0, 0), np.float32),) * 2
+        # Without fixed positions textures are looked up by the material coordinates.
+        fixed = stack.fixed_positions or (np.empty((0, 0), np.float32),) * 2
         grid = (*lattice.down, *lattice.across, lattice.in_tool)
+        shifts, textures = np.stack([stack.shifts(frame.time) for frame in frames]), stack.textures
+        self._add(
+            _add_splines, nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles
+        )
 
+    def _add(self, kernel: Callable[..., None], *arguments: Any) -> None:
         def add(first: int, last: int) -> None:
-            _add_splines(
-                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles, first, last,
-                self._own,
-            )  # fmt: skip
+            if self._check is not None:
+                self._check()
+            kernel(*arguments, first, last, self._own)
 
-        self._in_blocks(add)
-
-    @property
-    def _own(self) -> tuple[Any, ...]:
-        sums = self.mean, self.centre, self.peak, self.hottest
-        return self.tables, self.environments, np.float32(self.most), *sums, self.views
-
-    def _in_blocks(self, add: Callable[[int, int], None]) -> None:
-        def checked(first: int, last: int) -> None:
-            if self.check is not None:
-                self.check()
-            add(first, last)
-
-        in_blocks(len(self.hottest), checked)
+        in_blocks(len(self.hottest), add)
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
