@@ -443,9 +443,9 @@ def repeat(seed: int) -> dict[str, tuple[float, float, float]]:
 Row = dict[str, tuple[float, float, float]]
 
 
-def kept(seed: int) -> Row:
-    """Result of a repeat, computed or as it was kept."""
-    path = RESULTS / f"{seed}.json"
+def kept(seed: int, folder: Path = RESULTS) -> Row:
+    """Return the result of a repeat, computed or as it was kept."""
+    path = folder / f"{seed}.json"
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(repeat(seed)))
@@ -468,19 +468,21 @@ def table(rows: Sequence[Row]) -> Iterable[tuple[str, ...]]:
         yield name, f"{hits(rows, name)} of {len(rows)}", *told
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Repeat, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--repeats", type=int, default=100, help="how many seeds")
     parser.add_argument("--markdown", action="store_true", help="print a table for a page")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of kept repeats")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="only write a seed's files")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if options.write is not None:
         options.write.mkdir(parents=True, exist_ok=True)
         Laboratory(options.first).perform(options.write)
         return
-    rows = [kept(seed) for seed in range(options.first, options.first + options.repeats)]
+    seeds = range(options.first, options.first + options.repeats)
+    rows = [kept(seed, options.results) for seed in seeds]
     for number, line in enumerate(table(rows)):
         if options.markdown:
             print("|", " | ".join(line), "|")
