@@ -48,7 +48,7 @@ PROGRAMS = {
     "camera_pass.py": (
         "--rounds 1 --instants 1 --sub-frames 4",
         {
-            **dict.fromkeys(("given: ", "in memory: ", "stored: ", "inverse"), 3),
+            **dict.fromkeys(("given: ", "in memory: ", "stored: "), 3),
             **dict.fromkeys(("study: ", "new image: ", "image: chipglow", "counts: chipglow"), 2),
             "image: SciPy": 4,
         },
@@ -76,7 +76,7 @@ PROGRAMS = {
     "optics.py": ("--samples 128", {"| clear |": 1, "| obscuration 0.35, aberrations": 2}),
     "rasterise.py": (
         "--file --coarse 40 --fine 60",
-        {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
+        {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 2},
     ),
     "reflections.py": (
         "--draws 2 --angles 45 --study chip.yaml",
