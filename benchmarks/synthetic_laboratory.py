@@ -372,7 +372,7 @@ class Evaluation:
             points["count_uncertainty"],
             points["temperature_uncertainty"],
             CERTIFICATE,
-            INTEGRATION_TIME,
+            integration_time=INTEGRATION_TIME,
         )
         path = self.folder / "calibration.yaml"
         path.write_text(calibration_text(CalibrationDescription.of(fit)))
