@@ -179,13 +179,6 @@ def test_a_picture_without_a_legend_has_none():
     assert find_legend(np.full((50, 50, 3), 255, np.uint8)) is None
 
 
-def test_bands_of_a_legend_are_seen():
-    picture = with_legend(drawn(known_field(0, SHAPE), RAINBOW), NamedMap("rainbow", 10))
-    scale = ColourScale.from_legend(legend_pixels(picture, (100, 10, 108, 80)), ENDS)
-    assert scale.banded
-    assert scale.values == pytest.approx(ColourScale.named("rainbow", ENDS, 10).values)
-
-
 @pytest.mark.parametrize("box", [None, (200, 20, 216, 160)])
 @pytest.mark.parametrize("codec", [RAW, CODECS[2], H264], ids=lambda codec: codec.name)
 def test_values_by_the_legend(tmp_path, codec, box):
