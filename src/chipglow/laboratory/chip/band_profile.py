@@ -5,14 +5,13 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
 from math import isfinite, nan, sqrt
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import pandas as pd
 import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
@@ -431,13 +430,10 @@ class _Reader:
 
     def _position(self, number: int, curve: Array) -> Array:
         image, u = self.image(number), self.position
-
-        def read(values: Any, points: Array) -> Any:
-            return map_coordinates(values, image.index(points), order=1, mode="nearest")
-
-        down, right = (read(slope, curve) for slope in np.gradient(image.temperature, self.pitch))
+        slopes: Any = np.gradient(image.temperature, self.pitch)
+        down, right = (replace(image, temperature=slope).read(curve) for slope in slopes)
         behind, here, ahead = (
-            read(image.temperature, curve + self.pitch * k * normals_of(curve)) for k in (-1, 0, 1)
+            image.read(curve + self.pitch * k * normals_of(curve)) for k in (-1, 0, 1)
         )
         bend = (behind - 2 * here + ahead) / self.pitch**2
         return np.asarray(np.sqrt((down**2 + right**2) * u**2 + 0.75 * bend**2 * u**4))
