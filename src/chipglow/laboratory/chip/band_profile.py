@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
 from math import isfinite, nan, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
