@@ -257,12 +257,6 @@ def compare(
     reference : int, optional
         Number of the measured frame whose band is fully developed; see `band_profile`.
 
-    Raises
-    ------
-    ValueError
-        If there is no simulation, nothing that can be compared, or an uncertainty of the
-        temperature is stated beside that of the measurement itself.
-
     Notes
     -----
     Squares of 3 measured pixels on the rake face are compared, and along the shear band values at

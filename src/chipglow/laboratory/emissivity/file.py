@@ -194,13 +194,6 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     -------
     MapSurface
         Emissivities limited to 0 to 1, with the mean standard uncertainty of the pixels.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file is truncated or no emissivity map.
     """
 
     def surface(data: xr.Dataset) -> MapSurface:
