@@ -272,18 +272,6 @@ def test_the_truth_is_within_the_stated_interval(tmp_path, monkeypatch):
     assert sum(inside) >= 9
 
 
-def test_the_calibrated_range_is_kept(laboratory):
-    cut = ["flat_field={}", "bad_pixels=none"]
-    described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
-    (laboratory / "narrow.yaml").write_text(
-        yaml.safe_dump({**described, "lowest": "500 degC", "highest": "700 degC"})
-    )
-    measured = load_measurement("chip.yaml", [*cut, "calibration=narrow.yaml"])
-    kelvins = BAND.temperature(measured.radiance)
-    np.testing.assert_array_equal(measured.flags == Flag.UNDER_RANGE, ~(kelvins >= 773.15))
-    np.testing.assert_array_equal(measured.flags == Flag.SATURATED, kelvins > 973.15)
-
-
 def test_a_camera_file_alone_with_settings(laboratory):
     settings = [f"{name}={yaml.safe_dump(value, default_flow_style=True, width=999).strip()}"
                 for name, value in FIELDS.items() if name not in ("file", "tip")]  # fmt: skip
@@ -484,20 +472,6 @@ def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it
         assert code == 0, said
         assert said.count("Assumed: No pixel is saturated") == 1
         assert "Warning: 5 values are 65535" in said
-
-
-def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_path):
-    exposures = [3e-6, 3e-6, 5e-6, 5e-6, 5e-6]
-    written = camera_files.cine(camera_files.pictures(bits=12), "16", exposures=exposures)
-    (tmp_path / "a.cine").write_bytes(written)
-    warning = "Warning: The integration time varies from 3.00002 us to 5.00004 us."
-    code, said = run("convert", tmp_path / "a.cine")
-    assert "Settings are missing for a measurement" in said
-    assert said.count(warning) == 1
-    settings = ("--set", f"calibration={laboratory / 'calibration.yaml'}", "--set", "pitch=6 um")
-    code, said = run("convert", tmp_path / "a.cine", *settings)
-    assert code == 0, said
-    assert said.count(warning) == 1
 
 
 def test_convert_only_looks_without_out(laboratory):

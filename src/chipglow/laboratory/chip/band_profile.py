@@ -203,8 +203,6 @@ def band_profile(
     ------
     NoShearBandError
         If no frame has a band; of a single frame with the reason.
-    ValueError
-        If there is no tool, a number is impossible, or nothing on a given curve is usable.
 
     Notes
     -----

@@ -205,12 +205,6 @@ def rake_grid(
     uncertainty : ToolUncertainty, optional
         How well the place of the tool is known, such as that of a `FoundTool`.
 
-    Raises
-    ------
-    ValueError
-        If there is no tool, no square is inside the image, or none beside the rake face is usable
-        in any frame.
-
     Notes
     -----
     A pixel belongs to the square that holds its middle; nothing is resampled. A square is left out

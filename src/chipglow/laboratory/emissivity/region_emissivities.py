@@ -116,7 +116,7 @@ def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivi
         "The camera's calibration is exact, as the measurement states no uncertainty of it "
         "(camera_uncertainty).": any(one.calibration is None for one in maps),
         "Nothing changes between frames, as there is only one; noise is at most the standard "
-        "deviation over the pixels.": any(one.observations == 1 for one in maps),
+        "deviation over the pixels.": any(len(one.radiance) == 1 for one in maps),
     }
     notes = Notes([text for text, applies in texts.items() if applies])
     for of in rows:

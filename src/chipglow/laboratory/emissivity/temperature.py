@@ -115,13 +115,6 @@ def true_temperature(
         Relative standard uncertainty of the radiance from one recording to the next, by default
         as several recordings show; of one it is unknown and not in the uncertainty.
 
-    Raises
-    ------
-    ValueError
-        If there is no image, the images are of different pixels, fewer than two pixels can be
-        used, or the area is darker than what it reflects; if by a line the radiance does not
-        rise with the temperature.
-
     Notes
     -----
     L(T) = (L_app − (1 − ε) L_env) / ε: Equation 2 of Heigel and Whitenton (2010), solved. The

@@ -42,13 +42,6 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         camera's file.
     settings : iterable of str
         Fields of the description, such as ``band=3.8-5.1 um``, which override a YAML file.
-
-    Raises
-    ------
-    ValueError
-        If it is not a measurement, or cannot become one.
-    OSError
-        If a file cannot be read.
     """
     settings = list(settings)
     if is_measurement(source):
