@@ -247,7 +247,7 @@ class EmissivityMapFile(SurfaceChoice):
     file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
 
     def surface(self) -> MapSurface:
-        """The surface."""
+        """Return the surface."""
         return read_emissivity_map(self.file)
 
 
@@ -262,7 +262,7 @@ class MeasuredEmissivity(SurfaceChoice):
     region: Annotated[str, Parameter("Name of a region in it.")]
 
     def surface(self) -> TrendSurface:
-        """The surface."""
+        """Return the surface."""
         areas = read_emissivity_lines(self.file)
         if self.region not in areas:
             raise ValueError(

@@ -171,7 +171,7 @@ class RegionTemperatures:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region; one row each."""
+        """Return every region; one row each."""
         return pd.DataFrame(
             {
                 "region": row.name,
