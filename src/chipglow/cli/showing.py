@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.screen import current, figure, finish
-from chipglow.drawing.frames import shown_frame
+from chipglow.drawing.scales import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.measurement import MeasurementSummary, measurement_summary

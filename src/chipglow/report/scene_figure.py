@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID
+from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID, shown_frame
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import KELVIN
+from chipglow.drawing.scales import KELVIN, shown_frame
 from chipglow.scene import FILLED, Frame, Material, Scene
 
 _SAMPLED: Final = 5
