@@ -1,6 +1,7 @@
 """The error of one band and of the ratio of two against the true temperature, cause by cause."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -238,7 +239,8 @@ def wavelength_errors(
     """
     tell = progress or (lambda label, part: None)
     cameras = [camera.in_band(band) for band in plan.bands]
-    kept = [spot for spot in spots if _has_room(scene, camera, spot.start, plan.delay)]
+    duration = camera.integration_time
+    kept = [spot for spot in spots if _has_room(scene, spot.start + plan.delay, duration)]
     if not kept:
         raise ValueError(
             f"delay: {1e6 * plan.delay:g} us, expected so little that the scene lasts until the "
@@ -316,13 +318,12 @@ def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str
     ]
 
 
-def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
-    """Return whether the scene lasts until a delayed exposure ends."""
-    try:
-        frame_weights(scene.times, scene.frame_spacing, start + delay, camera.integration_time)
-    except ValueError:
-        return False
-    return True
+def _has_room(scene: Scene, start: float, duration: float) -> bool:
+    """Return whether the scene lasts until an exposure ends."""
+    with suppress(ValueError):
+        frame_weights(scene.times, scene.frame_spacing, start, duration)
+        return True
+    return False
 
 
 def _draws(
