@@ -293,7 +293,7 @@ def cut_spots(
 ) -> list[Spot]:
     """Return spots at the rake face, half a pixel into the chip, and in each shear band."""
     tell = progress or (lambda label, part: None)
-    cut = find_cut(scene, camera.integration_time, plan.exposures, plan.touching, tell)
+    cut = find_cut(scene, camera.integration_time, plan.exposures, tell)
     spots = []
     for segment in cut.segments:
         tool = segment.tool
