@@ -120,7 +120,6 @@ class _Task:
 
     @property
     def duration(self) -> float:
-        """How long an exposure lasts in s."""
         return self.camera.frame_duration(self.scene.raster)
 
     def attempt(self, title: str, compute: Callable[[], _Part]) -> _Part | None:
@@ -354,7 +353,6 @@ def _scene_variables(
 def _image_variables(
     measurements: Mapping[str, Measurement], looked: Looked, shown: int
 ) -> Variables:
-    """Return the images of every instant, and of the shown one by effects."""
     every = list(measurements.values())
     pixels, per_pixel = every[0].raster, ("pixel_y", "pixel_x")
     over = "surface", "instant", *per_pixel
@@ -412,7 +410,6 @@ def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Varia
 
 
 def _history_variables(cut: Cut) -> Variables:
-    """Return forces and chip thickness over time, as far as they are known."""
     variables: Variables = {}
     if forces := cut.forces:
         variables |= {
@@ -431,7 +428,6 @@ def _history_variables(cut: Cut) -> Variables:
 
 
 def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
-    """Yield warnings of the images of the shown exposure."""
     for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"

@@ -224,7 +224,6 @@ def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> 
 
 
 def _mean(values: Stack) -> float:
-    """Return the mean of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else nan
 

@@ -129,7 +129,6 @@ class WavelengthPlan(Part):
         return [*((number,) for number in range(len(self.bands))), *self.pairs]
 
     def thermometer(self, pair: Sequence[int]) -> RatioThermometer:
-        """The ratio of two bands of a grey body."""
         first, second = (self.bands[number] for number in pair)
         exponent = log((second.lower + second.upper) / (first.lower + first.upper))
         return RatioThermometer(first, second, 1.0, self.exponent_uncertainty * exponent)
@@ -319,7 +318,6 @@ def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str
 
 
 def _has_room(scene: Scene, start: float, duration: float) -> bool:
-    """Return whether the scene lasts until an exposure ends."""
     with suppress(ValueError):
         frame_weights(scene.times, scene.frame_spacing, start, duration)
         return True
@@ -420,7 +418,6 @@ def _compared(
 
 
 def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: Array) -> Array:
-    """Return the temperature by radiance and emissivity in a band."""
     return np.asarray(band.temperature((radiance - environment) / emissivity + environment))
 
 
@@ -445,7 +442,6 @@ def _of_place(
 
 
 def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
-    """Return the centre of the pixel that holds a spot."""
     pixels = camera.pixels(scene.raster)
     corner = np.array([pixels.left, pixels.top])
     column, row = np.floor((spot.point - corner) * [1, -1] / pixels.spacing).astype(int)
@@ -476,17 +472,14 @@ def _of_pixel(
 
 
 def _image(camera: Camera, exposure: Exposure) -> Array:
-    """Return the radiance of a camera's pixels before its detector in W/(m² sr), shape (y, x)."""
     return camera.form_image(exposure.mean_radiance, exposure.raster)
 
 
 def _ideal(camera: Camera) -> Camera:
-    """Return the camera without its optics."""
     return replace(camera, psf=None, optics=())
 
 
 def _read(camera: Camera, image: Array, start: float) -> Array:
-    """Return what the camera's detector makes of an image."""
     return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)
 
 

@@ -117,7 +117,6 @@ def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
 
 
 def _results(folder: Path) -> OpenedScene:
-    """Open the scene of a folder of results with its study."""
     file = folder / "study.yaml"
     if not file.is_file():
         raise FileNotFoundError(f"{folder}: holds no study.yaml, expected a folder of results")

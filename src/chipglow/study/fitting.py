@@ -73,7 +73,6 @@ def fit(study: Study, scene: Scene) -> Fitted:
 
 
 def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
-    """A surface whose textures do not follow the material."""
     if isinstance(surface, FeatureSurface):
         return replace(surface, follow=follow) if surface.follow == "material" else surface
     if not isinstance(surface, WrappedSurface):
@@ -83,14 +82,12 @@ def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
 
 
 def _layers(surface: Surface) -> Iterator[Surface]:
-    """A surface, and those under it."""
     yield surface
     if isinstance(surface, WrappedSurface):
         yield from _layers(surface.bare)
 
 
 def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
-    """At which temperatures emissivities were measured, a sentence for each surface."""
     for name, surface in surfaces.items():
         trends: list[EmissivityTrend] = []
         for layer in _layers(surface):
@@ -108,7 +105,6 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
-    """Where frames or cells are too coarse for what is asked, a sentence each."""
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
     if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
         yield (
@@ -126,7 +122,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
 
 
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
-    """What emissivity maps leave of the scene, a sentence each."""
+    """Yield what emissivity maps leave of the scene, a sentence each."""
     for name, outer in surfaces.items():
         *_, surface = _layers(outer)
         if not isinstance(surface, MapSurface):
@@ -151,7 +147,7 @@ def _place(raster: Raster) -> str:
 
 
 def left_to_the_paper(study: Study) -> Iterator[str]:
-    """What is the paper's in a study that is another, a sentence for each section."""
+    """Yield what is the paper's in a study that is another, a sentence for each section."""
     if study.is_papers:
         return
     sections = ["surface", "camera"] if study.scene else ["cutting", "surface", "camera"]
@@ -165,7 +161,6 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
 
 
 def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
-    """Fields that nobody set, with their values as a study writes them."""
     for one in own_settings(section):
         if one.name in without or one.plain in ("none", []):
             continue
@@ -176,7 +171,7 @@ def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
 
 
 def _written(value: Any) -> str:
-    """A value in one line, without what is none."""
+    """Return a value in one line, without what is none."""
     if isinstance(value, dict):
         value = {key: inner for key, inner in value.items() if inner not in ("none", None, {}, [])}
     return yaml_line(value)

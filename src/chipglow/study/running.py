@@ -223,7 +223,6 @@ def _fitted(
 
 
 def _inputs(study: Study) -> dict[str, Any]:
-    """Return all that a scene depends on."""
     simulation = study.cutting.simulation()
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)
