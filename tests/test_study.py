@@ -472,8 +472,8 @@ def test_the_cache_is_listed_and_cleared(cache, runs):
 
 def test_what_ended_runs_left_is_cleared_and_what_runs_stays(cache):
     cache.mkdir()
-    part = cache / ".scene-ended.0123abcd.part.nc"
-    for path in (part, part.with_suffix(".npz"), cache / ".scene-other.89ab4567.part.npz"):
+    part = cache / ".scene-ended.0123abcd.part"
+    for path in (part, part.with_suffix(".npz"), cache / ".scene-other.89ab4567.npz"):
         path.write_bytes(b"x" * 10)
     with atomic_path(cache / "scene-running.nc") as running:
         running.write_bytes(b"x" * 10)
