@@ -153,12 +153,6 @@ def test_heat_fraction_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(
     assert heat_fraction(rate, material.heat_fractions()) == pytest.approx(fraction, rel=1e-14)
 
 
-@given(fraction=st.floats(0.0, 1.0), rate=st.floats(0.0, 1e12))
-def test_a_constant_heat_fraction_is_itself(fraction, rate):
-    material = replace(AISI_1045, taylor_quinney=fraction)
-    assert heat_fraction(rate, material.heat_fractions()) == fraction
-
-
 @pytest.mark.parametrize("coefficient", [0.0, 0.3])
 def test_friction_of_a_block_on_the_rake_face(coefficient):
     """A block pressed on the face by its own motion: tangential force is μ times normal force."""
