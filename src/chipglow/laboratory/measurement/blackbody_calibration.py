@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from chipglow.camera import Blackbody, CalibrationFit, FittedCalibration, fit_models, preferred
+from chipglow.camera import MODELS, Blackbody, CalibrationFit, FittedCalibration, fit_calibration
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.measurement.camera_file import read_flat_fields, uniform_counts
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -28,29 +28,27 @@ class BlackbodyCalibration:
     @property
     def preferred(self) -> str:
         """Name of the model with the least information criterion."""
-        return preferred(self.fits)
+        return _preferred(self.fits)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each fit; one row each."""
+        """Return every point of each fit; one row each."""
         return pd.concat([_points(name, fit) for name, fit in self.fits.items()], ignore_index=True)
 
     def parameter_frame(self) -> pd.DataFrame:
-        """Every parameter of each fit; one row each."""
-        return pd.concat(
-            [
-                pd.DataFrame(
-                    {
-                        "model": name,
-                        "parameter": fit.calibration.NAMES,
-                        "value": fit.calibration.parameters,
-                        "standard_uncertainty": np.sqrt(np.diag(fit.calibration.covariance)),
-                        "unit": fit.calibration.UNITS,
-                    }
-                )
-                for name, fit in self.fits.items()
-            ],
-            ignore_index=True,
-        )
+        """Return every parameter of each fit; one row each."""
+        frames = [
+            pd.DataFrame(
+                {
+                    "model": name,
+                    "parameter": fit.calibration.NAMES,
+                    "value": fit.calibration.parameters,
+                    "standard_uncertainty": np.sqrt(np.diag(fit.calibration.covariance)),
+                    "unit": fit.calibration.UNITS,
+                }
+            )
+            for name, fit in self.fits.items()
+        ]
+        return pd.concat(frames, ignore_index=True)
 
 
 def calibrate_blackbodies(
@@ -79,28 +77,31 @@ def calibrate_blackbodies(
         raise ValueError(
             f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
         )
-    ideal = Blackbody()
-    blackbody = Blackbody(
-        ideal.emissivity if emissivity is None else emissivity,
-        emissivity_uncertainty,
-        ideal.surroundings if surroundings is None else surroundings,
-    )
+    given = {"emissivity": emissivity, "surroundings": surroundings}
+    known = {name: value for name, value in given.items() if value is not None}
+    blackbody = Blackbody(emissivity_uncertainty=emissivity_uncertainty, **known)
+    for name in models:
+        if name not in MODELS:
+            raise ValueError(f"model: {name!r}, expected one of {', '.join(MODELS)}")
     try:
-        fits = fit_models(
-            table["temperature"],
-            table["counts"],
-            band,
-            models,
-            blackbody=blackbody,
-            count_uncertainty=table.get("count_uncertainty"),
-            temperature_uncertainty=table.get("temperature_uncertainty"),
-            common_uncertainty=common_uncertainty or 0.0,
-            integration_time=integration_time,
-            range_name=range_name,
-        )
+        fits = {
+            name: fit_calibration(
+                MODELS[name],
+                table["temperature"],
+                table["counts"],
+                band,
+                table.get("count_uncertainty"),
+                table.get("temperature_uncertainty"),
+                common_uncertainty or 0.0,
+                integration_time=integration_time,
+                range_name=range_name,
+                blackbody=blackbody,
+            )
+            for name in models
+        }
     except ValueError as error:
         raise ValueError(f"{points}: {error}") from None
-    best = preferred(fits)
+    best = _preferred(fits)
     return BlackbodyCalibration(
         fits,
         Notes(
@@ -108,6 +109,10 @@ def calibrate_blackbodies(
             list(_warnings(best, fits[best], common_uncertainty is not None)),
         ),
     )
+
+
+def _preferred(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> str:
+    return min(fits, key=lambda name: fits[name].information_criterion)
 
 
 def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:

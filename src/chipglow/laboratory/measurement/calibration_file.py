@@ -1,13 +1,12 @@
 """A calibration as a YAML file holds it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 
-from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
+from chipglow.camera import MODELS, CalibrationFit, FittedCalibration
 from chipglow.io import atomic_path
 from chipglow.quantities import ZERO_CELSIUS, Parameter, Part
 from chipglow.quantities.units import (
@@ -17,11 +16,6 @@ from chipglow.quantities.units import (
 )
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, load_described
-
-MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
-    one.kind: one for one in (LinearCalibration, SakumaHattori)
-}
-"""Forms of a calibration by the names of a file."""
 
 Rows = tuple[tuple[float, ...], ...]
 PointRow = tuple[float, float, float, float]
@@ -112,7 +106,7 @@ class CalibrationDescription(Part):
         self.build()
 
     def build(self) -> FittedCalibration:
-        """The calibration."""
+        """Return the calibration."""
         kind = MODELS[self.model]
         if set(self.parameters) != set(kind.NAMES):
             raise ValueError(
@@ -154,14 +148,14 @@ def load_calibration(path: str | Path) -> FittedCalibration:
 
 
 def write_calibration(fit: CalibrationFit[FittedCalibration], path: str | Path) -> None:
-    """Write a calibration to a YAML file, which `load_calibration` reads."""
+    """Write a calibration to a YAML file for `load_calibration`."""
     text = calibration_text(CalibrationDescription.of(fit))
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def calibration_text(description: CalibrationDescription) -> str:
-    """A calibration as YAML, every field with a comment; `load_calibration` reads it."""
+    """Return a calibration as YAML, every field with a comment."""
     return commented_yaml(_HEADER, description)
 
 
