@@ -1,7 +1,7 @@
 """Images of edges, and which of their pixels can be used."""
 
 from dataclasses import dataclass, field, replace
-from math import cos, sin, sqrt
+from math import sqrt
 from typing import Final
 
 import numpy as np
@@ -186,16 +186,18 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     x, y = image.x - image.x.mean(), image.y - image.y.mean()
     try:
         # Where an edge is can be seen on clipped pixels too.
-        line = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
+        line, bend = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
         pixels = _pixels_of(image, x, y, line)
-        (low, high), clipped = _limits(image, x, y, line)
+        quick = _quick_fit(pixels)
+        warnings = _bent(bend, image)
+        limits, clipped = _limits(image, x, y, line)
+        warnings += clipped
         if clipped:
             distance = line.distance(pixels.x, pixels.y)
-            pixels = _chosen(pixels, (distance > low) & (distance < high))
-        quick = _quick_fit(pixels)
-        if not clipped:
+            pixels = _chosen(pixels, (distance > limits[0]) & (distance < limits[1]))
+            quick = _quick_fit(pixels)
+        else:
             _check_edge(pixels, quick)
-        warnings = _bent(pixels, quick) + clipped
         pixels, outliers = _without_outliers(pixels, quick)
         warnings += outliers
         _check_single(pixels, quick)
@@ -333,19 +335,11 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
         )
 
 
-def _bent(pixels: EdgePixels, quick: ModelFit) -> list[str]:
-    """Return a warning if a parabola along the edge fits the residuals better than a line."""
-    edge, line = quick.edges[0], quick.edges[0].line
-    along = pixels.y * cos(line.normal) - pixels.x * sin(line.normal)
-    unit = 2 * (along - along.min()) / np.ptp(along) - 1
-    slope = quick.response(0, pixels).slope(line.distance(pixels.x, pixels.y))
-    design = edge.step * slope[:, None] * np.vander(unit, 3)
-    residual = pixels.radiance - quick.predicted(0, pixels)
-    solution, *_ = np.linalg.lstsq(design, residual, rcond=None)
-    variance = float(np.mean((residual - design @ solution) ** 2))
-    bent = abs(float(solution[0]))
-    unsure = sqrt(variance * float(np.linalg.inv(design.T @ design)[0, 0]))
-    if bent < 4 * unsure or bent < 0.05 * pixels.pitch:
+def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> list[str]:
+    if bend is None:
+        return ["The edge was found by its step only; its straightness could not be checked."]
+    bent, unsure = bend
+    if bent < 4 * unsure or bent < 0.05 * image.pitch:
         return []
     return [
         f"The edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
