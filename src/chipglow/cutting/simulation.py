@@ -343,7 +343,7 @@ class _State:
         self.simulation, self.interval = simulation, interval
         self.heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
         mass = self.heat_mass * simulation.mass_scaling
-        resists = material.nonlocal_viscosity
+        resists, exponent = material.nonlocal_viscosity, simulation.friction.thermal_exponent
         self.step = Step(
             mass=mass,
             heat_mass=self.heat_mass,
@@ -362,8 +362,9 @@ class _State:
             inflow=-numerics.upstream,
             ceiling=conditions.feed + 2 * cell,
             speed=conditions.speed,
+            friction_exponent=exponent or 1.0,
+            friction_melting=inf if exponent is None else material.melting_temperature,
             viscosity=resists.viscosity if resists is not None else 0.0,
-            **_thermal_friction(simulation),
         )
         law, damage = material.flow_stress.numbers(), material.damage
         self.step_points = advance_with(law)
@@ -643,15 +644,6 @@ def _conduction(material: WorkpieceMaterial, temperature: float) -> tuple[float,
     conductivity = material.conductivity.at(temperature)
     capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
     return float(conductivity / capacity), float(np.sqrt(conductivity * capacity))
-
-
-def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
-    """Return what `Step` takes if friction depends on the temperature."""
-    exponent = simulation.friction.thermal_exponent
-    if exponent is None:
-        return {}
-    melting = simulation.workpiece.melting_temperature
-    return {"friction_exponent": exponent, "friction_melting": melting}
 
 
 def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> ToolHeat:
