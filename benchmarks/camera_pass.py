@@ -72,19 +72,14 @@ BORDER, LEAST = 12, 573.15  # pixels and K: images are compared within and above
 LIMITS = {"temperature": (293.0, 1100.0), "plastic_strain": (0.0, 3.0)}
 
 
-class GivenSurface(Surface, EmissivityField):
+class GivenSurface(Surface):
     """Emissivity as it is given."""
-
-    needs = ()
 
     def __init__(self, values):
         self.values = values
 
-    def on(self, scene):
-        return self
-
-    def emissivity(self, frame):
-        return self.values[round(frame.time / STEP)]
+    def on(self, scene, band=None, reflected=None):
+        return EmissivityField(lambda frame: self.values[round(frame.time / STEP)], frozenset())
 
 
 def lattice_of(raster):

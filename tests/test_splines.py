@@ -359,7 +359,7 @@ def test_the_table_of_radiance_is_close_enough():
     temperature[0, 0] = 250.0 + (np.arange(50) + 0.5) / STEPS_PER_KELVIN  # the worst places
     raster = Raster(0.0, 0.0, 1e-6, 40, 50)
     scene = Scene.from_fields(raster, [0.0], {"temperature": temperature})
-    found = expose(scene, UniformSurface(1.0), BAND, 0.0, 1e-6).mean_radiance
+    found = expose(scene, UniformSurface(1.0).on(scene), BAND, 0.0, 1e-6).mean_radiance
     np.testing.assert_allclose(found, BAND.radiance(temperature[0].astype(float)), rtol=6e-7)
 
 

@@ -19,7 +19,7 @@ from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.quantities import unchecked
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
-from chipglow.surface import UniformEmissivity
+from chipglow.surface import UniformSurface
 
 QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarser one before."""
@@ -52,7 +52,7 @@ class OpenedScene:
     def of(cls, scene: Scene, study: Study, name: str, from_file: bool = False) -> "OpenedScene":
         """Open a scene in an exposure in its middle; a ValueError if it is shorter."""
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            study = unchecked(study, surface=UniformEmissivity(0.5))
+            study = unchecked(study, surface=UniformSurface(0.5))
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         starts = spread_starts(scene, duration, 3)
         start = rounded(starts[len(starts) // 2])

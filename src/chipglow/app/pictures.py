@@ -281,7 +281,7 @@ class SceneModel:
         surfaces = (surface, plain) if both else (surface,)
 
         def make() -> _Exposed:
-            grey = all(one.in_band(camera.band, camera.reflected) is one for one in surfaces)
+            grey = surface.is_grey
             spectral = () if grey else (camera.band.lower, camera.band.upper, camera.reflected)
             laid = self._laid.result(
                 (state.key(*_SURFACE), quick, both, spectral),

@@ -326,7 +326,7 @@ class Camera(Part):
                 f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
                 "UniformSurface(0.6)"
             )
-        return surface.in_band(self.band, self.reflected).on(scene)
+        return surface.on(scene, self.band, self.reflected)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
         """Let a scene shine on the camera for one integration time.

@@ -14,7 +14,7 @@ from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Frame, Raster, Scene, is_gap
 from chipglow.scene.splines import SplineFrame
-from chipglow.surface import EmissivityField, EmissivityStack, FeatureFields
+from chipglow.surface import EmissivityField, EmissivityStack
 
 _ROUNDING: Final = 1e-6
 
@@ -206,12 +206,12 @@ def expose_views(
     fields = list({id(view.emissivity): view.emissivity for view in views}.values())
     bands = list(dict.fromkeys(view.band for view in views))
     places = {id(one): number for number, one in enumerate(fields)}
-    stack = fields[0].beside(fields[1:])
+    stack = EmissivityStack(fields)
     sums = Sums.zero(
         np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
         np.stack([_fine_table(band) for band in bands]),
         np.array([view.environment for view in views], np.float32),
-        stack.most,
+        stack.max_emissivity,
         scene.raster.shape,
         check or _nothing,
     )
@@ -337,20 +337,20 @@ def _sweep(
     sums: Sums,
 ) -> None:
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
-    features = stack if isinstance(stack, FeatureFields) else None
+    features = stack.features if stack.is_bare else None
     if features is not None and (splines := _splines(scene, indices)):
-        shifts = np.stack([features.shifts(frame.time) for frame in splines])
+        shifts = np.stack([features.shift(frame.time) for frame in splines])
         textures, fixed = features.textures, features.fixed_positions
         sums.add_splines(splines, fixed, shifts, textures, weights, middles)
         return
-    for begin, frames in _batches(scene, indices, stack.needs):
+    for begin, frames in _batches(scene, indices, stack.needed):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
         inside = middles - begin
         if features is None:
             sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
         else:
             positions = [features.positions(frame) for frame in frames]
-            shifts = np.stack([features.shifts(frame.time) for frame in frames])
+            shifts = np.stack([features.shift(frame.time) for frame in frames])
             sums.add_features(frames, positions, shifts, features.textures, part, inside)
 
 

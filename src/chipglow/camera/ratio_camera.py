@@ -14,7 +14,7 @@ from chipglow.camera.exposure import Exposure, View, expose_views
 from chipglow.camera.measurement import Measurement
 from chipglow.radiometry import RatioThermometer
 from chipglow.scene import Raster, Scene
-from chipglow.surface import EmissivityField, Surface
+from chipglow.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,10 +187,8 @@ def views_of(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> list[
                 f"camera: line_time is {camera.line_time!r}, expected None where bands are "
                 "compared: a global shutter"
             )
-    laid: dict[int, tuple[Surface, EmissivityField]] = {}
-    views = []
-    for camera in cameras:
-        seen = surface.in_band(camera.band, camera.reflected)
-        _, field = laid.setdefault(id(seen), (seen, seen.on(scene)))
-        views.append(View(field, camera.band, camera.reflected))
-    return views
+    if surface.is_grey:
+        fields = [surface.on(scene)] * len(cameras)
+    else:
+        fields = [camera.lay(surface, scene) for camera in cameras]
+    return [View(f, c.band, c.reflected) for f, c in zip(fields, cameras, strict=True)]

@@ -1,104 +1,90 @@
 """Surfaces: emissivity maps that follow the material."""
 
-from chipglow.surface.directional import (
-    DIRECTIONS,
-    Direction,
-    DirectionalField,
-    DirectionalSurface,
-    Fresnel,
-)
-from chipglow.surface.dispersive import DispersiveField, DispersiveSurface
+from chipglow.surface.cross_section import SideElements
+from chipglow.surface.directional import DIRECTIONS, Direction, Fresnel
 from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.exchange import Exchange
 from chipglow.surface.feature import (
     CHIP_1,
     CHIP_2,
-    FeatureField,
-    FeatureFields,
+    EmissivityStack,
+    Features,
     FeatureSurface,
+    FeatureTrends,
     chip_fraction,
+    feature_fractions,
     shear_band_fraction,
 )
-from chipglow.surface.line import (
-    EmissivityTrend,
-    FeatureTrends,
-    FeatureTrendsField,
-    TrendSurface,
+from chipglow.surface.map import MapSurface
+from chipglow.surface.oxide import OXIDES, Oxide, OxideHistory, ParabolicOxide
+from chipglow.surface.side_flow import REFLECTIONS, SideShape, Wedge
+from chipglow.surface.spectral import (
+    SPECTRA,
+    Dispersion,
+    HagenRubens,
+    SpectralSurface,
+    SpectralTable,
 )
-from chipglow.surface.map import MapField, MapSurface
-from chipglow.surface.oxide import (
-    OXIDES,
-    Oxide,
-    OxideHistory,
-    OxidisedField,
-    OxidisedSurface,
-    ParabolicOxide,
-)
-from chipglow.surface.reflecting import ReflectingField, ReflectingSurface
-from chipglow.surface.side_flow import REFLECTIONS, SideElements, SideShape, Wedge
-from chipglow.surface.spectral import SPECTRA, HagenRubens, SpectralSurface, SpectralTable
 from chipglow.surface.surface import (
+    MODIFIERS,
     SURFACES,
+    Change,
     EmissivityField,
-    EmissivityStack,
+    ModifiedSurface,
+    Modifier,
     Surface,
-    SurfaceChoice,
-    UniformEmissivity,
-    UniformSurface,
-    WrappedSurface,
 )
-from chipglow.surface.temperature import PhaseEmissivity, TemperatureSurface, TemperatureTable
+from chipglow.surface.temperature import (
+    EmissivityTrend,
+    HomogeneousSurface,
+    PhaseSurface,
+    TemperatureSurface,
+    TrendSurface,
+    UniformSurface,
+)
 from chipglow.surface.texture import Texture
 
 __all__ = [
     "CHIP_1",
     "CHIP_2",
     "DIRECTIONS",
+    "MODIFIERS",
     "OXIDES",
     "REFLECTIONS",
     "SPECTRA",
     "SURFACES",
+    "Change",
     "Direction",
-    "DirectionalField",
-    "DirectionalSurface",
-    "DispersiveField",
-    "DispersiveSurface",
+    "Dispersion",
     "Emissivity",
     "EmissivityField",
     "EmissivityStack",
     "EmissivityTrend",
     "Exchange",
-    "FeatureField",
-    "FeatureFields",
     "FeatureSurface",
     "FeatureTrends",
-    "FeatureTrendsField",
+    "Features",
     "Fresnel",
     "HagenRubens",
-    "MapField",
+    "HomogeneousSurface",
     "MapSurface",
+    "ModifiedSurface",
+    "Modifier",
     "Oxide",
     "OxideHistory",
-    "OxidisedField",
-    "OxidisedSurface",
     "ParabolicOxide",
-    "PhaseEmissivity",
-    "ReflectingField",
-    "ReflectingSurface",
+    "PhaseSurface",
     "SideElements",
     "SideShape",
     "SpectralSurface",
     "SpectralTable",
     "Surface",
-    "SurfaceChoice",
     "TemperatureSurface",
-    "TemperatureTable",
     "Texture",
     "TrendSurface",
-    "UniformEmissivity",
     "UniformSurface",
     "Wedge",
-    "WrappedSurface",
     "chip_fraction",
+    "feature_fractions",
     "shear_band_fraction",
 ]

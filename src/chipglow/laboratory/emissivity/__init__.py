@@ -12,6 +12,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 from chipglow.laboratory.emissivity.file import (
     EmissivityMapFile,
     MeasuredEmissivity,
+    SurfaceFile,
     emissivity_trend,
     read_emissivity_lines,
     read_emissivity_map,
@@ -46,6 +47,7 @@ __all__ = [
     "RegionEmissivity",
     "RegionSection",
     "RegionTemperatures",
+    "SurfaceFile",
     "TrueTemperature",
     "determine_emissivities",
     "determine_emissivity",
