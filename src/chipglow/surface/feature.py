@@ -22,13 +22,12 @@ from chipglow.surface.blend import (
     Textures,
     blend_row,
     fraction_between,
-    padded,
 )
 from chipglow.surface.blocks import in_blocks
 from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.surface import Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import EmissivityTrend, draw_text, drawn_trends
-from chipglow.surface.texture import Texture
+from chipglow.surface.texture import Texture, padded
 
 UNDEFORMED_STRAIN: Final = 0.01
 """Plastic strain under which material is not affected by the cut."""
