@@ -149,8 +149,8 @@ def _scene_places(scene: Scene, start: float, duration: float) -> list[_Points]:
     tool = scene.tool
     if tool is None:
         return [cursor, rake, band]
-    index = int(np.searchsorted(scene.times, start + duration / 2)) - 1
-    workpiece = scene.field("material", max(index, 0)) == Material.WORKPIECE
+    index = scene.frame_at(start + duration / 2)
+    workpiece = scene.field("material", index) == Material.WORKPIECE
     contact = contact_length(scene.raster, workpiece, tool, _TOUCHING)
     if contact > 0:
         middle, across = tool.rake_point(contact / 2), _REACH * np.asarray(tool.rake_normal)

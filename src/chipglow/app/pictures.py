@@ -10,7 +10,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
-from chipglow.analysis.cut import middle_frame
 from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
@@ -343,7 +342,7 @@ class SceneModel:
 
     def _middle_frame(self, state: State) -> int:
         """Return the index of the frame in the middle of the exposure."""
-        return middle_frame(self.opened.scene, state.start, state.study.camera.integration_time)
+        return self.opened.scene.frame_at(state.start + state.study.camera.integration_time / 2)
 
 
 class MeasurementModel:

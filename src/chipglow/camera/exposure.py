@@ -315,17 +315,10 @@ def _row_weights(
     for of_row, (own, values) in zip(weights, covered, strict=True):
         of_row[own.start - indices.start : own.stop - indices.start] = values
     middles = [
-        _frame_at(scene, one + duration / 2, own) - indices.start
+        min(max(scene.frame_at(one + duration / 2), own[0]), own[-1]) - indices.start
         for one, (own, _) in zip(starts, covered, strict=True)
     ]
     return indices, weights[row_of], np.array(middles, np.intp)[row_of]
-
-
-def _frame_at(scene: Scene, time: float, indices: range) -> int:
-    """The one of these frames that stands for a time."""
-    rounded = time + _ROUNDING * scene.frame_spacing
-    index = int(np.searchsorted(scene.times, rounded, side="right")) - 1
-    return min(max(index, indices[0]), indices[-1])
 
 
 def _sweep(
