@@ -53,9 +53,9 @@ from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
     EmissivityLine,
-    ReflectedTemperature,
     determine_emissivity,
     load_regions,
+    reflected_temperature,
     true_temperature,
 )
 from chipglow.laboratory.emissivity.emissivity import Heating
@@ -423,7 +423,7 @@ class Evaluation:
             self.images("unknown-*.hcc"),
             found["shear band"],
             EmissivityLine.constant(1.0),
-            ReflectedTemperature(293.0, ROOM),
+            reflected_temperature(293.0, ROOM),
         )
         return {
             "blackbody": Found.of(unknown.estimate),

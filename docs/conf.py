@@ -6,13 +6,13 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
-sys.path.insert(0, str(HERE))  # for mathml and sample_files
+sys.path.insert(0, str(HERE))  # for mathml, field_tables and sample_files
 
+from field_tables import field_tables  # noqa: E402
 from sample_files import SAMPLES, write_archive  # noqa: E402
 
 from chipglow.io import ImportDescription  # noqa: E402
 from chipglow.laboratory.measurement import MeasurementDescription  # noqa: E402
-from chipglow.quantities import field_tables  # noqa: E402
 from chipglow.study import Study, study_text  # noqa: E402
 
 project = "chipglow"

@@ -12,7 +12,7 @@ from math import cos, log, radians, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.cutting import EnergyHistory, ForceHistory
+from chipglow.cutting import CuttingSimulation, EnergyHistory, ForceHistory
 from chipglow.scene import Material, Raster, Scene, ToolGeometry
 
 ROOM = 293.15
@@ -175,3 +175,21 @@ class AnalyticChip:
         since = np.where(chip, across / closing, 0.0)[..., None]
         crossing = points - since * chip_velocity
         return np.asarray(crossing - (time - since) * np.array([self.speed, 0.0]))
+
+
+def replace_cut(monkeypatch, scene):
+    """Replace the cutting simulation by a chip in closed form; returns the list of its runs."""
+    calls = []
+
+    def cut_chip(simulation, window, raster, on_frame, on_progress, resume, on_checkpoint, preview):
+        calls.append(simulation)
+        for frame in scene.frames():
+            on_frame(frame)
+            if preview:
+                preview.on_frame(frame)
+        on_progress(1.0)
+        return AnalyticChip().cut_history()
+
+    monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
+    monkeypatch.setattr(CuttingSimulation, "lattice", lambda *_: None)  # it has samples only
+    return calls

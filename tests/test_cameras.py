@@ -487,9 +487,7 @@ def test_only_the_chosen_frames_are_read(tmp_path, kind, monkeypatch):
 
     read = []
     own = binary.Binary.read
-    monkeypatch.setattr(
-        binary.Binary, "read", lambda self, a, n, what: read.append(n) or own(self, a, n, what)
-    )
+    monkeypatch.setattr(binary.Binary, "read", lambda self, a, n: read.append(n) or own(self, a, n))
     read_recording(path, slice(4, 5))
     assert sum(n for n in read if n > PICTURES[0].nbytes // 2) < 2 * PICTURES[0].nbytes + 4000
 
@@ -554,11 +552,11 @@ def test_absurd_dimensions_are_refused_before_memory_is_taken(tmp_path):
     wide = np.zeros((1, 2), np.uint16)
     one = bytearray(files.fff(wide, pack=partial(files.png, swapped=False)))
     struct.pack_into("<HH", one, 128 + 2, 60_000, 60_000)
-    with pytest.raises(SourceError, match="60000 columns and 60000 rows"):
+    with pytest.raises(SourceError, match=r"3\.6e\+09 samples"):
         read_here(make(tmp_path, "a.fff", bytes(one)), "flir", None, Stated())
     cine = bytearray(files.cine(PICTURES))
     struct.pack_into("<ii", cine, 48, 65_000, -65_000)
-    with pytest.raises(SourceError, match="expected 8450000000"):
+    with pytest.raises(SourceError, match="no whole frame"):
         read_recording(make(tmp_path, "a.cine", bytes(cine)))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import typer
 import yaml
-from analytic_chip import AnalyticChip
+from analytic_chip import AnalyticChip, replace_cut
 from typer.testing import CliRunner
 from undrawn import leave_undrawn
 
@@ -62,34 +62,6 @@ def folder(tmp_path, undrawn, monkeypatch):
 @pytest.fixture(scope="module")
 def chip_scene():
     return AnalyticChip().scene()
-
-
-def replace_cut(monkeypatch, scene):
-    """Replace the cutting simulation by a chip in closed form; returns the list of its runs."""
-    calls = []
-
-    def cut_chip(
-        simulation,
-        window,
-        raster,
-        on_frame,
-        on_progress=None,
-        resume=None,
-        on_checkpoint=None,
-        preview=None,
-    ):
-        calls.append(simulation)
-        for frame in scene.frames():
-            on_frame(frame)
-            if preview:
-                preview.on_frame(frame)
-        if on_progress:
-            on_progress(1.0)
-        return AnalyticChip().cut_history()
-
-    monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
-    monkeypatch.setattr(CuttingSimulation, "lattice", lambda *_: None)  # it has samples only
-    return calls
 
 
 @pytest.fixture
@@ -172,6 +144,8 @@ def test_help_imports_none_of_the_heavy_libraries(command, own):
 def test_init_writes_the_papers_study_and_keeps_what_is_there(folder):
     assert chipglow("init", "paper.yaml").exit_code == 0
     assert load_study("paper.yaml") == Study()
+    assert chipglow("init", "paper.json", "--schema").exit_code == 0
+    assert loads((folder / "paper.json").read_text())["title"] == "Study"
     assert_refused(chipglow("init", "study.yaml"), "study.yaml", "already exists", "--force")
     assert (folder / "study.yaml").read_text() == STUDY
     assert chipglow("init", "study.yaml", "--force").exit_code == 0
@@ -261,11 +235,7 @@ def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):
     assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "--force")
     assert runs == []
     assert [path.name for path in (folder / "thesis").iterdir()] == ["chapter.tex"]
-
-
-@pytest.mark.parametrize("command", ["run", "cut"])
-def test_a_place_that_is_not_there_is_refused_before_anything_is_computed(command, runs):
-    assert_refused(chipglow(command, "study.yaml", "--out", "no/where"), "no folder no")
+    assert_refused(chipglow("run", "study.yaml", "--out", "no/where"), "no folder no")
     assert runs == []
 
 
@@ -451,15 +421,6 @@ def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip
     assert_refused(chipglow(*arguments), "surface: maps: 'chip 1' is the name of another chip too")
 
 
-def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
-    arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
-    result = chipglow(*arguments, "--start", "20 us", "--chip", "chip 2")
-    assert result.exit_code == 0, result.output
-    measurement = read_measurement("m.nc")
-    np.testing.assert_allclose(measurement.times, [20e-6])
-    assert measurement.data.attrs["surface"] == "chip 2"
-
-
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
@@ -473,6 +434,14 @@ def test_measure_refuses_what_it_cannot_do_and_writes_nothing(
     arguments = ["measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc"]
     assert_refused(chipglow(*arguments, option, value), message)
     assert sorted(path.name for path in folder.iterdir()) == ["scene.nc", "study.yaml"]
+
+
+def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
+    options = ("--start", "20 us", "--chip", "chip 2", "--out", "m.nc")
+    assert chipglow("measure", "scene.nc", "--study", "study.yaml", *options).exit_code == 0
+    measurement = read_measurement("m.nc")
+    np.testing.assert_allclose(measurement.times, [20e-6])
+    assert measurement.data.attrs["surface"] == "chip 2"
 
 
 def test_a_scene_that_is_cut_short_or_no_scene_is_refused(folder, scene):

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
-from chipglow.laboratory.chip.frames import FrameScatter
+from chipglow.laboratory.chip.frames import frame_scatter
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
 from chipglow.laboratory.comparison.comparison import SURE, _confidence
 from chipglow.scene import PlacedTool, ToolGeometry
@@ -435,12 +435,12 @@ def test_noise_that_is_alike_makes_no_set_of_two_the_best(known):
     sets = [Estimate(np.full(60, 700.0 + away)) for away in (10.0, -10.0)]
     for seed in range(repeats):
         shown = 700.0 + alike(np.random.default_rng(seed))
-        scatter = FrameScatter.of(shown)
+        scatter = frame_scatter(shown)
         alone = shown.std(axis=0, ddof=1) / sqrt(len(shown))
         mean = shown.mean(axis=0)
         found = Estimate(mean).with_component("position", alone, independent="per element")
         if known:
-            found = Estimate(mean, (scatter.component(),))
+            found = Estimate(mean, (scatter,))
         best = int(np.argmin([((one.values - mean) ** 2).mean() for one in sets]))
         claims += _confidence(found, sets, best) >= SURE
     # Without the frames' own patterns 84 % are called so; binomial: 6 of 60 +- 2.3.
@@ -450,19 +450,18 @@ def test_noise_that_is_alike_makes_no_set_of_two_the_best(known):
 
 def of_mean(scatter):
     """Standard uncertainty of the mean over all places."""
-    none = np.zeros(scatter.standard_deviation.shape)
-    return Estimate(none, (scatter.component(),)).mean().standard_uncertainty
+    return Estimate(np.zeros(scatter.variance.shape), (scatter,)).mean().standard_uncertainty
 
 
 def test_the_uncertainty_of_a_mean_over_frames_that_are_alike_is_theirs():
     generator = np.random.default_rng(5)
     shown = [alike(generator, 60) for _ in range(40)]
     true = np.std([one.mean(axis=0) for one in shown])
-    stated = np.mean([FrameScatter.of(one).standard_deviation for one in shown])
+    stated = np.mean([np.sqrt(frame_scatter(one).variance) for one in shown])
     assert stated == pytest.approx(true, rel=0.15)
     together = np.std([one.mean() for one in shown])
-    assert np.mean([of_mean(FrameScatter.of(one)) for one in shown]) == pytest.approx(
+    assert np.mean([of_mean(frame_scatter(one)) for one in shown]) == pytest.approx(
         together, rel=0.25
     )
     even = generator.standard_normal((30, 200))
-    assert FrameScatter.of(even).standard_deviation.mean() == pytest.approx(1 / sqrt(30), rel=0.05)
+    assert np.sqrt(frame_scatter(even).variance).mean() == pytest.approx(1 / sqrt(30), rel=0.05)

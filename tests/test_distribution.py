@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from chipglow.analysis import Headline
 from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution
 
 CAUSES = ("segment", "texture", "pixel phase")
@@ -78,6 +79,14 @@ def test_three_draws_of_what_decides_count_as_three():
     # t of two degrees of freedom, 4.303, times 10, times the root of 1 + 1/3.
     assert high == pytest.approx(-40.0 + 4.303 * 10.0 * np.sqrt(4 / 3), rel=1e-3)
     assert low == pytest.approx(-80.0 - high)
+
+
+def test_a_part_of_an_error_of_unknown_sign_is_not_told():
+    names, portion = ("rake face", "mid-contact", "chip 2"), Distribution(np.full(3, -10.0), "a")
+    error, known = (Distribution(np.array([-30.0, one, -20.0]), "a") for one in (1.0, -10.0))
+    assert Headline(*names, error, error, portion).psf_fraction is None
+    fraction = Headline(*names, known, known, portion).psf_fraction.mean
+    assert fraction == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)
 
 
 def test_a_single_draw_says_nothing_of_the_scatter():

@@ -409,16 +409,6 @@ def test_truncated_files(tmp_path, write, fraction):
     refused(CloudSource(str(path), **options))
 
 
-def test_vtk_that_claims_too_much(tmp_path):
-    head = "# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 1000000000000 float\n"
-    (tmp_path / "p.vtk").write_text(head + "0" * 100)
-    refused(CloudSource(str(tmp_path / "p.vtk")), "1000000000000 values in")
-    (tmp_path / "p.vtp").write_text(
-        '<VTKFile type="PolyData"><Piece NumberOfPoints="1000000000000">'
-    )
-    refused(CloudSource(str(tmp_path / "p.vtp")), "1000000000000 values in")
-
-
 def test_arrays_that_claim_too_much(tmp_path):
     with h5py.File(tmp_path / "p.h5", "w") as file:
         for name in ("x", "y", "temperature"):

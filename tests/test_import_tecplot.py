@@ -123,7 +123,7 @@ def test_the_ghosts_of_the_guides_examples(tmp_path, shape, stored):
     zone = ZoneOfFile(columns, shape, centred=(False, False, False, True))
     write_tecplot(tmp_path / "chip.plt", ("X", "Y", "Z", "T"), [zone])
     (found,) = binary_zones(tmp_path / "chip.plt")
-    np.testing.assert_array_equal(found.read().grid.cell_data["T"], [1.5, 12.5])
+    np.testing.assert_array_equal(found.load().grid.cell_data["T"], [1.5, 12.5])
 
 
 @pytest.mark.parametrize("kind", ["bricks", "tetrahedra"])

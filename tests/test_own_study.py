@@ -1,6 +1,5 @@
 """A study of one's own: what follows from it, what it leaves to the paper, what it will cost."""
 
-import subprocess
 import sys
 
 import numpy as np
@@ -8,8 +7,6 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import Distribution
-from chipglow.analysis.reductions import Headline
 from chipglow.camera import AnnularAperturePSF
 from chipglow.cli import progress
 from chipglow.quantities import adapter
@@ -19,9 +16,7 @@ from chipglow.scene import Raster
 from chipglow.study import Study, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.camera_section import CAMERAS
-from chipglow.text import DescriptionError
 
-NAMES = ("rake face", "mid-contact", "chip 2")
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
     "camera": {
@@ -110,6 +105,9 @@ def test_a_response_file_weighs_the_band(tmp_path):
         ({"detector_pitch": "15 um"}, "magnification: is missing"),
         ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, expected over 0"),
         ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "makes 6 um"),
+        ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
+        ({"preset": "alpha-nir"}, "magnification: is missing"),
+        ({"psf": {"kind": "airy", "f_number": 2.5}}, "magnification: is missing, expected it with"),
         ({"psf": {"kind": "airy"}}, "expected one of numerical_aperture and f_number"),
         (
             {"psf": {"kind": "airy", "f_number": 2.0, "numerical_aperture": 0.2}},
@@ -184,18 +182,6 @@ def test_a_dear_cut_is_begun_only_if_the_user_says_so(agreed, asked, monkeypatch
     assert len(questions) == asked
 
 
-def test_an_empty_file_is_no_study(tmp_path):
-    (tmp_path / "empty.yaml").write_text("")
-    with pytest.raises(DescriptionError, match=r"empty.yaml: is empty, expected a study"):
-        load_study(tmp_path / "empty.yaml")
-
-
-def test_the_package_runs_as_a_module():
-    command = [sys.executable, "-m", "chipglow", "--version"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("chipglow ")
-
-
 def test_what_is_too_coarse_is_said():
     coarse = Study(cutting={"feed": "0.05 mm", "numerics": {"cell": "10 um"}})
     scene = AnalyticChip(frames=10, frame_spacing=8e-6).scene()
@@ -209,22 +195,6 @@ def test_what_is_too_coarse_is_said():
 def test_the_reference_true_needs_no_quotes(tmp_path):
     (tmp_path / "s.yaml").write_text("analysis: {reference: true}\n")
     assert load_study(tmp_path / "s.yaml").analysis.reference == "true"
-
-
-def test_an_f_number_needs_the_magnification():
-    with pytest.raises(ValueError, match=r"magnification: is missing, expected it with psf"):
-        Study(camera={"psf": {"kind": "airy", "f_number": 2.5}})
-
-
-def test_a_part_of_an_error_of_unknown_sign_is_not_told():
-    causes = ("segment", "texture", "pixel phase")
-    error = Distribution(np.array([[[-30.0, 1.0, -20.0]]]), causes)
-    portion = Distribution(np.array([[[-10.0, -10.0, -10.0]]]), causes)
-    assert Headline(*NAMES, error, error, portion).psf_fraction is None
-    known = Distribution(np.array([[[-30.0, -10.0, -20.0]]]), causes)
-    assert Headline(*NAMES, known, known, portion).psf_fraction.mean == pytest.approx(
-        (1 / 3 + 1 + 1 / 2) / 3
-    )
 
 
 def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():
@@ -243,19 +213,3 @@ def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand(
         built = Study(camera={"preset": name, "magnification": 1.0}).camera
         assert f"{built.array[0]} x {built.array[1]}" in preset["source"]
         assert f"{1e6 * built.build().pitch:g} um" in preset["source"]
-
-
-def test_the_insb_camera_with_a_1_x_lens():
-    camera = Study(camera={"preset": "flir-a6751", "magnification": 1.0}).camera.build()
-    assert (camera.band, camera.pitch) == (Band(3e-6, 5e-6), pytest.approx(15e-6, rel=1e-12))
-    assert camera.psf.numerical_aperture == pytest.approx(1 / (4 * 2.5), rel=1e-12)
-
-
-def test_an_unknown_camera_is_refused():
-    with pytest.raises(ValueError, match="'lepton' is unknown, expected one of flir-lepton-3"):
-        Study(camera={"preset": "lepton"})
-
-
-def test_a_preset_needs_its_magnification():
-    with pytest.raises(ValueError, match="magnification: is missing"):
-        Study(camera={"preset": "alpha-nir"})

@@ -22,8 +22,7 @@ from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
-from chipglow.report.visible import visible_picture
-from chipglow.scene import Line, Material
+from chipglow.scene import Line
 from chipglow.study import Study
 
 TITLE = "My <i>own</i> study"
@@ -444,22 +443,3 @@ def test_the_papers_emissivities_come_back_from_heated_objects(result):
     for chip in ("chip 1", "chip 2"):
         body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
         assert band.mean > body.mean + 2 * band.estimate.standard_uncertainty
-
-
-def test_the_visible_picture_shows_tool_and_bands(result):
-    grey = visible_picture(result.frame, result.raster)
-    material, strain = result.frame.material, result.frame.plastic_strain
-    assert (grey[material == Material.TOOL] == 0.0).all()
-    steel = material == Material.WORKPIECE
-    assert grey.min() >= 0.0 and grey.max() <= 1.0
-    low, high = grey[steel & (strain < 1.0)].mean(), grey[steel & (strain > 2.0)].mean()
-    assert high < low
-
-
-def test_table_2_says_what_the_study_sets():
-    rows = {name: (paper, here) for name, paper, here in SETTINGS}
-    for name in ("Feed", "Cutting speed", "Rake angle", "Clearance angle", "Edge radius"):
-        assert rows[name][0] == rows[name][1], name
-    other = table_2(Study(cutting={"feed": "0.1 mm", "tool": {"rake_angle": "6 deg"}}))
-    assert ("Feed", "0.3 mm", "0.1 mm") in other
-    assert ("Rake angle", "−7°", "6°") in other

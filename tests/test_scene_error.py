@@ -23,12 +23,12 @@ from chipglow.analysis import (
 )
 from chipglow.camera import Camera, GaussianPSF
 from chipglow.cli import app
-from chipglow.io import open_scene, write_scene
+from chipglow.io import write_scene
 from chipglow.radiometry import Band
-from chipglow.scene import Raster, Scene, SceneError, ToolGeometry
+from chipglow.scene import Raster, Scene, ToolGeometry
 from chipglow.scene.regions import Circle, Polygon, Region
 from chipglow.study import Study, run
-from chipglow.surface import CHIP_1, TemperatureSurface, UniformSurface
+from chipglow.surface import TemperatureSurface, UniformSurface
 
 RASTER = Raster(left=-60e-6, top=40e-6, spacing=1e-6, rows=80, columns=120)
 BAND = Band(3.8e-6, 5.1e-6)
@@ -60,24 +60,6 @@ def found(scene=None, camera=CAMERA, surface=None, **plan):
 
 def reading(result, place, name):
     return headline(result.data, f"{place}, {name}")
-
-
-def test_a_scene_of_temperature_alone_is_whole():
-    scene = plate()
-    frame = scene.frame(0)
-    assert scene.fields == ("temperature",)
-    assert (frame.material == 1).all()
-    assert frame.plastic_strain is None and frame.velocity_x is None
-    with pytest.raises(SceneError, match="has no plastic_strain, expected it"):
-        scene.field("plastic_strain", 0)
-
-
-def test_a_file_of_temperature_alone_is_read_as_written(tmp_path):
-    write_scene(plate(), tmp_path / "plate.nc")
-    back = open_scene(tmp_path / "plate.nc")
-    assert back.fields == ("temperature",)
-    # Packed in steps of 1/40 K.
-    np.testing.assert_allclose(back.frame(0).temperature, plate().frame(0).temperature, atol=0.0126)
 
 
 def test_an_even_plate_is_measured_without_error():
@@ -165,21 +147,12 @@ def test_emissivity_follows_the_temperature():
             ),
             "is in pixels, expected lengths",
         ),
+        (lambda: PointPlace("middle", (0.0, 0.0)), "two places have the name 'middle'"),
     ],
 )
 def test_places_that_cannot_be_are_refused(place, wrong):
     with pytest.raises(ValueError, match=wrong):
-        found(places=(place(),))
-
-
-def test_two_places_have_two_names():
-    with pytest.raises(ValueError, match="two places have the name 'middle'"):
-        Plan(places=(MIDDLE, MIDDLE))
-
-
-def test_features_of_a_chip_need_the_strain():
-    with pytest.raises(ValueError, match=r"no plastic strain.*expected a surface of another"):
-        CHIP_1.on(plate())
+        found(places=(MIDDLE, place()))
 
 
 def test_a_place_that_some_pixels_do_not_hold_is_told_of():

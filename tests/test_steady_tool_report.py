@@ -79,13 +79,3 @@ def test_the_report_shows_both_and_what_the_paper_misses(own, steady, undrawn, t
     numbers = summary["steady_tool"]
     assert numbers["rake_chip_degC"]["difference"] == pytest.approx(WARMER, abs=1e-3)
     assert numbers["cutting_N_per_mm"]["difference"] == 0.0  # the same forces
-
-
-def test_the_study_differs_in_its_tool_only():
-    study = Study.quick()
-    steady = study.with_steady_tool()
-    assert steady.cutting.simulation().tool_temperature is not None
-    assert study.cutting.simulation().tool_temperature is None
-    back = replace(steady.cutting.tool, temperature=None)
-    assert back == study.cutting.tool
-    assert steady.camera == study.camera

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analytic_chip import AnalyticChip
+from analytic_chip import AnalyticChip, replace_cut
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from chipglow.analysis import Plan
@@ -209,178 +209,89 @@ def load(text, folder):
     return load_study(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "field", "message"),
-    [
-        ("sede: 3", "", "unknown key 'sede', did you mean 'seed'?"),
-        ("camera: {integration_tme: 10 us}", "camera", "did you mean 'integration_time'?"),
-        (
-            "camera: {zoom: 3}",
-            "camera",
-            "unknown key 'zoom', expected one of preset, band, response",
-        ),
-        (
-            "camera: {integration_time: 10}",
-            "camera.integration_time",
-            "10 has no unit, expected a time such as 10 us",
-        ),
-        (
-            "cutting: {feed: 0.3}",
-            "cutting.feed",
-            "0.3 has no unit, expected a length such as 0.3 mm",
-        ),
-        ("cutting: {feed: -0.3 mm}", "cutting.feed", "-0.3 mm is not over 0, expected a length"),
-        ("cutting: {feed: 0.3 s}", "cutting.feed", "'0.3 s' is not a length"),
-        (
-            "cutting: {speed: fast}",
-            "cutting.speed",
-            "'fast' is not a speed, expected one such as 250 m/min",
-        ),
-        (
-            "cutting: {initial_temperature: -280 degC}",
-            "cutting.initial_temperature",
-            "-280 degC is not over 0 K",
-        ),
-        (
-            "cutting: {tool: {temperature: 1300 degC}}",
-            "cutting.tool.temperature",
-            "1300 degC, expected -73.15 degC to 1226.85 degC",
-        ),
-        (
-            "cutting: {tool: {temperature: hot}}",
-            "cutting.tool.temperature",
-            "'hot' is not a temperature",
-        ),
-        (
-            "cutting: {tool: {rake_angle: 80 deg}}",
-            "cutting.tool",
-            "80 deg, expected over -60 deg, under 60 deg",
-        ),
-        (
-            "cutting: {tool: {material: cheese}}",
-            "cutting.tool.material",
-            "'cheese' is unknown, expected one of carbide",
-        ),
-        (
-            "cutting: {workpiece: cheese}",
-            "cutting.workpiece",
-            "'cheese' is unknown, expected one of aisi-1045",
-        ),
-        (
-            "cutting: {numerics: {cell: 1 m}}",
-            "cutting.numerics",
-            "1000000 um, expected 0.5 um to 43.75 um",
-        ),
-        (
-            "cutting: {field_of_view: {rows: 8.5}}",
-            "cutting.field_of_view.rows",
-            "8.5, expected a valid integer",
-        ),
-        (
-            "cutting: {field_of_view: {rows: 0}}",
-            "cutting.field_of_view",
-            "expected 1 or more",
-        ),
-        (
-            "cutting: {window: {end: 3 mm}}",
-            "cutting",
-            "window.end: 3 mm is beyond cutting_length, expected up to 2.6 mm",
-        ),
-        (
-            "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
-            "cutting.window",
-            "start: 1.9 mm, expected under end, 1.8 mm",
-        ),
-        (
-            "cutting: {window: {band_duration: 5 us}}",
-            "cutting.window.band_duration",
-            "5 us is shorter than the exposure, expected 10 us or more",
-        ),
-        ("cutting: 3", "cutting", "3 is no section, expected keys of speed"),
-        ("camera: {band: 5.1-3.8 um}", "camera.band", "5.1-3.8 um is reversed"),
-        ("camera: {band: 3.8-5.1}", "camera.band", "3.8-5.1 has no unit"),
-        (
-            "{camera: {integration_time: 200 us}, cutting: {window: {start: 1.579 mm, "
-            "end: 1.958 mm}}}",
-            "camera.integration_time",
-            "200 us is longer than the scene, expected up to the 90.96 us",
-        ),
-        (
-            "camera: {pitch: 2 mm}",
-            "camera.pitch",
-            "2000 um is larger than the field of view, expected up to the 540",
-        ),
-        ("camera: {fill_factor: 2}", "camera", "2, expected over 0, up to 1"),
-        ("camera: {fill_factor: yes}", "camera.fill_factor", "True, expected a valid number"),
-        ("camera: {fill_factor: .nan}", "camera.fill_factor", "nan, expected a finite number"),
-        (
-            "camera: {psf: {kind: lens}}",
-            "camera.psf",
-            "kind: 'lens', expected one of annular-aperture, gaussian, airy, measured",
-        ),
-        ("camera: {psf: {kind: gaussian}}", "camera.psf.fwhm", "is missing"),
-        ("camera: {psf: {kind: gaussian, fwhm: 8}}", "camera.psf.fwhm", "8 has no unit"),
-        (
-            "camera: {psf: {kind: measured, file: no.npy, spacing: 1 um}}",
-            "camera.psf",
-            "no.npy: No such file",
-        ),
-        (
-            "camera: {psf_order: pixels}",
-            "camera.psf_order",
-            "'pixels', expected 'optics' or 'detector'",
-        ),
-        ("surface: {chips: {}}", "surface", "chips: {} is empty, expected one chip or more"),
-        (
-            "surface: {chips: {a: chip-3}}",
-            "surface.chips.a",
-            "'chip-3' is unknown, expected one of chip-1, chip-2",
-        ),
-        ("surface: {tool: {mean: 1.2}}", "surface.tool.mean", "1.2, expected 0 to 1"),
-        (
-            "surface: {chips: {a: chip-1}}",
-            "analysis.rake_chip",
-            "'chip 2' is unknown, expected one of a",
-        ),
-        (
-            "analysis: {reference: best}",
-            "analysis.reference",
-            "'best', expected 'maximum', 'mean', 'centre' or 'true'",
-        ),
-        ("analysis: {exposures: 0}", "analysis", "exposures: 0, expected 1 or more"),
-        ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0", "4 has no unit"),
-        ("seed: -1", "seed", "-1, expected 0 or more"),
-        (
-            "cutting: {tool: {chamfer: {width: 10 um, angle: 20 deg}}}",
-            "cutting.tool",
-            "chamfer width: expected over 17.53 um",
-        ),
-        (
-            "cutting: {tool: {hone: {rake: 40 um, clearance: 20 um}, edge_radius: 5 um}}",
-            "cutting.tool",
-            "edge_radius: is not used beside hone, expected one or the other",
-        ),
-        (
-            "cutting: {tool: {outline: none.csv}}",
-            "cutting.tool",
-            "none.csv: No such file or directory, expected a file",
-        ),
-        ("- 1", "", "[1] is no section"),
-        ("a: [1,", "line 1", "expected YAML"),
-        ("seed: 1\nseed: 2", "line 2", "duplicate key 'seed'"),
-        ("x: !!python/object/apply:os.system [ls]", "line 1", "could not determine a constructor"),
-        ("seed: 2026-13-45", "", "month must be in 1..12, expected YAML"),
-    ],
-)
-def test_bad_input_is_one_line_with_file_field_value_and_expectation(
-    text, field, message, tmp_path
-):
+REFUSED = [
+    ("sede: 3", "unknown key 'sede', did you mean 'seed'?"),
+    ("camera: {zoom: 3}", "camera: unknown key 'zoom', expected one of preset, band, response"),
+    ("cutting: {feed: 0.3}", "cutting.feed: 0.3 has no unit, expected a length such as 0.3 mm"),
+    ("cutting: {feed: -0.3 mm}", "cutting.feed: -0.3 mm is not over 0, expected a length"),
+    ("cutting: {feed: 0.3 s}", "cutting.feed: '0.3 s' is not a length"),
+    ("cutting: {initial_temperature: -280 degC}", "initial_temperature: -280 degC is not over 0 K"),
+    (
+        "cutting: {tool: {temperature: 1300 degC}}",
+        "1300 degC, expected -73.15 degC to 1226.85 degC",
+    ),
+    ("cutting: {tool: {temperature: hot}}", "tool.temperature: 'hot' is not a temperature"),
+    ("cutting: {tool: {rake_angle: 80 deg}}", "80 deg, expected over -60 deg, under 60 deg"),
+    ("cutting: {tool: {material: cheese}}", "'cheese' is unknown, expected one of carbide"),
+    ("cutting: {workpiece: cheese}", "workpiece: 'cheese' is unknown, expected one of aisi-1045"),
+    ("cutting: {numerics: {cell: 1 m}}", "1000000 um, expected 0.5 um to 43.75 um"),
+    ("cutting: {field_of_view: {rows: 8.5}}", "field_of_view.rows: 8.5, expected a valid integer"),
+    ("cutting: {field_of_view: {rows: 0}}", "expected 1 or more"),
+    ("cutting: {window: {end: 3 mm}}", "window.end: 3 mm is beyond cutting_length, expected up to"),
+    (
+        "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
+        "start: 1.9 mm, expected under end, 1.8 mm",
+    ),
+    (
+        "cutting: {window: {band_duration: 5 us}}",
+        "5 us is shorter than the exposure, expected 10 us",
+    ),
+    ("cutting: 3", "cutting: 3 is no section, expected keys of speed"),
+    ("camera: {band: 5.1-3.8 um}", "camera.band: 5.1-3.8 um is reversed"),
+    ("camera: {band: 3.8-5.1}", "camera.band: 3.8-5.1 has no unit"),
+    (
+        "{camera: {integration_time: 200 us}, cutting: {window: {start: 1.579 mm, end: 1.958 mm}}}",
+        "camera.integration_time: 200 us is longer than the scene, expected up to the 90.96 us",
+    ),
+    ("camera: {pitch: 2 mm}", "2000 um is larger than the field of view, expected up to the 540"),
+    ("camera: {fill_factor: yes}", "camera.fill_factor: True, expected a valid number"),
+    ("camera: {fill_factor: .nan}", "camera.fill_factor: nan, expected a finite number"),
+    (
+        "camera: {psf: {kind: lens}}",
+        "kind: 'lens', expected one of annular-aperture, gaussian, airy",
+    ),
+    ("camera: {psf: {kind: gaussian}}", "camera.psf.fwhm: is missing"),
+    ("camera: {psf: {kind: measured, file: no.npy, spacing: 1 um}}", "no.npy: No such file"),
+    ("camera: {psf_order: pixels}", "psf_order: 'pixels', expected 'optics' or 'detector'"),
+    ("surface: {chips: {}}", "surface: chips: {} is empty, expected one chip or more"),
+    (
+        "surface: {chips: {a: chip-3}}",
+        "surface.chips.a: 'chip-3' is unknown, expected one of chip-1",
+    ),
+    ("surface: {tool: {mean: 1.2}}", "surface.tool.mean: 1.2, expected 0 to 1"),
+    ("surface: {chips: {a: chip-1}}", "analysis.rake_chip: 'chip 2' is unknown, expected one of a"),
+    ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0: 4 has no unit"),
+    ("seed: -1", "seed: -1, expected 0 or more"),
+    (
+        "cutting: {tool: {chamfer: {width: 10 um, angle: 20 deg}}}",
+        "chamfer width: expected over 17.53 um",
+    ),
+    (
+        "cutting: {tool: {hone: {rake: 40 um, clearance: 20 um}, edge_radius: 5 um}}",
+        "edge_radius: is not used beside hone, expected one or the other",
+    ),
+    (
+        "cutting: {tool: {outline: none.csv}}",
+        "none.csv: No such file or directory, expected a file",
+    ),
+    ("- 1", "[1] is no section"),
+    ("a: [1,", "line 1, column 7: "),
+    ("seed: 1\nseed: 2", "line 2, column 1: duplicate key 'seed'"),
+    ("x: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
+    ("seed: 2026-13-45", "month must be in 1..12, expected YAML"),
+    (b"\x89HDF\r\n\x1a\n\xff\xfe", "expected text in UTF-8"),
+    ("seed: 1\n" + 1_000_000 * "#", "expected a file of up to 1000 kB"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED, ids=[message for _, message in REFUSED])
+def test_bad_input_is_one_line_with_file_field_value_and_expectation(text, message, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(DescriptionError) as caught:
-        load(text, tmp_path)
+        load_study(path)
     line = str(caught.value)
-    assert "\n" not in line
-    assert line.startswith(f"study.yaml: {field}")
-    assert message in line
+    assert "\n" not in line and "study.yaml: " in line and message in line
 
 
 TEMPLATE = [line for line in study_text(Study()).splitlines() if line.strip()[:1] not in ("", "#")]
@@ -401,24 +312,14 @@ def test_a_study_with_a_garbled_line_is_read_or_refused_in_one_line(number, text
         assert len(str(error).splitlines()) == 1
 
 
-def test_a_file_that_is_not_text_is_refused(tmp_path):
-    (tmp_path / "study.yaml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
-    with pytest.raises(DescriptionError, match=r"study\.yaml: expected text in UTF-8"):
-        load_study(tmp_path / "study.yaml")
-
-
-def test_a_file_that_nobody_writes_by_hand_is_refused_unread(tmp_path):
-    (tmp_path / "study.yaml").write_text("seed: 1\n" + 1_000_000 * "#")
-    with pytest.raises(DescriptionError, match=r"study\.yaml: expected a file of up to 1000 kB"):
-        load_study(tmp_path / "study.yaml")
-
-
 def test_a_mark_of_the_order_of_bytes_is_no_part_of_the_study(tmp_path):
     (tmp_path / "study.yaml").write_text("seed: 3\n", encoding="utf-8-sig")
     assert load_study(tmp_path / "study.yaml").seed == 3
 
 
 def test_an_empty_study_or_section_means_the_defaults(tmp_path):
+    with pytest.raises(DescriptionError, match=r"study.yaml: is empty, expected a study"):
+        load("", tmp_path)
     assert load("surface:\n", tmp_path) == Study()
     assert load("camera:\nanalysis:\n", tmp_path) == Study()
 
@@ -469,29 +370,7 @@ def cache(tmp_path, monkeypatch):
 @pytest.fixture
 def runs(monkeypatch):
     """The cutting simulation replaced by three frames of a chip in closed form."""
-    chip = AnalyticChip(frames=3)
-    calls = []
-
-    def cut_chip(
-        simulation,
-        window,
-        raster,
-        on_frame,
-        on_progress=None,
-        resume=None,
-        on_checkpoint=None,
-        preview=None,
-    ):
-        calls.append(simulation)
-        for frame in chip.scene().frames():
-            on_frame(frame)
-        if on_progress:
-            on_progress(1.0)
-        return chip.cut_history()
-
-    monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
-    monkeypatch.setattr(CuttingSimulation, "lattice", lambda *_: None)  # it has samples only
-    return calls
+    return replace_cut(monkeypatch, AnalyticChip(frames=3).scene())
 
 
 def small_study(**cutting):

@@ -14,11 +14,11 @@ from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
     EmissivityLine,
     Heating,
-    ReflectedTemperature,
     RegionEmissivities,
     determine_emissivity,
     emissivity_line,
     read_emissivity_lines,
+    reflected_temperature,
     true_temperature,
     write_emissivity,
 )
@@ -74,12 +74,12 @@ def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius
 def test_parts_of_the_uncertainty_are_those_of_small_changes():
     """Each part is the change of the result when its cause changes by its uncertainty."""
     seen, known = [image()], EmissivityLine.constant(0.42, 1e-4)
-    found = true_temperature(seen, WHOLE, known, ReflectedTemperature(ROOM, 0.01))
+    found = true_temperature(seen, WHOLE, known, reflected_temperature(ROOM, 0.01))
     more = true_temperature(
-        seen, WHOLE, EmissivityLine.constant(0.4201), ReflectedTemperature(ROOM)
+        seen, WHOLE, EmissivityLine.constant(0.4201), reflected_temperature(ROOM)
     )
     warmer = true_temperature(
-        seen, WHOLE, EmissivityLine.constant(0.42), ReflectedTemperature(ROOM + 0.01)
+        seen, WHOLE, EmissivityLine.constant(0.42), reflected_temperature(ROOM + 0.01)
     )
     assert found.estimate.contribution("emissivity") == pytest.approx(
         found.estimate.values - more.estimate.values, rel=1e-2
@@ -115,7 +115,7 @@ def test_errors_that_emissivity_and_image_share_cancel():
     assert apart.correlation is None
     assert apart.estimate.contribution("calibration") > 0.5
     elsewhere = true_temperature(
-        [heated], WHOLE, emissivity, ReflectedTemperature(ROOM, 5.0), calibration
+        [heated], WHOLE, emissivity, reflected_temperature(ROOM, 5.0), calibration
     )
     assert elsewhere.estimate.contribution("reflected") > 0.01
 
@@ -146,11 +146,11 @@ def test_stated_intervals_hold_the_truth():
 
 def test_cold_surroundings_are_part_of_the_uncertainty():
     """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
-    cold = ReflectedTemperature(190.0, 1.0)
+    cold = reflected_temperature(190.0, 1.0)
     seen = [image(0.05, 330.0, reflected=190.0)]
     found = true_temperature(seen, WHOLE, EmissivityLine.constant(0.05), cold)
     warmer = true_temperature(
-        seen, WHOLE, EmissivityLine.constant(0.05), ReflectedTemperature(191.0)
+        seen, WHOLE, EmissivityLine.constant(0.05), reflected_temperature(191.0)
     )
     assert found.estimate.values == pytest.approx(330.0, abs=1e-3)
     assert found.estimate.contribution("reflected") == pytest.approx(
@@ -424,7 +424,7 @@ def test_impossible_input_is_one_clear_error():
     with pytest.raises(ValueError, match="temperature: there is no image"):
         true_temperature([], WHOLE, known)
     with pytest.raises(ValueError, match=r"darker than what it reflects at 626\.85 °C"):
-        true_temperature([image()], WHOLE, known, ReflectedTemperature(900.0))
+        true_temperature([image()], WHOLE, known, reflected_temperature(900.0))
     flags = np.full((1, *RASTER.shape), Flag.DEAD, np.uint8)
     with pytest.raises(ValueError, match="0 of its 1200 pixels can be used"):
         true_temperature([image(flags=flags)], WHOLE, known)
@@ -434,9 +434,9 @@ def test_impossible_input_is_one_clear_error():
     with pytest.raises(ValueError, match="standard uncertainty is -1"):
         EmissivityLine.constant(0.5, -1.0)
     with pytest.raises(ValueError, match="reflected: is 0"):
-        ReflectedTemperature(0.0)
+        reflected_temperature(0.0)
     with pytest.raises(ValueError, match="reflected: standard uncertainty"):
-        ReflectedTemperature(293.0, -1.0)
+        reflected_temperature(293.0, -1.0)
 
 
 # The command

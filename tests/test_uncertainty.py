@@ -141,15 +141,6 @@ def test_h2_from_the_covariance_is_the_same():
     np.testing.assert_allclose(two.covariance(), one.covariance(), rtol=1e-6)
     np.testing.assert_allclose(two.degrees_of_freedom, 4.0)
 
-    def joint(three):
-        volts, amperes, phase = three
-        ratio = volts / amperes
-        return np.array([ratio * np.cos(phase), ratio * np.sin(phase), ratio])
-
-    whole = propagate(joint, known, elementwise=False)
-    # Both differ from the derivatives by terms of third order of uncertainties of 0.1 %.
-    np.testing.assert_allclose(whole.covariance(), one.covariance(), rtol=1e-4)
-
 
 CELSIUS = [21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511]
 CORRECTIONS = [
@@ -303,8 +294,7 @@ def test_degrees_of_freedom_are_of_each_error_or_of_all():
 def test_remarks_travel():
     one = Estimate(1.0).with_unevaluated("drift").with_warnings("The left half is hidden.")
     two = exact(2.0, "place", 0.1).with_unevaluated("drift", "noise")
-    for found in (one + two, two / one, Estimate.stack([one, two]), propagate(np.hypot, one, two),
-                  propagate(np.hypot, one, two, elementwise=False)):  # fmt: skip
+    for found in (one + two, two / one, Estimate.stack([one, two]), propagate(np.hypot, one, two)):
         assert found.warnings == ("The left half is hidden.",)
         assert found.unevaluated == ("drift", "noise")
     assert np.isnan(found.contribution("drift"))
@@ -353,8 +343,8 @@ def test_derivatives_of_any_function():
         derivatives=[lambda x, p: p * x ** (p - 1), lambda x, p: x**p * np.log(x)],
     )  # fmt: skip
     # Slopes over one standard uncertainty err by its square, 1e-7.
-    for found in (propagate(np.power, one, two), propagate(np.power, one, two, elementwise=False)):
-        np.testing.assert_allclose(found.covariance(), analytic.covariance(), rtol=1e-5)
+    found = propagate(np.power, one, two)
+    np.testing.assert_allclose(found.covariance(), analytic.covariance(), rtol=1e-5)
     unknown = propagate(np.add, Estimate([1.0, np.nan]), two)
     np.testing.assert_array_equal(unknown.values, [4.0, np.nan])
     with pytest.raises(ValueError, match="derivatives: 1 of a function of 2 inputs"):
@@ -573,7 +563,7 @@ def test_impossible_estimates_are_refused():
     for together in (
         lambda: pixels + other,
         lambda: draw([pixels, other], 2, generator),
-        lambda: propagate(np.add, pixels, other, elementwise=False),
+        lambda: propagate(np.add, pixels, other),
     ):
         with pytest.raises(ValueError, match="expected the same errors wherever its name"):
             together()

@@ -3,6 +3,7 @@
 from chipglow.analysis.cut import (
     Cut as Cut,
     CuttingForces as CuttingForces,
+    Progress as Progress,
     lacking as lacking,
     spread_starts as spread_starts,
 )

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import nan
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,17 +34,11 @@ class Headline:
         return Distribution(self.psf_portion.values / self.error.values, self.error.causes)
 
 
-@dataclass(frozen=True)
-class OneDraw:
+class OneDraw(NamedTuple):
     """One reading of a single frame, in K of radiance temperature; NaN where it is unknown."""
 
     error: float
     psf_portion: float
-
-    @property
-    def psf_fraction(self) -> float:
-        """The PSF's portion over the error; NaN for no error."""
-        return self.psf_portion / self.error if self.error else nan
 
 
 def error(data: xr.Dataset, kind: str = "", effects: str = ALL) -> xr.DataArray:

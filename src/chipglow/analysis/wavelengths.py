@@ -14,7 +14,6 @@ from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSc
 
 from chipglow.analysis.cut import Progress, find_cut, spread_starts
 from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
-from chipglow.analysis.places import PointPlace
 from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
 from chipglow.camera.ratio_camera import views_of
@@ -309,17 +308,10 @@ def cut_spots(
 def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str]) -> list[Spot]:
     """Return the points of a plan in every exposure, with every surface."""
     starts = spread_starts(scene, camera.integration_time, plan.exposures)
-    several = len(surfaces) > 1
     return [
-        Spot(
-            f"{place.name}, {name}" if several else place.name,
-            name,
-            float(start),
-            np.array(place.point),
-        )
-        for place in plan.all_places
-        if isinstance(place, PointPlace)
-        for name in surfaces
+        Spot(f"{name}, {one}" if len(surfaces) > 1 else name, one, float(start), np.array(point))
+        for name, point in plan.points.items()
+        for one in surfaces
         for start in starts
     ]
 

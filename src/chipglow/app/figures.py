@@ -18,7 +18,6 @@ from bokeh.models import (
 )
 from bokeh.palettes import Cividis256, Inferno256, RdBu11, interp_palette
 from bokeh.plotting import figure
-from numpy.typing import NDArray
 
 from chipglow.app.controls import CURSOR, LINES
 from chipglow.app.pictures import Drawn, Panel, Picture
@@ -165,12 +164,6 @@ class Line:
         one.min_border_left = _BORDER + 6
         one.title.text_font_size = "12px"
 
-    def show_band(self, along: NDArray[np.float64], draws: NDArray[np.float64]) -> None:
-        """Shade the range of draws."""
-        known = np.isfinite(draws).all(axis=0)
-        low, high = draws[:, known].min(axis=0), draws[:, known].max(axis=0)
-        self.band.data = {"along": along[known], "low": low, "high": high}
-
 
 class Figures:
     """All figures of a page."""
@@ -215,7 +208,10 @@ class Figures:
     def show_drawn(self, picture: Picture, drawn: Drawn) -> None:
         """Shade the range of draws along the lines."""
         for name, line in self.lines.items():
-            line.show_band(picture.lines[name]["along"], drawn.lines[name])
+            along, draws = picture.lines[name]["along"], drawn.lines[name]
+            known = np.isfinite(draws).all(axis=0)
+            low, high = draws[:, known].min(axis=0), draws[:, known].max(axis=0)
+            line.band.data = {"along": along[known], "low": low, "high": high}
 
     def set_theme(self, theme: str) -> None:
         """Write everything on light or dark ground."""

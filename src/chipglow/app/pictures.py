@@ -13,7 +13,7 @@ from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPla
 from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
-from chipglow.app.opening import QUICK_SAMPLES, Opened, OpenedMeasurement, OpenedScene, with_samples
+from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
 from chipglow.camera import Camera, Exposure
 from chipglow.camera.sweep import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
@@ -98,7 +98,6 @@ class _Cache(dict[Hashable, _Result], Generic[_Result]):
     """The results of the last few keys."""
 
     def __init__(self, size: int) -> None:
-        super().__init__()
         self._size = size
 
     def result(self, key: Hashable, make: Callable[[], _Result]) -> _Result:
@@ -163,13 +162,18 @@ class SceneModel:
         if state.error_image != "total":
             error = parts().get(state.error_image, xr.zeros_like(error))
         raster, exposure = camera.pixels(scene.raster), images.exposure
+        shown, label = _unflagged(data, error), ERROR_IMAGES[state.error_image]
+        limit = round_limit(shown, 99, 5.0)
         panels = {
             "scene": self._scene_panel(state, exposure, quick),
             "measured": _measured_panel(data, raster),
-            "error": _error_panel(state, error, data, raster),
+            "error": Panel(label, "K", shown, raster, (-limit, limit), SIGNED),
         }
-        if panels["scene"].unit == "°C":
-            panels |= _same_colours(panels["scene"], panels["measured"], camera.lower_limit)
+        if panels["scene"].unit == "°C":  # both temperatures have the same colours
+            (low, high), (least, most) = panels["scene"].limits, panels["measured"].limits
+            low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
+            limits = min(least, low), max(most, high)
+            panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
         lines = _lines(state, raster, data)
         return Picture(state, raster, data, panels, lines, quick, camera, exposure, parts)
 
@@ -385,16 +389,6 @@ class MeasurementModel:
         return int(np.abs(self.opened.measurement.times - state.start).argmin())
 
 
-Model: TypeAlias = SceneModel | MeasurementModel
-
-
-def model_of(opened: Opened) -> Model:
-    """Return the model of what is open."""
-    if isinstance(opened, OpenedMeasurement):
-        return MeasurementModel(opened)
-    return SceneModel(opened)
-
-
 def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str, Array]]:
     """Return the temperatures along both lines."""
     lines = {}
@@ -414,18 +408,5 @@ def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:
     return Panel("Measured radiance temperature", "°C", values, raster, limits, HEAT)
 
 
-def _error_panel(state: State, error: xr.DataArray, data: xr.Dataset, raster: Raster) -> Panel:
-    values = _unflagged(data, error)
-    limit = round_limit(values, 99, 5.0)
-    return Panel(ERROR_IMAGES[state.error_image], "K", values, raster, (-limit, limit), SIGNED)
-
-
 def _unflagged(data: xr.Dataset, image: xr.DataArray) -> Array:
     return np.where(data["flagged"].values, nan, image.values)
-
-
-def _same_colours(scene: Panel, measured: Panel, lower_limit: float | None) -> dict[str, Panel]:
-    """Return both with the same colours, from the camera's lower limit if it has one."""
-    low = scene.limits[0] if lower_limit is None else lower_limit - KELVIN
-    limits = min(measured.limits[0], low), max(measured.limits[1], scene.limits[1])
-    return {"scene": replace(scene, limits=limits), "measured": replace(measured, limits=limits)}

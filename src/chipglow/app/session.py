@@ -6,8 +6,8 @@ from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import State, Texts
-from chipglow.app.opening import Opened
-from chipglow.app.pictures import Picture, SceneModel, model_of
+from chipglow.app.opening import Opened, OpenedScene
+from chipglow.app.pictures import MeasurementModel, Picture, SceneModel
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
@@ -89,7 +89,9 @@ class Session:
     """The state of one user, by default that of the study."""
 
     def __init__(self, opened: Opened, notify: Notify) -> None:
-        self.model = model_of(opened)
+        self.model: SceneModel | MeasurementModel = (
+            SceneModel(opened) if isinstance(opened, OpenedScene) else MeasurementModel(opened)
+        )
         self.state = opened.controls.initial
         self._settled, self._at = [self.state], 0
         self._notify = notify

@@ -17,7 +17,7 @@ from bokeh.document import Document
 from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
-from chipglow.app.controls import CURSOR, Control, Texts
+from chipglow.app.controls import CURSOR, Texts
 from chipglow.app.figures import TITLES, Figures
 from chipglow.app.opening import Opened, OpenedScene
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
@@ -26,6 +26,7 @@ from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 
 _FOLDER: Final = Path(__file__).parent
+_OF_CONTROL: Final = "path", "label", "group", "unit", "low", "high", "step", "optional"
 
 _PARTS: Final = (
     ("motion", "Motion", "Mean over the exposure minus its maximum"),
@@ -284,7 +285,15 @@ class View:
             "name": opened.name,
             "embedded": self._embedded,
             "uploads": uploads,
-            "rows": [_described(row) for row in opened.controls.rows if row.group],
+            "rows": [
+                {name: getattr(row, name) for name in _OF_CONTROL}
+                | {
+                    "stops": [float(row.shown(stop)) for stop in row.stops],
+                    "options": [(word, one.label) for word, one in row.options.items()] or None,
+                }
+                for row in opened.controls.rows
+                if row.group
+            ],
             "saves": _SAVES if is_scene else (),
             "views": list(views.items()),
             "images": list(self.figures.images),
@@ -311,15 +320,6 @@ class View:
             self._document.add_next_tick_callback(together)
         except RuntimeError:  # the page was closed meanwhile
             self.session.end()
-
-
-def _described(row: Control) -> dict[str, Any]:
-    """Return a control as page.js needs it."""
-    names = "path", "label", "group", "unit", "low", "high", "step", "optional"
-    return {name: getattr(row, name) for name in names} | {
-        "stops": [float(row.shown(stop)) for stop in row.stops],
-        "options": [(word, option.label) for word, option in row.options.items()] or None,
-    }
 
 
 def _measured(readout: Readout) -> str:

@@ -15,7 +15,11 @@ from chipglow.cli.boundary import Boundary
 from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
+from chipglow.cli.cutting import cut
 from chipglow.cli.emissivity import emissivity
+from chipglow.cli.importing import import_source
+from chipglow.cli.materials import materials
+from chipglow.cli.measuring import measure
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
@@ -197,75 +201,9 @@ def error(
     write_results(loaded, out, force, compute=errors)
 
 
-@app.command()
-def cut(
-    study: opt.StudyFile,
-    out: Annotated[Path, opt.file("Scene to write, NetCDF.")],
-    preview: Annotated[
-        Path | None,
-        opt.file(
-            "Movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of the "
-            "whole cut; with --resume, of the rest; of a cached cut, of the recorded part.",
-            ".mp4",
-            ".gif",
-        ),
-    ] = None,
-    resume: opt.Resume = False,
-    yes: opt.Yes = False,
-) -> None:
-    """Run only the cutting simulation of a study."""
-    from chipglow.cli.cutting import cut_study
-    from chipglow.study import load_study
-
-    cut_study(load_study(study), out, preview, resume, yes)
-
-
-@app.command("import")
-def import_source(
-    source: Annotated[
-        Path,
-        opt.argument(
-            "SOURCE", "Mesh, grid, point cloud or movie, or YAML file describing an import."
-        ),
-    ],
-    out: Annotated[
-        Path | None, opt.file("Scene to write, NetCDF. Omit it to only inspect the source.")
-    ] = None,
-    settings: Annotated[
-        list[str] | None,
-        opt.value(
-            "FIELD=VALUE", "Set a field of the import (units.length=mm). Repeatable.", "--set"
-        ),
-    ] = None,
-    resume: Annotated[bool, opt.flag("--resume", "Resume an interrupted import.")] = False,
-) -> None:
-    """Import meshes, grids, points or movies as a scene."""
-    from chipglow.cli.importing import import_fields
-    from chipglow.io import load_import
-
-    import_fields(load_import(source, settings or ()), out, resume)
-
-
-@app.command()
-def measure(
-    scene: opt.SceneFile,
-    study: Annotated[Path, opt.value("STUDY", "Study file defining surface and camera.")],
-    out: Annotated[Path, opt.file("Measurement to write, NetCDF.")],
-    start: Annotated[
-        float | None,
-        opt.time("Start of the first exposure, e.g. '400 us'. Default: that of the scene."),
-    ] = None,
-    chip: Annotated[
-        str | None, opt.value("NAME", "One of the study's chips. Default: the first.")
-    ] = None,
-) -> None:
-    """Measure a scene with a study's camera."""
-    from chipglow.cli.measuring import measure_scene
-    from chipglow.study import load_study
-
-    measure_scene(scene, load_study(study), out, start, chip)
-
-
+app.command()(cut)
+app.command("import")(import_source)
+app.command()(measure)
 app.command()(wavelengths)
 
 
@@ -321,22 +259,7 @@ def open_app(
     serve(path, address, port, announce)
 
 
-@app.command()
-def materials(
-    name: Annotated[
-        str | None, opt.argument("NAME", "Material to show: a name, or your own file (.yaml).")
-    ] = None,
-    plot: Annotated[Path | None, opt.picture("Draw flow stress and heat properties")] = None,
-) -> None:
-    """List the materials, or show the properties of one with their sources."""
-    from chipglow.cli.materials import list_materials, show_material
-
-    if name is not None:
-        show_material(name, plot)
-    elif plot is not None:
-        raise ValueError("--plot requires the name of a material")
-    else:
-        list_materials()
+app.command()(materials)
 
 
 @app.command()

@@ -58,7 +58,7 @@ def compare(
     settings: opt.Settings = None,
 ) -> None:
     """Compare a measurement with simulations and report the best fit at each place."""
-    from chipglow.cli.times import frame_at
+    from chipglow.drawing.frames import shown_frame
     from chipglow.laboratory import comparison as lab
     from chipglow.laboratory.chip import chosen_tool, read_curve
     from chipglow.laboratory.comparison.comparison import COVERAGE
@@ -79,7 +79,7 @@ def compare(
         lab.StatedUncertainties(
             uncertainty or 0.0, emissivity_uncertainty, position, chosen.uncertainty
         ),
-        None if reference is None else frame_at("--reference", reference, whole.times),
+        None if reference is None else shown_frame(whole.times, reference, option="--reference: "),
     )
     screen, fits = current(), result.fit_frame()
     fits["bias_expanded_K"] = COVERAGE * fits["bias_standard_uncertainty_K"]

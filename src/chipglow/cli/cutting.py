@@ -1,22 +1,17 @@
 """The command ``chipglow cut``: the cutting simulation, and optionally a movie of it."""
 
 import sys
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable
+from contextlib import nullcontext
 from math import isfinite, nan
 from pathlib import Path
-from shutil import copyfile
-from typing import Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from rich.console import Console
-
-from chipglow.cli.progress import confirm_cost, progress_bars
+from chipglow.cli import options as opt
 from chipglow.cli.screen import current
-from chipglow.io import atomic_path, open_scene
-from chipglow.laboratory.chip import Inertia, inertia, resolution_warnings
-from chipglow.scene import Frame
-from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
-from chipglow.text import Notes
+
+if TYPE_CHECKING:
+    from chipglow.laboratory.chip import Inertia
 
 _INERTIA: Final = {
     "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
@@ -24,29 +19,50 @@ _INERTIA: Final = {
 }
 
 
-def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agreed: bool) -> None:
-    """Run the cut, or take it from the cache, and write the scene."""
-    movie: AbstractContextManager[Callable[[Frame], None] | None] = nullcontext()
+def cut(
+    study: opt.StudyFile,
+    out: Annotated[Path, opt.file("Scene to write, NetCDF.")],
+    preview: Annotated[
+        Path | None,
+        opt.file(
+            "Movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of the "
+            "whole cut; with --resume, of the rest; of a cached cut, of the recorded part.",
+            ".mp4",
+            ".gif",
+        ),
+    ] = None,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
+) -> None:
+    """Run only the cutting simulation of a study."""
+    from shutil import copyfile
+
+    from chipglow.cli.progress import confirm_cost, progress_bars
+    from chipglow.io import atomic_path, open_scene
+    from chipglow.laboratory.chip import inertia, resolution_warnings
+    from chipglow.study import cut as compute, load_study, preview_raster
+
+    loaded = load_study(study)
+    movie: Any = nullcontext()
     if preview is not None:
         from chipglow.report import cut_movie
 
-        movie = cut_movie(preview, preview_raster(study), study.cutting.simulation())
+        movie = cut_movie(preview, preview_raster(loaded), loaded.cutting.simulation())
     with atomic_path(out) as temporary, movie as on_preview:
-        confirm_cost(study, resume, agreed)
-        if on_preview:
-            _announce_preview(study, resume)
+        confirm_cost(loaded, resume, yes)
         with progress_bars() as progress:
-            copyfile(cut(study, progress, resume, on_preview), temporary)
+            copyfile(compute(loaded, progress, resume, on_preview), temporary)
     scene = open_scene(out)
     say_of_cut(inertia(scene), resolution_warnings(scene))
     scene.data.close()
-    current().file(out)
-    if preview is not None:
-        current().file(preview)
+    for path in filter(None, (out, preview)):
+        current().file(path)
 
 
-def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
+def say_of_cut(inertia: "Inertia | None", warnings: Iterable[str] = ()) -> None:
     """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
+    from chipglow.text import Notes
+
     fractions = {name: getattr(inertia, name, nan) for name in _INERTIA}
     known = {name: fraction for name, fraction in fractions.items() if isfinite(fraction)}
     if known:
@@ -54,14 +70,3 @@ def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
         current().say(f"Scaled mass after the build-up: {texts}.", known, sys.stderr)
     own = [inertia.warning] if inertia and inertia.warning else []
     current().notes(Notes(warnings=[*own, *warnings]))
-
-
-def _announce_preview(study: Study, resume: bool) -> None:
-    console, window = Console(stderr=True), study.cutting.window
-    if is_cut(study):
-        console.print(
-            f"The preview shows the cached scene: {window.start * 1e3:g} mm to "
-            f"{window.end * 1e3:g} mm of the cut."
-        )
-    elif resume and kept_progress(study):
-        console.print("The preview shows the rest of the cut.")

@@ -1,18 +1,39 @@
 """The command ``chipglow import``: fields of other programs to a scene."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-import pandas as pd
-
-from chipglow.cli.progress import progress_bars, say_checkpoint
+from chipglow.cli import options as opt
 from chipglow.cli.screen import current
-from chipglow.io import ImportDescription, import_scene, prospect
-from chipglow.io.importing import Prospect, kept_import
+
+if TYPE_CHECKING:
+    from chipglow.io.importing import Prospect
 
 
-def import_fields(description: ImportDescription, out: Path | None, resume: bool) -> None:
-    """Print the contents of a source and, if a file is named, write its scene."""
-    wanted = description.build()
+def import_source(
+    source: Annotated[
+        Path,
+        opt.argument(
+            "SOURCE", "Mesh, grid, point cloud or movie, or YAML file describing an import."
+        ),
+    ],
+    out: Annotated[
+        Path | None, opt.file("Scene to write, NetCDF. Omit it to only inspect the source.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        opt.value(
+            "FIELD=VALUE", "Set a field of the import (units.length=mm). Repeatable.", "--set"
+        ),
+    ] = None,
+    resume: Annotated[bool, opt.flag("--resume", "Resume an interrupted import.")] = False,
+) -> None:
+    """Import meshes, grids, points or movies as a scene."""
+    from chipglow.cli.progress import progress_bars, say_checkpoint
+    from chipglow.io import import_scene, load_import, prospect
+    from chipglow.io.importing import kept_import
+
+    wanted = load_import(source, settings or ()).build()
     looked = prospect(wanted)
     _say(looked)
     if out is None:
@@ -30,7 +51,9 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     current().file(out)
 
 
-def _say(looked: Prospect) -> None:
+def _say(looked: "Prospect") -> None:
+    import pandas as pd
+
     screen, survey, raster = current(), looked.survey, looked.raster
     times = survey.times * 1e6
     screen.say(

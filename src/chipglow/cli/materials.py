@@ -1,35 +1,42 @@
 """The command ``chipglow materials``."""
 
 from pathlib import Path
+from typing import Annotated
 
-import pandas as pd
-
+from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
-from chipglow.cutting import material_file, material_names
-from chipglow.text import Notes
 
 
-def list_materials() -> None:
-    """List the materials of the library."""
-    title = "The first of several sets is the default."
-    frame = pd.DataFrame(map(_row, material_names()))
-    current().table("materials", frame, title=title, unbroken=("name",))
+def materials(
+    name: Annotated[
+        str | None, opt.argument("NAME", "Material to show: a name, or your own file (.yaml).")
+    ] = None,
+    plot: Annotated[Path | None, opt.picture("Draw flow stress and heat properties")] = None,
+) -> None:
+    """List the materials, or show the properties of one with their sources."""
+    import pandas as pd
 
-
-def _row(name: str) -> dict[str, str]:
-    material = material_file(name)
-    return {
-        "name": name,
-        "kind": "tool" if material.tool else "workpiece",
-        "sets": ", ".join(material.workpieces),
-        "description": f"{material.name}: {material.description}",
-    }
-
-
-def show_material(name: str, plot: Path | None) -> None:
-    """Print all properties of a material, with units and numbered sources; optionally draw it."""
+    from chipglow.cutting import material_file, material_names
     from chipglow.report.materials import material_figure
+    from chipglow.text import Notes
 
+    screen = current()
+    if name is None:
+        if plot is not None:
+            raise ValueError("--plot requires the name of a material")
+        files = {one: material_file(one) for one in material_names()}
+        rows = [
+            {
+                "name": one,
+                "kind": "tool" if file.tool else "workpiece",
+                "sets": ", ".join(file.workpieces),
+                "description": f"{file.name}: {file.description}",
+            }
+            for one, file in files.items()
+        ]
+        title = "The first of several sets is the default."
+        screen.table("materials", pd.DataFrame(rows), title=title, unbroken=("name",))
+        return
     material = material_file(name)
     sources = list(dict.fromkeys(number.source for number in material.properties))
     rows = [
@@ -41,7 +48,6 @@ def show_material(name: str, plot: Path | None) -> None:
         }
         for number in material.properties
     ]
-    screen = current()
     screen.say(f"{material.name}: {material.description}")
     screen.heading()
     columns = ["field", "value", "note"]

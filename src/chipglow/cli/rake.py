@@ -4,6 +4,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import pandas as pd
+
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
@@ -56,13 +58,13 @@ def rake(
 
 def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[int] | None:
     """Return the indices of the chosen frames, or None for all."""
-    from chipglow.cli.times import frame_at
+    from chipglow.drawing.frames import shown_frame
 
     times = measurement.times
     if at is not None:
         if frame != "all":
             raise ValueError("--frame and --at cannot be combined")
-        return [frame_at("--at", at, times)]
+        return [shown_frame(times, at, option="--at: ")]
     if frame == "all":
         return None
     if not (frame.isdecimal() and int(frame) < times.size):
@@ -73,13 +75,11 @@ def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[in
 def _print_squares(grid: "RakeGrid") -> None:
     several = grid.times.size > 1
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"
-    squares = grid.mean_frame()
-    wide = squares.pivot(index="along_um", columns="depth_um")
-    depths = wide["mean_degC"].columns
-    wide.columns = [f"{name}_{depths.get_loc(depth)}" for name, depth in wide.columns]
-    columns = {"along / µm": "along_um"} | {
-        f"{depth:.4g} µm deep": f"mean_degC_{n} ± standard_deviation_K_{n}"
-        for n, depth in enumerate(depths)
-    }
+    squares, columns = {"along_um": 1e6 * grid.along}, {"along / µm": "along_um"}
+    for n, depth in enumerate(1e6 * grid.depth):
+        squares[f"mean_degC_{n}"] = grid.frame_mean[n] - 273.15
+        squares[f"standard_deviation_K_{n}"] = grid.bars[n]
+        squares[f"frames_{n}"] = grid.frame_count[n]
+        columns[f"{depth:.4g} µm deep"] = f"mean_degC_{n} ± standard_deviation_K_{n}"
     title = f"radiance temperature / °C ± standard deviation {over}"
-    current().table("squares", wide.reset_index(), columns, title, columns.values())
+    current().table("squares", pd.DataFrame(squares), columns, title, columns.values())

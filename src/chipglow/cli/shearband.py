@@ -41,7 +41,7 @@ def shearband(
     settings: opt.Settings = None,
 ) -> None:
     """Read the radiance temperature along the shear band (the paper's Figure 9)."""
-    from chipglow.cli.times import frame_at
+    from chipglow.drawing.frames import shown_frame
     from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
     from chipglow.laboratory.chip.figures import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement
@@ -53,9 +53,11 @@ def shearband(
     profile = band_profile(
         measured,
         chosen.tool,
-        frames=sorted({frame_at("--at", time, times) for time in at}) if at else None,
+        frames=sorted({shown_frame(times, time, option="--at: ") for time in at}) if at else None,
         curve=None if curve == "found" else read_curve(curve),
-        reference=None if reference is None else frame_at("--reference", reference, times),
+        reference=None
+        if reference is None
+        else shown_frame(times, reference, option="--reference: "),
         width=width,
         position=position,
         uncertainty=chosen.uncertainty,

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.screen import current, figure, finish
-from chipglow.cli.times import frame_at
+from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.measurement import MeasurementSummary, measurement_summary
-from chipglow.radiometry import Band
 from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from chipglow.report import SceneSummary
 
 _LONGEST: Final = 800
-_MOST_NUMBERS: Final = 8
+_MOST: Final = 8
 _FLAG_NAMES: Final = {
     Flag.UNDER_RANGE: "below the lower range limit or the calibration",
     Flag.SATURATED: "saturated or above the calibration",
@@ -42,34 +41,11 @@ _Rows: TypeAlias = Iterator[tuple[str, str]]
 
 def show(path: Path, at: float | None, plot: Path | None) -> None:
     """Print the contents of a scene or a measurement and optionally draw it."""
-    if is_measurement(path):
-        _show_measurement(path, at, plot)
-    else:
-        _show_scene(path, at, plot)
-
-
-def _show_scene(path: Path, at: float | None, plot: Path | None) -> None:
     from chipglow.report import draw_scene, scene_summary
 
-    _check_shown(path)
-    scene = open_scene(path)
-    time = None if at is None else scene.times[frame_at("--at", at, scene.times, "scene")]
-    summary = scene_summary(scene, time)
-    screen = current()
-    screen.facts("scene", _scene_facts(scene, path))
-    screen.heading(f"\nAt {microseconds(scene.times[summary.index])}:")
-    screen.facts("state", _state(summary))
-    screen.heading()
-    _show_fields(summary)
-    screen.values(_raster_values(scene.raster, scene.times))
-    screen.values({"at_us": 1e6 * scene.times[summary.index]})
-    _show_attributes(scene.data.attrs, ("tool_",))
-    finish(Notes(), (plot, figure(draw_scene, scene, time)))
-    scene.data.close()
-
-
-def _check_shown(path: Path) -> None:
-    """Raise an error if a file is neither a scene nor similar to one."""
+    if is_measurement(path):
+        _show_measurement(path, at, plot)
+        return
     if path.is_file() and not holds(path, ()):
         raise ValueError(
             f"{path}: not a NetCDF-4 file, or truncated; expected a scene or measurement "
@@ -79,6 +55,22 @@ def _check_shown(path: Path) -> None:
         raise ValueError(
             f"{path}: contains neither temperature nor radiance; expected a scene or measurement"
         )
+    scene = open_scene(path)
+    time = None if at is None else scene.times[shown_frame(scene.times, at, "scene", "--at: ")]
+    summary = scene_summary(scene, time)
+    screen = current()
+    screen.facts("scene", _scene_facts(scene, path))
+    screen.heading(f"\nAt {microseconds(scene.times[summary.index])}:")
+    screen.facts("state", _state(summary))
+    screen.heading()
+    everywhere = f"in {len(summary.sampled)} frames"
+    columns = {everywhere if name == "overall" else name: name for name in summary.fields}
+    screen.table("fields", summary.fields, columns, "Over the material", unbroken=("field",))
+    screen.values(_raster_values(scene.raster, scene.times))
+    screen.values({"at_us": 1e6 * scene.times[summary.index]})
+    _show_attributes(scene.data.attrs, ("tool_",))
+    finish(Notes(), (plot, figure(draw_scene, scene, time)))
+    scene.data.close()
 
 
 def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
@@ -86,7 +78,7 @@ def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
 
     measurement = read_measurement(path)
     times = measurement.times
-    time = None if at is None else times[frame_at("--at", at, times, "measurement")]
+    time = None if at is None else times[shown_frame(times, at, option="--at: ")]
     say_measurement(measurement, time)
     finish(measurement.notes, (plot, figure(draw_measurement, measurement, time)))
 
@@ -122,15 +114,10 @@ def _where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _R
     yield "y", f"{bottom} to {top}"
     yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
     if len(times) > 1:
-        yield "interval", _interval_text(np.diff(times))
-
-
-def _interval_text(steps: NDArray[np.float64]) -> str:
-    """Return the interval of the frames, or its range."""
-    least, mean, greatest = (float(f(steps)) for f in (np.min, np.mean, np.max))
-    if greatest - least < 1e-3 * mean:
-        return microseconds(mean)
-    return f"{microseconds(least)} to {microseconds(greatest)}"
+        least, mean, greatest = (float(f(np.diff(times))) for f in (np.min, np.mean, np.max))
+        is_even = greatest - least < 1e-3 * mean
+        uneven = f"{microseconds(least)} to {microseconds(greatest)}"
+        yield "interval", microseconds(mean) if is_even else uneven
 
 
 def _tool_text(tool: Tool) -> str:
@@ -168,12 +155,6 @@ def _raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]
     }
 
 
-def _show_fields(summary: "SceneSummary") -> None:
-    everywhere = f"in {len(summary.sampled)} frames"
-    columns = {everywhere if name == "overall" else name: name for name in summary.fields}
-    current().table("fields", summary.fields, columns, "Over the material", unbroken=("field",))
-
-
 def _show_attributes(attributes: Mapping[Any, Any], omitted: tuple[str, ...]) -> None:
     """Print the other attributes of a file, if any, below a heading."""
     others = {
@@ -196,13 +177,12 @@ def _attribute_text(value: Any) -> str:
         parsed = None
     if isinstance(parsed, dict):
         leaves = pd.json_normalize(parsed).to_dict("records")[0]
-        text = ", ".join(f"{name} {_leaf_text(leaf)}" for name, leaf in leaves.items())
+        long = {name: isinstance(one, list) and len(one) > _MOST for name, one in leaves.items()}
+        text = ", ".join(
+            f"{name} [{len(leaf)} values]" if long[name] else f"{name} {leaf}"
+            for name, leaf in leaves.items()
+        )
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} … ({len(text)} characters)"
-
-
-def _leaf_text(value: Any) -> str:
-    is_long = isinstance(value, list) and len(value) > _MOST_NUMBERS
-    return f"[{len(value)} values]" if is_long else str(value)
 
 
 def microseconds(time: float) -> str:
@@ -223,8 +203,12 @@ def _measurement_facts(
         netd, kelvins = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
         yield "NETD", f"{1e3 * netd:.3g} mK at {kelvins - 273.15:.4g} °C, half of the range filled"
     if {"band_lower", "band_upper"} <= set(data.attrs):
-        band = measurement.band
-        shape = "" if band.response is None else f", {_response_text(band)}"
+        band, shape = measurement.band, ""
+        if band.response is not None:
+            wavelengths = 1e6 * band.wavelengths
+            values = np.asarray(band.response(band.wavelengths))
+            mean, peak = np.average(wavelengths, weights=values), wavelengths[values.argmax()]
+            shape = f", response with its mean at {mean:.4g} µm and its peak at {peak:.4g} µm"
         yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
     if measurement.tool is not None:
         yield "tool", _tool_text(measurement.tool)
@@ -239,14 +223,6 @@ def _measurement_facts(
     for flag, name in _FLAG_NAMES.items():
         if summary.fractions[flag]:
             yield name, f"{100 * summary.fractions[flag]:.3g} %"
-
-
-def _response_text(band: Band) -> str:
-    """Describe a response curve."""
-    wavelengths = 1e6 * band.wavelengths
-    values = np.asarray(band.response(band.wavelengths) if band.response else 1.0)
-    mean, peak = np.average(wavelengths, weights=values), wavelengths[values.argmax()]
-    return f"response with its mean at {mean:.4g} µm and its peak at {peak:.4g} µm"
 
 
 def _celsius(kelvins: tuple[float, float, float] | None) -> str:

@@ -55,7 +55,7 @@ def temperature(
     named = lab.load_regions(regions)
     surroundings = None
     if reflected is not None or reflected_uncertainty is not None:
-        surroundings = lab.ReflectedTemperature(reflected or 293.0, reflected_uncertainty or 0.0)
+        surroundings = lab.reflected_temperature(reflected or 293.0, reflected_uncertainty or 0.0)
     fitted = None if calibration is None else load_calibration(calibration)
     measurements = [load_measurement(image, settings or ()) for image in images]
     lines = _emissivities(emissivity, emissivity_uncertainty)

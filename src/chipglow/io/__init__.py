@@ -25,9 +25,9 @@ from chipglow.io.scene_file import (
     open_scene,
     write_scene,
 )
+from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.io.table_file import check_table_path
 from chipglow.io.tool_section import ToolSection, read_tool_outline
-from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
     "IMPORT_SOURCES",

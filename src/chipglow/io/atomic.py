@@ -2,7 +2,6 @@
 
 import ctypes
 import errno
-import io
 import os
 import secrets
 import shutil
@@ -11,13 +10,15 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from chipglow.io.interrupts import uninterrupted
-from chipglow.io.unfinished import has_checkpoint, hold
 
 MANIFEST: Final = ".chipglow-files"
 """File in a folder of results that lists the files that chipglow wrote there, one a line."""
+
+TOKEN: Final = "[0-9a-f]" * 8
+"""Pattern of what makes temporary names differ."""
 
 _OF_THE_SYSTEM: Final = {MANIFEST, ".DS_Store", "Thumbs.db", "desktop.ini"}
 _NO_ROOM: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -26,22 +27,16 @@ _RENAME_EXCHANGE: Final = 2
 
 
 @contextmanager
-def atomic_path(
-    path: str | os.PathLike[str], keep: Callable[[Path], bool] = lambda _: False
-) -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Write a file under a temporary name in the same folder; move it into place at the end.
 
     An existing file is replaced; of a symbolic link the target. If the block raises, `path` stays
-    as it was, and the temporary file is removed unless `keep` says that it stays.
+    as it was, and the temporary file is removed.
     """
     path = check_output(Path(path))
     with _temporary(path, Path.touch) as temporary:
-        try:
-            yield temporary
-            temporary.replace(path)
-        finally:
-            if not keep(temporary):
-                temporary.unlink(missing_ok=True)
+        yield temporary
+        temporary.replace(path)
 
 
 @contextmanager
@@ -53,50 +48,11 @@ def atomic_folder(path: str | os.PathLike[str], force: bool = False) -> Iterator
     """
     path = check_output_folder(Path(path), force)
     with _temporary(path, Path.mkdir) as temporary:
-        try:
-            yield temporary
-            _write_manifest(temporary, _files(temporary))
-            check_output_folder(path, force)
-            with uninterrupted():
-                _replace_folder(temporary, path)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-
-
-class KeptErrorFile(io.FileIO):
-    """A file to write that keeps its first error, for the writer to raise.
-
-    HDF5 loses the errors of what it writes late, and a process that closes an HDF5 file on a full
-    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`.
-    """
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        super().__init__(path, "w+")
-        self._error: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        """Write all the data, or keep the error; after an error write nothing more."""
-        view = memoryview(data).cast("B")
-        written = 0
-        try:
-            while self._error is None and written < len(view):
-                written += super().write(view[written:])
-        except OSError as error:
-            self._error = error
-        return len(view)
-
-    def truncate(self, size: int | None = None) -> int:
-        """Set the length, or keep the error."""
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self._error = self._error or error
-            return size or 0
-
-    def check(self, path: Path) -> None:
-        """Raise the error that was kept, naming `path`."""
-        if self._error is not None:
-            raise OSError(self._error.errno, self._error.strerror, str(path)) from self._error
+        yield temporary
+        _write_manifest(temporary, _files(temporary))
+        check_output_folder(path, force)
+        with uninterrupted():
+            _replace_folder(temporary, path)
 
 
 def check_output(path: Path) -> Path:
@@ -127,7 +83,7 @@ def check_output_folder(path: Path, force: bool = False) -> Path:
 
 
 def written_files(folder: Path) -> set[str]:
-    """Files in a folder that chipglow wrote, relative to it."""
+    """Return the files in a folder that chipglow wrote, relative to it."""
     try:
         listed = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):
@@ -149,7 +105,7 @@ def _check_writable(path: Path, folder: Path) -> None:
 
 
 @contextmanager
-def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
+def errors_name(path: Path, temporary: Path) -> Iterator[None]:
     """Let errors of writing under a temporary name bear the name that was asked for.
 
     Those of `write` bear none, and those of `shutil.copyfile` first that of the file it read.
@@ -166,32 +122,33 @@ def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
 
 @contextmanager
 def _temporary(path: Path, create: Callable[[Path], None]) -> Iterator[Path]:
-    """Create a file or folder beside `path` and hold it; others whose process ended are removed."""
+    """Create a file or folder beside `path` and hold it; it is removed, if it is still there.
+
+    Those whose process ended before it could do so are removed at the beginning.
+    """
     place = path.absolute()  # "." has no name
-    _remove_abandoned(place)
+    for left in place.parent.glob(f".{escape(place.stem)}.{TOKEN}.part{escape(place.suffix)}"):
+        if (lock := _lock(left)) is not None:
+            _remove(left)
+            os.close(lock)
     temporary = place.with_name(f".{place.stem}.{secrets.token_hex(4)}.part{place.suffix}")
     lock = None
     try:
-        with _errors_name(path, temporary):
+        with errors_name(path, temporary):
             create(temporary)
             lock = _lock(temporary)
             yield temporary
     finally:
+        _remove(temporary)
         if lock is not None:
             os.close(lock)
 
 
-def _remove_abandoned(path: Path) -> None:
-    """Remove temporary files and folders of `path` that no process holds, but no checkpoint's."""
-    name = f".{escape(path.stem)}.{'[0-9a-f]' * 8}.part{escape(path.suffix)}"
-    for part in path.parent.glob(name):
-        lock = None if has_checkpoint(part) else _lock(part)
-        if lock is not None:
-            if part.is_dir():
-                shutil.rmtree(part, ignore_errors=True)
-            else:
-                part.unlink(missing_ok=True)
-            os.close(lock)
+def _remove(part: Path) -> None:
+    if part.is_dir():
+        shutil.rmtree(part, ignore_errors=True)
+    else:
+        part.unlink(missing_ok=True)
 
 
 def _lock(part: Path) -> int | None:
@@ -208,8 +165,21 @@ def _lock(part: Path) -> int | None:
     return None
 
 
+def hold(descriptor: int) -> bool:
+    """Lock a file until it is closed or the process ends; False if someone else holds it."""
+    if sys.platform == "win32":  # which keeps an open file from being deleted by itself
+        return True
+    import fcntl
+
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
 def _files(folder: Path) -> set[str]:
-    """All files and links in a folder, relative to it."""
+    """Return all files and links in a folder, relative to it."""
     found = (entry for entry in folder.rglob("*") if entry.is_symlink() or not entry.is_dir())
     return {
         entry.relative_to(folder).as_posix() for entry in found if entry.name not in _OF_THE_SYSTEM

@@ -19,30 +19,21 @@ _FILTERS: Final = (h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_DEFLATE)
 _LEVEL: Final = 2  # gives the size of level 1 of zlib
 
 
-def write_chunk(dataset: h5py.Dataset, index: int, values: NDArray[Any]) -> None:
-    """Write ``dataset[index]``, a chunk with `COMPRESSION`."""
-    size = dataset.dtype.itemsize
-    values = np.ascontiguousarray(values, dataset.dtype)
-    shuffled = np.ascontiguousarray(values.view(np.uint8).reshape(-1, size).T)
-    dataset.id.write_direct_chunk(
-        _corner(dataset, index), isal_zlib.compress(shuffled.data, _LEVEL)
-    )
+def chunk_of(values: NDArray[Any]) -> bytes:
+    """Return the bytes of a chunk with `COMPRESSION`."""
+    values = np.ascontiguousarray(values)
+    shuffled = np.ascontiguousarray(values.view(np.uint8).reshape(-1, values.itemsize).T)
+    return bytes(isal_zlib.compress(shuffled.data, _LEVEL))
 
 
 def read_chunk(dataset: h5py.Dataset, index: int) -> NDArray[Any]:
-    """Read ``dataset[index]``; what is no chunk with `COMPRESSION` is left to HDF5.
-
-    Raises
-    ------
-    OSError
-        If the chunk is damaged.
-    """
+    """Read ``dataset[index]``; what is no chunk with `COMPRESSION` is left to HDF5."""
     shape = dataset.shape[1:]
     settings = dataset.id.get_create_plist()
     filters = tuple(settings.get_filter(i)[0] for i in range(settings.get_nfilters()))
     if dataset.chunks != (1, *shape) or filters != _FILTERS:
         return np.asarray(dataset[index])
-    corner = _corner(dataset, index)
+    corner = (index, *(0,) * (dataset.ndim - 1))
     place = dataset.id.get_chunk_info_by_coord(corner)
     if place.byte_offset is None or place.filter_mask:
         return np.asarray(dataset[index])
@@ -59,7 +50,3 @@ def read_chunk(dataset: h5py.Dataset, index: int) -> NDArray[Any]:
     for byte, plane in enumerate(planes):
         values.view(np.uint8).reshape(-1, values.itemsize)[:, byte] = plane
     return values
-
-
-def _corner(dataset: h5py.Dataset, index: int) -> tuple[int, ...]:
-    return (index, *(0,) * (dataset.ndim - 1))

@@ -1,18 +1,21 @@
-"""A digest at the end of the HDF5 files that chipglow writes: damage is found before HDF5 reads it.
+"""HDF5 files with a digest at their end: damage is found before HDF5 reads them.
 
 HDF5 ignores what follows its own data, and programs that change a file cut it off.
 """
 
 import subprocess
 import sys
+from collections.abc import Callable
 from hashlib import file_digest, sha256
 from io import FileIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import h5py
 
 from chipglow.io import examine
+from chipglow.io.atomic import atomic_path
+from chipglow.io.interrupts import uninterrupted
 from chipglow.text import check_own_data
 
 PATIENCE: Final = 30.0
@@ -26,11 +29,56 @@ _LENGTH: Final = len(_MARK) + sha256().digest_size
 _BLOCK: Final = 1 << 20
 
 
-def append_digest(file: FileIO) -> None:
-    """Append the digest of a file, open for reading and writing, to it."""
-    file.seek(0)
-    digest = file_digest(file, "sha256").digest()
-    file.write(_MARK + digest)
+class HDF5Sink(FileIO):
+    """A file that HDF5 writes, which keeps its first error for `check` to raise.
+
+    HDF5 loses the errors of what it writes late, and a process that closes an HDF5 file on a full
+    disk can crash. Here HDF5 sees no error.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self._error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all the data, or keep the error; after an error write nothing more."""
+        view = memoryview(data).cast("B")
+        written = 0
+        try:
+            while self._error is None and written < len(view):
+                written += super().write(view[written:])
+        except OSError as error:
+            self._error = error
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or keep the error."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self._error = self._error or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise the error that was kept."""
+        if self._error is not None:
+            raise OSError(self._error.errno, self._error.strerror, self.name) from self._error
+
+
+@uninterrupted()
+def write_hdf5(path: Path, write: Callable[[HDF5Sink], None]) -> None:
+    """Write an HDF5 file by a function of the file to write; it is whole or not there.
+
+    HDF5 calls back into Python: an exception that a signal raises there could end the process.
+    """
+    with atomic_path(path) as part, HDF5Sink(part) as sink:
+        try:
+            write(sink)
+            sink.seek(0)
+            digest = file_digest(sink, "sha256").digest()
+            sink.write(_MARK + digest)
+        finally:
+            sink.check()  # the cause of what HDF5 says
 
 
 def is_intact(path: Path) -> bool | None:

@@ -1,7 +1,4 @@
-"""Read an HDF5 file in a process of its own, which `chipglow.io.digest` starts: it may loop.
-
-It imports nothing of chipglow, to start at once. Its exit message is the first problem.
-"""
+"""Read an HDF5 file in a process of its own, as HDF5 may loop; nothing of chipglow is imported."""
 
 import sys
 from typing import Any

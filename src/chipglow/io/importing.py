@@ -15,7 +15,7 @@ import numpy as np
 
 from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
-from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
+from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
@@ -40,13 +40,7 @@ _KELVIN: Final = (
 
 @dataclass(frozen=True)
 class View(Part):
-    """Where the scene is sampled; what is not said is as in the source.
-
-    Raises
-    ------
-    ValueError
-        If the right edge is not right of the left one, or the upper one not over the lower one.
-    """
+    """Where the scene is sampled; what is not said is as in the source."""
 
     left: Annotated[float | None, Parameter("Left edge.", POSITION)] = None
     right: Annotated[float | None, Parameter("Right edge.", POSITION)] = None
@@ -69,13 +63,7 @@ class View(Part):
                 raise ValueError(f"{high}: {last:g} m, expected over {low}, {first:g} m")
 
     def raster(self, survey: Survey) -> Raster:
-        """The samples for a source.
-
-        Raises
-        ------
-        SourceError
-            If nothing of the source is in view, or there are too many samples.
-        """
+        """Return the samples for a source; refuse a view of nothing and too many samples."""
         given = (self.left, self.right, self.bottom, self.top)
         left, right, bottom, top = (
             there if said is None else said
@@ -118,42 +106,20 @@ def _metres(extent: Extent) -> str:
 
 @dataclass(frozen=True)
 class Import:
-    """What to read, and what to make of it.
-
-    Parameters
-    ----------
-    source : Source
-        Where the fields are.
-    view : View
-        Where the scene's samples shall be.
-    completion : Completion
-        What stands in for what the source does not have.
-    description : mapping
-        How the source was described, kept with the scene: text and numbers.
-    assumptions : mapping
-        Assumptions that apply if the source contains a field, by the field's name.
-    """
+    """What to read, and what to make of it."""
 
     source: Source
     view: View = field(default_factory=View)
     completion: Completion = field(default_factory=Completion)
     description: Mapping[str, Any] = field(default_factory=dict)
+    """How the source was described, kept with the scene: text and numbers."""
     assumptions: Mapping[str, str] = field(default_factory=dict)
+    """Assumptions that apply if the source contains a field, by the field's name."""
 
 
 @dataclass(frozen=True)
 class Prospect:
-    """What an import will make: what is in the source, where it is sampled, what is assumed.
-
-    Parameters
-    ----------
-    survey : Survey
-        What is in the source.
-    raster : Raster
-        Where the scene's samples will be.
-    notes : Notes
-        All assumptions, and what the source states.
-    """
+    """What an import will make: what is in the source, where it is sampled, what is assumed."""
 
     survey: Survey
     raster: Raster
@@ -161,15 +127,7 @@ class Prospect:
 
 
 def prospect(wanted: Import) -> Prospect:
-    """Look at a source and find out what a scene of it would be.
-
-    Raises
-    ------
-    SourceError
-        If the source cannot be read, or no scene can be made of it.
-    OSError
-        If a file is missing.
-    """
+    """Look at a source and find out what a scene of it would be."""
     survey = wanted.source.survey()
     _check_times(survey)
     if "temperature" not in survey.found:
@@ -231,12 +189,11 @@ def import_scene(
     fields = completion.fields(survey.found, len(survey.times))
     key = _key(wanted, looked)
     done = len(resume.frames()[0]) if resume else 0
-    attributes = _attributes(key, looked)
     with SceneWriter(
         path,
         raster,
         completion.tool,
-        attributes,
+        _attributes(key, looked),
         fields,
         hottest=HOTTEST_PLAUSIBLE,
         resume=resume,
@@ -263,9 +220,12 @@ def import_scene(
 def kept_import(
     wanted: Import, looked: Prospect, path: str | os.PathLike[str]
 ) -> UnfinishedScene | None:
-    """What an earlier run of the same import to a file left at a checkpoint, the furthest."""
-    key = _key(wanted, looked)
-    return next((left for left in unfinished_scenes(Path(path)) if _is_of(left, key)), None)
+    """Find what an earlier run of the same import to a file left at a checkpoint, the furthest."""
+    key = np.frombuffer(_key(wanted, looked).encode(), np.uint8)
+    for left in unfinished_scenes(Path(path)):
+        if left.progress > 0 and np.array_equal(left.state().get(_KEY, []), key):
+            return left
+    return None
 
 
 def read_scene(source: Import | Source) -> Scene:
@@ -298,12 +258,12 @@ def read_scene(source: Import | Source) -> Scene:
 
 
 def _attributes(key: str, looked: Prospect) -> dict[str, str]:
-    """What a scene keeps of where it is from."""
+    """Return what a scene keeps of where it is from."""
     return {"import": key, **looked.notes.attrs()}
 
 
 def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
-    """Whole frames after the first that are done; those depend on some before them."""
+    """Yield the frames after those that are done; they depend on some before them."""
     first = max(done - wanted.completion.memory, 0)
     frames = complete(wanted.source.frames(raster, first), raster, wanted.completion)
     seen = done > 0
@@ -349,7 +309,7 @@ def _holds_all(raster: Raster, survey: Survey) -> bool:
 
 
 def _doubtful_size(survey: Survey) -> tuple[str, ...]:
-    """A sentence if the source is larger or smaller than what is cut and seen by a microscope."""
+    """Return a sentence if the source is larger or smaller than what a microscope sees."""
     left, right, bottom, top = survey.extent
     size = max(right - left, top - bottom)
     if _SMALLEST <= size <= _LARGEST:
@@ -373,13 +333,6 @@ def _check_times(survey: Survey) -> None:
 
 
 def _key(wanted: Import, looked: Prospect) -> str:
-    """What makes two imports the same."""
+    """Return what makes two imports the same."""
     raster = vars(looked.raster)
     return json.dumps({**wanted.description, "raster": raster}, sort_keys=True, default=str)
-
-
-def _is_of(left: UnfinishedScene, key: str) -> bool:
-    if left.progress == 0:
-        return False
-    stored = left.state().get(_KEY)
-    return stored is not None and stored.tobytes() == key.encode()

@@ -1,4 +1,4 @@
-"""Ctrl-C where no exception may come: while HDF5 writes through a file object of Python's."""
+"""Ctrl-C where no exception may come."""
 
 import signal
 from collections.abc import Iterator
@@ -8,11 +8,7 @@ from threading import current_thread, main_thread
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold signals back that would raise an exception; they are sent again when the block ends.
-
-    HDF5 calls back into Python to write. An exception that a signal raises there becomes another
-    one, or ends the process. Also a decorator.
-    """
+    """Hold signals back that would raise an exception; they are sent again when the block ends."""
     if current_thread() is not main_thread():  # where no signal is handled
         yield
         return

@@ -11,9 +11,8 @@ import xarray as xr
 
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
-from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.chunks import COMPRESSION
-from chipglow.io.digest import append_digest, check_file, is_intact
+from chipglow.io.digest import check_file, is_intact, write_hdf5
 
 Made = TypeVar("Made")
 
@@ -38,13 +37,8 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
         for name, variable in data.variables.items()
         if variable.ndim and np.issubdtype(variable.dtype, np.number)
     }
-    path = Path(path)
-    with atomic_path(path) as temporary, KeptErrorFile(temporary) as sink:
-        try:
-            data.drop_encoding().to_netcdf(sink, engine="h5netcdf", encoding=encoding)
-            append_digest(sink)
-        finally:
-            sink.check(path)  # the cause of what HDF5 says
+    bare = data.drop_encoding()
+    write_hdf5(Path(path), lambda sink: bare.to_netcdf(sink, engine="h5netcdf", encoding=encoding))
 
 
 def is_measurement(path: str | os.PathLike[str]) -> bool:

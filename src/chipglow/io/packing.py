@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
+
+_ENCODING: Final = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
 
 
 @dataclass(frozen=True)
@@ -16,10 +19,24 @@ class Packing:
     many bits after the leading one; else as they are.
     """
 
-    dtype: type[np.generic] = np.float32
+    dtype: DTypeLike = np.float32
     step: float = 0.0
     offset: float = 0.0
     bits: int = 0
+
+    @classmethod
+    def stored(cls, dataset: h5py.Dataset) -> "Packing | None":
+        """Return how a dataset is packed; None if xarray has to read it."""
+        said = {
+            name: np.asarray(dataset.attrs[name]) for name in _ENCODING if name in dataset.attrs
+        }
+        if not said and dataset.dtype in (np.float32, np.uint8):
+            return cls(dataset.dtype)
+        if list(said) != ["scale_factor", "add_offset"] or dataset.dtype.kind not in "iu":
+            return None
+        if any(number.dtype != np.float32 or number.size != 1 for number in said.values()):
+            return None
+        return cls(dataset.dtype, *(number.item() for number in said.values()))
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -31,7 +48,7 @@ class Packing:
     @property
     def range(self) -> tuple[float, float]:
         """Smallest and largest value that integers reach."""
-        limits = np.iinfo(np.dtype(self.dtype))
+        limits = np.iinfo(self.dtype)
         return self.offset + self.step * limits.min, self.offset + self.step * limits.max
 
     def pack(self, values: NDArray[Any]) -> NDArray[Any]:
@@ -55,9 +72,9 @@ class Packing:
         return np.rint(counts, out=counts).astype(self.dtype)
 
     def unpack(self, packed: NDArray[Any]) -> NDArray[Any]:
-        """Return the values of what `pack` returned."""
+        """Return a copy of the values of what `pack` returned."""
         if not self.step:
-            return packed
+            return packed.copy()
         values = np.multiply(packed, np.float32(self.step), dtype=np.float32, casting="same_kind")
         if self.offset:
             values += np.float32(self.offset)
@@ -89,5 +106,5 @@ HOT: Final = Packing(np.int32, step=0.025, offset=200.0)
 
 
 def packing_for(hottest: float) -> Mapping[str, Packing]:
-    """Packing of each field of a scene whose temperature in K may be as high as `hottest`."""
+    """Return the packing of each field of a scene with temperatures in K up to `hottest`."""
     return PACKING if hottest <= HOTTEST_PACKED else {**PACKING, "temperature": HOT}

@@ -1,8 +1,4 @@
-"""Readers of other people's files in a subprocess: what a damaged file does there is one error.
-
-They are large libraries, some in C and C++: a damaged file can make them crash, hang or ask for all
-of the memory. There it takes only their process with it.
-"""
+"""Readers of other people's files in a subprocess: a crash, hang or flood there is one error."""
 
 import os
 import pickle
@@ -118,10 +114,7 @@ class Sandbox:
 
 @dataclass(frozen=True)
 class Isolated(Source):
-    """Another source, read in a subprocess: see `Sandbox`.
-
-    By default `patience_for` its files.
-    """
+    """Another source, read in a subprocess: see `Sandbox`; by default `patience_for` its files."""
 
     source: Source
     name: str

@@ -17,18 +17,12 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io import spline_file
-from chipglow.io.atomic import KeptErrorFile, atomic_path
-from chipglow.io.chunks import COMPRESSION, read_chunk, write_chunk
-from chipglow.io.digest import append_digest, check_file
+from chipglow.io.chunks import COMPRESSION, chunk_of, read_chunk
+from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
-from chipglow.io.unfinished import (
-    UnfinishedScene,
-    checkpoint_path,
-    has_checkpoint,
-    write_checkpoint,
-)
+from chipglow.io.packing import HOTTEST_PACKED, Packing, packing_for
+from chipglow.io.spool import UnfinishedScene, spooled
 from chipglow.scene import (
     ENERGY_UNITS,
     FIELD_UNITS,
@@ -89,8 +83,8 @@ CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
-    A context manager. The file has a temporary name until the end; if the block raises, nothing
-    is left of it unless there is a checkpoint to go on from.
+    A context manager. Frames are kept in a `Spool` beside the file, which is written at the end;
+    if the block raises, nothing is left unless there is a checkpoint to go on from.
 
     Parameters
     ----------
@@ -137,18 +131,13 @@ class SceneWriter:
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         self._units = {name: units[name] for name in fields}
         self._lattice = lattice
-        self._chunked = spline_file.CHUNKED if lattice else tuple(self._units)
         self._packing = packing_for(hottest)
+        self._forces: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._stack = ExitStack()
-        self._times: list[float] = []
-        self._chunks: list[tuple[int, int, int]] = []
         self._resume = resume
 
     def __enter__(self) -> "SceneWriter":
-        with ExitStack() as stack:
-            with uninterrupted():
-                self._open(stack)
-            self._stack = stack.pop_all()
+        self._spool = self._stack.enter_context(spooled(self.path, self._resume))
         return self
 
     @uninterrupted()
@@ -161,41 +150,24 @@ class SceneWriter:
         with self._stack:
             if error is not None:
                 raise error
-            if not self._times:
+            if not self._spool.times:
                 raise SceneError(f"{self.path}: no frame was written, expected 1 or more")
+            write_hdf5(self.path, self._write)
 
-    @uninterrupted()
     def append(self, frame: Frame) -> None:
         """Write the next frame."""
-        if self._times and frame.time <= self._times[-1]:
+        times = self._spool.times
+        if times and frame.time <= times[-1]:
             raise SceneError(
-                f"scene: frame at {frame.time:.9g} s, expected later than {self._times[-1]:.9g} s"
+                f"scene: frame at {frame.time:.9g} s, expected later than {times[-1]:.9g} s"
             )
         check_frame(frame)
-        packed = self._kept(frame)
-        count = len(self._times)
-        self._file.resize_dimension("time", count + 1)
-        self._file.variables["time"][count] = frame.time
-        for name, values in packed.items():
-            write_chunk(self._hdf[name], count, values)
-        self._sink.check(self.path)
-        self._times.append(frame.time)
+        self._spool.append(frame.time, map(chunk_of, self._kept(frame)))
 
-    @uninterrupted()
     def checkpoint(self, state: Mapping[str, NDArray[Any]], progress: float) -> Path:
         """Keep the frames so far, with a state to go on from, even if the process is killed."""
-        self._hdf.flush()
-        self._sink.check(self.path)
-        os.fsync(self._sink.fileno())
-        for frame in range(len(self._chunks) // len(self._chunked), len(self._times)):
-            for name in self._chunked:
-                dataset = self._dataset(name)
-                at = dataset.get_chunk_info_by_coord((frame, *(0,) * (dataset.rank - 1)))
-                self._chunks.append((at.byte_offset, at.size, at.filter_mask))
-        write_checkpoint(self._part, state, progress, self._times, self._chunks)
-        return checkpoint_path(self._part)
+        return self._spool.checkpoint(state, progress)
 
-    @uninterrupted()
     def forces(
         self,
         times: ArrayLike,
@@ -203,109 +175,32 @@ class SceneWriter:
         thrust: ArrayLike,
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
-        """Write the force history, once, and the energy balance with it."""
-        time = np.asarray(times, dtype=np.float64)
-        units = {**FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
+        """Write the force history, and the energy balance with it."""
+        units = {"force_time": "s", **FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
         given = {"cutting_force": cutting, "thrust_force": thrust, **(energies or {})}
-        if set(given) != set(units):
-            raise SceneError(f"scene: energies {list(energies or {})}, expected {list(units)[2:]}")
-        forces = {name: np.asarray(given[name], dtype=np.float64) for name in units}
+        if set(given) != set(units) - {"force_time"}:
+            raise SceneError(f"scene: energies {list(energies or {})}, expected {list(units)[3:]}")
+        time = np.asarray(times, dtype=np.float64)
         if time.ndim != 1 or (np.diff(time) <= 0).any() or not np.isfinite(time).all():
             raise SceneError("scene: force_time must be one finite, ascending row of times")
-        for name, values in forces.items():
-            if values.shape != time.shape or not np.isfinite(values).all():
+        history = {"force_time": time}
+        for name in given:
+            history[name] = np.asarray(given[name], dtype=np.float64)
+            if history[name].shape != time.shape or not np.isfinite(history[name]).all():
                 raise SceneError(f"scene: {name!r} must be finite and have shape {time.shape}")
-        self._file.dimensions["force_time"] = time.size
-        for name, unit, values in (
-            ("force_time", "s", time),
-            *((name, units[name], values) for name, values in forces.items()),
-        ):
-            variable = self._file.create_variable(name, ("force_time",), data=values, **COMPRESSION)
-            variable.attrs["units"] = unit
-            variable.attrs["long_name"] = _LONG_NAMES.get(name, "time of the force history")
+        self._forces = {name: (unit, history[name]) for name, unit in units.items()}
 
-    def _open(self, stack: ExitStack) -> None:
-        stack.push(self._drop_checkpoint)
-        self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
-        self._sink = stack.enter_context(KeptErrorFile(self._part))
-        stack.callback(self._sink.check, self.path)
-        stack.callback(append_digest, self._sink)
-        self._hdf = stack.enter_context(
-            h5py.File(self._sink, "w", track_order=True, libver=_VERSION)
-        )
-        self._file = stack.enter_context(h5netcdf.File(self._hdf, "w"))
-        self._create_variables()
-        if self._resume is not None:
-            self._take_over(self._resume)
-
-    def _take_over(self, unfinished: UnfinishedScene) -> None:
-        """Copy the frames of a checkpoint, as they are compressed.
-
-        HDF5 cannot open a file whose writer was killed, but a chunk once written stays in place.
-        """
-        times, chunks = unfinished.frames()
-        self._file.resize_dimension("time", len(times))
-        with unfinished.part.open("rb") as source:
-            for index, (offset, size, filters) in enumerate(chunks.tolist()):
-                frame, field = divmod(index, len(self._chunked))
-                source.seek(offset)
-                dataset = self._dataset(self._chunked[field])
-                corner = (frame, *(0,) * (dataset.rank - 1))
-                dataset.write_direct_chunk(corner, source.read(size), filters)
-                self._sink.check(self.path)
-        self._file.variables["time"][...] = times
-        self._times = times.tolist()
-
-    def _dataset(self, name: str) -> Any:
-        return self._hdf[name].id
-
-    def _drop_checkpoint(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            checkpoint_path(self._part).unlink(missing_ok=True)
-
-    def _create_variables(self) -> None:
-        rows, columns = self.raster.shape
-        self._file.dimensions = {"time": None, "y": rows, "x": columns}
-        for name, value in self._attributes.items():
-            self._file.attrs[name] = value
-        self._file.attrs["Conventions"] = "CF-1.11"
-        self._file.attrs["chipglow_version"] = version("chipglow")
-        self._file.attrs["chipglow_format"] = SCENE_FORMAT
-        coordinates = raster_coordinates(self.raster, np.empty(0))
-        for name, (dimension, values, attributes) in coordinates.items():
-            variable = self._file.create_variable(name, (dimension,), np.float64, **COMPRESSION)
-            if values.size:
-                variable[...] = values
-            variable.attrs.update(attributes)
-        if self._lattice is not None:
-            spline_file.create(self._file, self._lattice)
-            return
-        for name in self._units:
-            self._create_field(name)
-
-    def _create_field(self, name: str) -> None:
-        packing = self._packing[name]
-        variable = self._file.create_variable(
-            name,
-            ("time", "y", "x"),
-            packing.dtype,
-            chunks=(1, *self.raster.shape),
-            **COMPRESSION,
-        )
-        variable.attrs.update(
-            units=self._units[name], long_name=_LONG_NAMES[name], **packing.attributes
-        )
-
-    def _kept(self, frame: Frame) -> dict[str, NDArray[Any]]:
-        """What the file keeps of a frame, by variable."""
+    def _kept(self, frame: Frame) -> list[NDArray[Any]]:
+        """Return what the file keeps of a frame, in the order of the variables."""
         if self._lattice is None:
-            return {name: self._packed(name, frame) for name in self._units}
+            return [self._packed(name, frame) for name in self._units]
         if frame.splines is None or frame.splines.nodes.shape != self._lattice.shape:
             raise SceneError(
                 f"scene: the frame at {frame.time:.9g} s has no splines of shape "
                 f"{self._lattice.shape}, expected those of the lattice"
             )
-        return dict(spline_file.rounded(frame.splines))
+        kept = spline_file.rounded(frame.splines)
+        return [kept[name] for name in spline_file.CHUNKED]
 
     def _packed(self, name: str, frame: Frame) -> NDArray[Any]:
         values = getattr(frame, name)
@@ -319,48 +214,89 @@ class SceneWriter:
         except ValueError as error:
             raise SceneError(f"scene: {name!r} at {frame.time:.9g} s: {error}") from None
 
+    def _write(self, sink: HDF5Sink) -> None:
+        with (
+            h5py.File(sink, "w", track_order=True, libver=_VERSION) as hdf,
+            h5netcdf.File(hdf, "w") as file,
+        ):
+            self._create_variables(file)
+            chunked = spline_file.CHUNKED if self._lattice else tuple(self._units)
+            for index, chunk in enumerate(self._spool.chunks()):
+                frame, place = divmod(index, len(chunked))
+                dataset = hdf[chunked[place]].id
+                dataset.write_direct_chunk((frame, *(0,) * (dataset.rank - 1)), chunk)
+                sink.check()
+
+    def _create_variables(self, file: h5netcdf.File) -> None:
+        rows, columns = self.raster.shape
+        times = np.array(self._spool.times)
+        file.dimensions = {"time": times.size, "y": rows, "x": columns}
+        file.attrs.update(
+            {
+                **self._attributes,
+                "Conventions": "CF-1.11",
+                "chipglow_version": version("chipglow"),
+                "chipglow_format": SCENE_FORMAT,
+            }
+        )
+        for name, (dimension, values, attributes) in raster_coordinates(self.raster, times).items():
+            variable = file.create_variable(name, (dimension,), data=values, **COMPRESSION)
+            variable.attrs.update(attributes)
+        if self._lattice is not None:
+            spline_file.create(file, self._lattice)
+        else:
+            for name in self._units:
+                self._create_field(file, name)
+        if self._forces:
+            file.dimensions["force_time"] = self._forces["force_time"][1].size
+        for name, (unit, values) in self._forces.items():
+            variable = file.create_variable(name, ("force_time",), data=values, **COMPRESSION)
+            long_name = _LONG_NAMES.get(name, "time of the force history")
+            variable.attrs.update(units=unit, long_name=long_name)
+
+    def _create_field(self, file: h5netcdf.File, name: str) -> None:
+        packing = self._packing[name]
+        variable = file.create_variable(
+            name,
+            ("time", "y", "x"),
+            packing.dtype,
+            chunks=(1, *self.raster.shape),
+            **COMPRESSION,
+        )
+        variable.attrs.update(
+            units=self._units[name], long_name=_LONG_NAMES[name], **packing.attributes
+        )
+
 
 class StoredScene(Scene):
     """A scene in a file, read frame by frame; opened by `open_scene`.
 
     Fields that are packed as `SceneWriter` packs them are read without the way through xarray,
-    in half the time; what was read last stays in memory, up to `CACHED_BYTES`. `lattice` says
+    in half the time; what was read last stays in memory, up to `CACHED_BYTES`. `lattice` states
     where the nodes are if the file holds splines, None if it holds samples.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = h5py.File(path, "r")
-        names = (*PACKING, *spline_file.CHUNKED)
-        self._datasets = {name: self._file[name] for name in names if name in self._file}
-        self._direct = {
-            name: packing
-            for name, packing in (*PACKING.items(), ("temperature", HOT))
-            if self._is_packed(name, packing)
-        }
         data = xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         self.lattice = spline_file.stored_lattice(self._file, data)
+        fields = (*CUT_FIELDS, QUALITY) if self.lattice is None else spline_file.CHUNKED
+        datasets = {name: self._file[name] for name in fields if name in data}
+        packings = {name: Packing.stored(dataset) for name, dataset in datasets.items()}
+        self._direct = {name: packing for name, packing in packings.items() if packing}
         if self.lattice is not None:
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
         shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
         chunks = CACHED_BYTES // max(prod(shape) * np.dtype(np.float32).itemsize, 1)
-        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, self._datasets))
+        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, datasets))
         super().__init__(data)
 
     def coarser(self, step: int, every: int = 1) -> Scene:
-        """The same scene with fewer samples, for a quick look.
+        """Return the scene of splines with fewer samples, for a quick look.
 
-        Parameters
-        ----------
-        step : int
-            How many samples, in either direction, become one.
-        every : int
-            One of so many frames that follow one another is kept, the first after each gap.
-
-        Raises
-        ------
-        ValueError
-            If the file holds no splines, or too few samples remain.
+        `step` samples in either direction become one; one frame of `every` is kept, the first
+        after each gap.
         """
         if self.lattice is None:
             raise ValueError(f"{self.path}: has samples, expected splines")
@@ -370,7 +306,8 @@ class StoredScene(Scene):
     @property
     def hottest(self) -> float:
         """Temperature in K over which the file can have none."""
-        narrow = self._direct.get("temperature") == PACKING["temperature"]
+        packing = self._direct.get("temperature")
+        narrow = packing and packing.step and packing.range[1] < HOTTEST_PACKED + packing.step
         return HOTTEST_PACKED if narrow else HOTTEST_PLAUSIBLE
 
     @property
@@ -381,21 +318,12 @@ class StoredScene(Scene):
         filters = [settings.get_filter(i) for i in range(settings.get_nfilters())]
         return ", ".join(name.decode() or str(code) for code, _, _, name in filters) or "none"
 
-    def _is_packed(self, name: str, packing: Packing) -> bool:
-        stored = self._file.get(name)
-        if not isinstance(stored, h5py.Dataset) or stored.dtype != packing.dtype:
-            return False
-        names = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
-        return {key: stored.attrs[key] for key in names if key in stored.attrs} == dict(
-            packing.attributes
-        )
-
     def _unchecked(self, index: int, names: Collection[str] | None) -> Frame:
         splines = self.splines(index)
         return splines.frame(names) if splines else super()._unchecked(index, names)
 
     def splines(self, index: int) -> SplineFrame | None:
-        """The splines of one frame; None if the file has samples."""
+        """Return the splines of one frame; None if the file has samples."""
         if self.lattice is None:
             return None
         index = range(len(self.times))[index]
@@ -413,9 +341,7 @@ class StoredScene(Scene):
         if name not in self._direct:
             with _telling(self.path, name, index):
                 return super()._read(name, index)
-        packed = self._chunk(name, index)
-        values = self._direct[name].unpack(packed)
-        return values.copy() if values is packed else values
+        return self._direct[name].unpack(self._chunk(name, index))
 
 
 def _read_chunk(
@@ -427,7 +353,7 @@ def _read_chunk(
 
 @contextmanager
 def _telling(path: Path, name: str, index: int) -> Iterator[None]:
-    """Say of what cannot be read where it is."""
+    """Name the place of what cannot be read."""
     try:
         yield
     except OSError as error:
@@ -446,7 +372,7 @@ class _CoarserScene(Scene):
         super().__init__(spline_file.with_samples(empty, self._read, _LONG_NAMES))
 
     def splines(self, index: int) -> SplineFrame:
-        """The splines of one frame."""
+        """Return the splines of one frame."""
         found = self._stored.splines(self._kept[index])
         assert found is not None
         return SplineFrame(self._lattice, found.time, found.nodes, found.limits)

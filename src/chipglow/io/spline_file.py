@@ -48,7 +48,7 @@ UNITS: Final[Mapping[str, str]] = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS}
 
 
 def create(file: h5netcdf.File, lattice: Lattice) -> None:
-    """Create the variables that hold splines, and those that say where their nodes are."""
+    """Create the variables that hold splines, and those that state where their nodes are."""
     fields, rows, columns = lattice.shape
     file.dimensions.update(spline=fields, node_y=rows, node_x=columns)
     file.dimensions.update(limited=FILLED_SPLINE, side=2)
@@ -60,25 +60,23 @@ def create(file: h5netcdf.File, lattice: Lattice) -> None:
     file.create_variable(
         "in_tool", ("y", "x"), data=lattice.in_tool.astype(np.uint8), **COMPRESSION
     )
-    dimensions = ("time", "spline", "node_y", "node_x")
-    splines = file.create_variable(
-        SPLINES, dimensions, np.float32, chunks=(1, *lattice.shape), **COMPRESSION
-    )
-    splines.attrs["long_name"] = "coefficients of quadratic B-splines"
-    splines.attrs["fields"] = " ".join(SPLINE_FIELDS)
-    splines.attrs["ambient"] = lattice.ambient
-    limits = file.create_variable(
-        LIMITS,
-        ("time", "limited", "side"),
-        np.float32,
-        chunks=(1, FILLED_SPLINE, 2),
-        **COMPRESSION,
-    )
-    limits.attrs["long_name"] = "least and greatest value of a sample of the workpiece"
+    for name, dimensions, shape, attributes in (
+        (SPLINES, ("spline", "node_y", "node_x"), lattice.shape, {
+            "long_name": "coefficients of quadratic B-splines",
+            "fields": " ".join(SPLINE_FIELDS),
+            "ambient": lattice.ambient,
+        }),
+        (LIMITS, ("limited", "side"), (FILLED_SPLINE, 2), {
+            "long_name": "least and greatest value of a sample of the workpiece",
+        }),
+    ):  # fmt: skip
+        file.create_variable(
+            name, ("time", *dimensions), np.float32, chunks=(1, *shape), **COMPRESSION
+        ).attrs.update(attributes)
 
 
 def rounded(frame: SplineFrame) -> dict[str, NDArray[np.float32]]:
-    """What the file keeps of a frame, by variable."""
+    """Return what the file keeps of a frame, by variable."""
     check(frame)
     return {SPLINES: np.rint(frame.nodes / _STEP) * _STEP, LIMITS: frame.limits}
 
@@ -90,7 +88,7 @@ def check(frame: SplineFrame) -> None:
 
 
 def stored_lattice(file: h5py.File, data: xr.Dataset) -> Lattice | None:
-    """Where the nodes of a file's splines are; None if it has none."""
+    """Return where the nodes of a file's splines are; None if it has none."""
     if SPLINES not in file:
         return None
     x, y, splines = file["node_x"][:], file["node_y"][:], file[SPLINES]
@@ -132,7 +130,7 @@ class SampledVariable(BackendArray):
 
 
 def with_samples(data: xr.Dataset, read: Read, long_names: Mapping[str, str]) -> xr.Dataset:
-    """The dataset of a file of splines with the fields themselves instead."""
+    """Return the dataset of a file of splines with the fields themselves instead."""
     shape = (data.sizes["time"], data.sizes["y"], data.sizes["x"])
     fields = {
         name: (

@@ -130,28 +130,6 @@ def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
     return tuple(data.values()) if isinstance(part, tuple) else data
 
 
-def field_tables(part: Part, name: str) -> str:
-    """Tables in Markdown of a part with this key, and of the parts in it."""
-    return "\n".join(_table_lines(part, name))
-
-
-def _table_lines(part: Part, name: str) -> Iterator[str]:
-    yield from (f"## `{name}`", "", first_sentence(type(part)), "")
-    yield "| field | meaning | unit | default | allowed |"
-    yield "|---|---|---|---|---|"
-    inner = []
-    for one in own_settings(part):
-        if one.is_section:
-            inner.append(one)
-            continue
-        cells = (one.meaning, one.unit, f"`{one.plain}`", one.allowed)
-        row = (" ".join(cell.split()).replace("|", r"\|") for cell in cells)
-        yield f"| `{one.name}` | {' | '.join(row)} |"
-    yield ""
-    for one in inner:
-        yield from _table_lines(one.value, f"{name}.{one.name}")
-
-
 def _families(annotation: Any) -> Iterator[Family]:
     if isinstance(annotation, Family):
         yield annotation

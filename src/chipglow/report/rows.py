@@ -167,7 +167,8 @@ def _reading(facts: Facts, name: str) -> Iterator[Row]:
         yield _drawn(facts, name, "psf_portion_degC", found.psf_portion, one.psf_portion)
     else:
         draws = Distribution(100.0 * fraction.values, fraction.causes) if fraction else None
-        yield _drawn(facts, name, "psf_fraction_percent", draws, 100 * one.psf_fraction)
+        single = one.psf_portion / one.error if one.error else nan
+        yield _drawn(facts, name, "psf_fraction_percent", draws, 100 * single)
 
 
 def _drawn(

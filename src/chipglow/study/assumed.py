@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 from typing import Any, Final
 
-import yaml
-
 from chipglow.quantities import Part, own_settings
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import FeaturesSection
+from chipglow.text.template import yaml_line
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
@@ -46,7 +45,4 @@ def _written(value: Any) -> str:
     """A value in one line, without what is none."""
     if isinstance(value, dict):
         value = {key: inner for key, inner in value.items() if inner not in ("none", None, {}, [])}
-    text: str = yaml.safe_dump(
-        value, default_flow_style=True, allow_unicode=True, width=10_000, sort_keys=False
-    )
-    return text.removesuffix("\n").removesuffix("\n...")
+    return yaml_line(value)

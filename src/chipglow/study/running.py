@@ -7,12 +7,13 @@ from functools import partial
 from json import dumps
 from pathlib import Path
 from time import monotonic
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import xarray as xr
 
 from chipglow.analysis import (
     Analysis,
+    Progress as Progress,
     analyse,
     cut_spots,
     lacking,
@@ -34,9 +35,6 @@ from chipglow.study.cache import scene_path
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
-
-Progress: TypeAlias = Callable[[str, float], None]
-"""Told which step is under way and how much of it is done, 0 to 1."""
 
 CUTTING_STEP: Final = "cutting simulation"
 PREVIEW_STEP: Final = "preview"

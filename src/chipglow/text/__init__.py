@@ -1,27 +1,17 @@
 """Files from outside: small text files, YAML and what it describes, HDF5 without links."""
 
 from chipglow.text.description import (
-    described_by,
-    load_described,
-    placed,
-    validated,
+    described_by as described_by,
+    load_described as load_described,
+    placed as placed,
+    validated as validated,
 )
-from chipglow.text.notes import Notes
-from chipglow.text.own_data import check_own_data
-from chipglow.text.template import commented_yaml, json_schema
-from chipglow.text.yaml_file import DescriptionError, parse_yaml, read_small_text, read_yaml
-
-__all__ = [
-    "DescriptionError",
-    "Notes",
-    "check_own_data",
-    "commented_yaml",
-    "described_by",
-    "json_schema",
-    "load_described",
-    "parse_yaml",
-    "placed",
-    "read_small_text",
-    "read_yaml",
-    "validated",
-]
+from chipglow.text.notes import Notes as Notes
+from chipglow.text.own_data import check_own_data as check_own_data
+from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema
+from chipglow.text.yaml_file import (
+    DescriptionError as DescriptionError,
+    parse_yaml as parse_yaml,
+    read_small_text as read_small_text,
+    read_yaml as read_yaml,
+)

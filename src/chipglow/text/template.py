@@ -40,14 +40,14 @@ def _section_lines(section: Part, indent: str, unused: Collection[str] = ()) -> 
 
 def _entry_lines(name: str, value: object, plain: Any, indent: str) -> Iterator[str]:
     if isinstance(value, Part):
-        yield f"{indent}{_scalar(name)}:"
+        yield f"{indent}{yaml_line(name)}:"
         yield from _section_lines(value, indent + "  ")
     elif isinstance(value, Mapping) and value:
-        yield f"{indent}{_scalar(name)}:"
+        yield f"{indent}{yaml_line(name)}:"
         for key, item in value.items():
             yield from _entry_lines(key, item, plain[key], indent + "  ")
     else:
-        yield f"{indent}{_scalar(name)}: {_scalar(plain)}"
+        yield f"{indent}{yaml_line(name)}: {yaml_line(plain)}"
 
 
 def _wrapped(text: str) -> list[str]:
@@ -57,7 +57,8 @@ def _wrapped(text: str) -> list[str]:
     return [one.replace("\xa0", " ") for each in lines for one in each]
 
 
-def _scalar(value: Any) -> str:
+def yaml_line(value: Any) -> str:
+    """Return a value as YAML in one line."""
     text: str = yaml.safe_dump(
         value, default_flow_style=True, allow_unicode=True, width=float("inf"), sort_keys=False
     )

@@ -20,42 +20,22 @@ class Cause:
 
     Two causes are the same, and their errors fully correlated, if they have the same name and the
     same identity.
-
-    Parameters
-    ----------
-    name : str
-        What it is, such as ``"calibration"``. Budgets have a line for each name.
-    identity : str
-        Tells causes of one name apart whose errors are independent. Empty for the one that is the
-        same wherever its name appears.
-    errors : int
-        How many independent errors it has: 1 of a systematic component, the number of pixels of
-        their noise, the number of observations that show how several quantities vary together.
-    degrees_of_freedom : float
-        Of the standard uncertainty of these errors; infinite if it is exactly known.
-    pooled : bool
-        Whether one estimate with these degrees of freedom serves all errors, as the residuals of
-        a fit do (JCGM 100:2008, H.3); otherwise every error has its own.
-    parts : tuple of str
-        Names of the errors in budgets, if each is to have its own line; by default all have that
-        of the cause.
-    distribution : str
-        Of an error: normal (Student's with finite degrees of freedom), rectangular, triangular or
-        arcsine (JCGM 101:2008, 6.4).
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
     """
 
     name: str
+    """What it is, such as ``"calibration"``. Budgets have a line for each name."""
     identity: str = ""
+    """Tells causes of one name apart whose errors are independent."""
     errors: int = 1
+    """How many independent errors it has: 1 of a systematic one, the number of pixels of noise."""
     degrees_of_freedom: float = inf
+    """Of the standard uncertainty of these errors; infinite if it is exactly known."""
     pooled: bool = True
+    """Whether one estimate with these degrees of freedom serves all errors (JCGM 100:2008, H.3)."""
     distribution: Distribution = "normal"
+    """Of an error (JCGM 101:2008, 6.4); normal is Student's with finite degrees of freedom."""
     parts: tuple[str, ...] = ()
+    """Names of the errors in budgets, if each is to have a line of its own."""
 
     def __post_init__(self) -> None:
         if not self.name.strip():
@@ -90,25 +70,15 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """What the errors of one cause do to an estimate.
-
-    Parameters
-    ----------
-    cause : Cause
-        The cause.
-    effects : ndarray or scipy.sparse.csr_array
-        Change of each value by an error of one standard uncertainty, with its sign, shape
-        (values, errors): the sensitivity coefficient times the standard uncertainty of
-        JCGM 100:2008, 5.1.3.
-
-    Raises
-    ------
-    ValueError
-        If the shape is not that of the cause.
-    """
+    """Effects of the errors of one cause on an estimate."""
 
     cause: Cause
     effects: Any
+    """Change of each value by an error of one standard uncertainty, with its sign.
+
+    Array or sparse array of shape (values, errors): the sensitivity coefficient times the standard
+    uncertainty of JCGM 100:2008, 5.1.3.
+    """
 
     def __post_init__(self) -> None:
         if self.effects.ndim != 2 or self.effects.shape[1] != self.cause.errors:
@@ -141,7 +111,7 @@ class Component:
         return bool((self.effects.indices == np.arange(size)).all())
 
     def of_line(self, name: str) -> "Component | None":
-        """What of it counts in a line of a budget; None if nothing does."""
+        """Return what of it counts in a line of a budget; None if nothing does."""
         if name not in self.cause.lines:
             return None
         if not self.cause.parts:
@@ -151,7 +121,7 @@ class Component:
         return Component(cause, self.effects[:, errors])
 
     def scaled(self, factors: NDArray[np.float64]) -> Any:
-        """Effects on values that are multiplied by factors of shape (values,)."""
+        """Return the effects on values that are multiplied by factors of shape (values,)."""
         if sparse.issparse(self.effects):
             found = self.effects.copy()
             found.data *= np.repeat(factors, np.diff(found.indptr))
@@ -159,24 +129,21 @@ class Component:
         return self.effects * factors[:, None]
 
     def taken(self, rows: NDArray[np.intp]) -> "Component":
-        """The component of some of the values, some of them several times."""
+        """Return the component of some of the values, some of them several times."""
         if sparse.issparse(self.effects):
             count = int(np.diff(self.effects.indptr)[rows].sum())
         else:
             count = rows.size * self.cause.errors
-        self._check_size(count)
-        return Component(self.cause, self.effects[rows])
-
-    def through(self, matrix: Any) -> "Component":
-        """The component of linear combinations of the values, matrix of shape (m, values)."""
-        return Component(self.cause, matrix @ self.effects)
-
-    def _check_size(self, count: int) -> None:
         if count > _MOST:
             raise ValueError(
                 f"component {self.cause.name}: {count:.1e} effects of single errors on single "
                 f"values, expected {_MOST:.0e} at most: use chipglow.uncertainty.draw"
             )
+        return Component(self.cause, self.effects[rows])
+
+    def through(self, matrix: Any) -> "Component":
+        """Return the component of linear combinations of the values, matrix (m, values)."""
+        return Component(self.cause, matrix @ self.effects)
 
 
 def _squared(effects: Any) -> Any:

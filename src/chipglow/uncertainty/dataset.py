@@ -1,10 +1,10 @@
 """Estimates as datasets with the attributes of obsarray, which punpy reads.
 
 Conventions: obsarray's user guide, "Storing uncertainties" (https://obsarray.readthedocs.io). A
-variable names its uncertainty variables in ``unc_comps``; each of these says for every dimension
-whether its errors are ``random`` or ``systematic``. Values of an uncertainty variable keep the sign
-of the effect: the covariance of a systematic one is the product of its values. What obsarray has no
-attribute for (cause, identity, degrees of freedom, warnings) stands beside in attributes of ours.
+variable names its uncertainty variables in ``unc_comps``; each of these states for every dimension
+whether its errors are ``random`` or ``systematic``, and keeps the sign of the effect: the
+covariance of a systematic one is the product of its values. What obsarray has no attribute for
+(cause, identity, degrees of freedom, warnings) stands beside in attributes of ours.
 """
 
 import re
@@ -38,33 +38,8 @@ _RANDOM, _SYSTEMATIC, _MATRIX = "random", "systematic", "err_corr_matrix"
 def to_xarray(
     estimate: Estimate, name: str, dims: Sequence[str] | None = None, units: str = "1"
 ) -> xr.Dataset:
-    """Values and components as variables of a dataset.
+    """Return values and components as variables of a dataset; those of several can be merged.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        What is kept.
-    name : str
-        Name of the variable of the values.
-    dims : sequence of str, optional
-        Its dimensions; ``dim_0`` and so on by default.
-    units : str
-        Of values and uncertainties.
-
-    Returns
-    -------
-    xarray.Dataset
-        The variable, and an uncertainty variable for each component, or for each error of one
-        that makes several values vary together. Datasets of several estimates can be merged.
-
-    Raises
-    ------
-    ValueError
-        If the number of dimensions is wrong, or a component is of more errors than there are
-        values, with more than a thousand values.
-
-    Notes
-    -----
     A component of more errors than values, and more than 32, is kept by as many errors as there
     are values: with the same covariance, but no longer the same as the errors of other estimates.
     """
@@ -90,18 +65,7 @@ def to_xarray(
 def from_xarray(data: xr.Dataset, name: str) -> Estimate:
     """Read an estimate from a dataset of `to_xarray` or of obsarray.
 
-    Parameters
-    ----------
-    data : xarray.Dataset
-        What holds the variable.
-    name : str
-        Name of the variable of the values.
-
-    Raises
-    ------
-    ValueError
-        If there is no such variable, an uncertainty variable is missing, or its correlation has a
-        form other than random, systematic or, along all dimensions together, a matrix.
+    Correlations are random or systematic along each dimension or, along all together, a matrix.
     """
     if name not in data:
         raise ValueError(f"{name}: there is no such variable, expected one of {list(data)}")
@@ -123,7 +87,7 @@ def from_xarray(data: xr.Dataset, name: str) -> Estimate:
 
 
 def _parts(component: Component, name: str) -> Iterator[tuple[NDArray[np.float64], dict[str, Any]]]:
-    """Values and attributes of the uncertainty variables of a component."""
+    """Yield values and attributes of the uncertainty variables of a component."""
     if component.per_element:
         yield component.effects.diagonal(), {**_attributes(component.cause, 0), "form": _RANDOM}
         return
@@ -134,7 +98,7 @@ def _parts(component: Component, name: str) -> Iterator[tuple[NDArray[np.float64
 
 
 def _compact(component: Component, name: str) -> Component:
-    """The component with at most as many errors as values."""
+    """Return the component with at most as many errors as values."""
     size, errors = component.effects.shape
     if errors > max(size, _FEW) and size > _MANY:
         raise ValueError(
@@ -172,7 +136,7 @@ def _attributes(cause: Cause, error: int) -> dict[str, Any]:
 
 
 def _label(attributes: Mapping[str, Any], name: str, others: Mapping[str, Any]) -> str:
-    """Name of an uncertainty variable that no other has."""
+    """Return a name of an uncertainty variable that no other has."""
     label = f"u_{re.sub(r'[^0-9A-Za-z]+', '_', attributes['cause'])}_{name}"
     count = sum(other == label or other.startswith(f"{label}_") for other in others)
     return f"{label}_{count + 1}" if count else label
@@ -188,7 +152,7 @@ def _forms(form: str, dims: Sequence[str]) -> dict[str, Any]:
 
 
 def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, int, Any]:
-    """Cause, number of the error, and effects of an uncertainty variable."""
+    """Return cause, number of the error, and effects of an uncertainty variable."""
     part = data[label]
     values = np.broadcast_to(part.values, variable.shape).astype(np.float64)
     if part.attrs.get("units") == "%":
@@ -212,7 +176,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
 def _effects(
     data: xr.Dataset, part: xr.DataArray, label: str, values: NDArray[np.float64]
 ) -> tuple[Any, bool]:
-    """Effects of an uncertainty variable, and whether they are random."""
+    """Return the effects of an uncertainty variable, and whether they are random."""
     form = dict.fromkeys(part.dims, _RANDOM)
     params: tuple[str, ...] = ()
     for key, dims in part.attrs.items():
@@ -237,5 +201,5 @@ def _effects(
 
 
 def _texts(value: Any) -> tuple[str, ...]:
-    """Texts of an attribute: a list of one comes back from a file as a text."""
+    """Return the texts of an attribute: a list of one comes back from a file as a text."""
     return (value,) if isinstance(value, str) else tuple(str(text) for text in value)

@@ -28,32 +28,10 @@ def draw(
 ) -> tuple[NDArray[np.float64], ...]:
     """Draw values of several estimates together: errors that they have in common are the same.
 
-    Parameters
-    ----------
-    estimates : sequence of Estimate
-        The inputs of a model.
-    count : int
-        How many draws; JCGM 101:2008, 7.2.2, advises 10⁶ for a coverage interval.
-    generator : numpy.random.Generator
-        Source of random numbers: the same state gives the same draws.
-
-    Returns
-    -------
-    tuple of ndarray
-        For each estimate, shape (count, ...). A function of them has the distribution of the
-        output.
-
-    Raises
-    ------
-    ValueError
-        If two estimates have components of one name that cannot be the same.
-
-    Notes
-    -----
-    Propagation of distributions, JCGM 101:2008, clause 7. A normal cause with finite degrees of
-    freedom is drawn from Student's distribution (6.4.9), whose variance is larger by ν/(ν − 2);
-    pooled errors have one χ² together. Degrees of freedom of other distributions
-    play no part.
+    Returns an array of shape (count, ...) for each estimate; a function of them has the
+    distribution of the output (JCGM 101:2008, clause 7; 7.2.2 advises 10⁶ draws for a coverage
+    interval). A normal cause with finite degrees of freedom is drawn from Student's distribution
+    (6.4.9); pooled errors have one χ² together.
     """
     causes: dict[tuple[str, str], Cause] = {}
     used: dict[tuple[str, str], list[NDArray[np.intp]]] = {}
@@ -81,7 +59,7 @@ def draw(
 
 
 def _used(effects: Any) -> NDArray[np.intp]:
-    """Errors that have an effect."""
+    """Return the numbers of the errors that have an effect."""
     if sparse.issparse(effects):
         return np.unique(effects.indices).astype(np.intp)
     return np.arange(effects.shape[1])
@@ -90,31 +68,10 @@ def _used(effects: Any) -> NDArray[np.intp]:
 def coverage_interval(
     draws: ArrayLike, level: float = 0.95, shortest: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Ends of the interval that holds a value with a probability.
+    """Return lower and upper end of the interval that holds a value with a probability.
 
-    Parameters
-    ----------
-    draws : array_like
-        Shape (count, ...).
-    level : float
-        The probability, between 0 and 1.
-    shortest : bool
-        Whether the interval is the shortest one; by default as much is beyond one end as beyond
-        the other.
-
-    Returns
-    -------
-    tuple of (ndarray, ndarray)
-        Lower and upper end, shape (...).
-
-    Raises
-    ------
-    ValueError
-        If the level is not between 0 and 1, or there are too few draws for it.
-
-    Notes
-    -----
-    JCGM 101:2008, 7.7.
+    Of draws of shape (count, ...); with as much beyond one end as beyond the other, or the shortest
+    interval (JCGM 101:2008, 7.7).
     """
     values = np.sort(np.asarray(draws, np.float64), axis=0)
     if not 0 < level < 1:
@@ -131,7 +88,7 @@ def coverage_interval(
 
 
 def _errors(cause: Cause, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
-    """Errors in standard uncertainties, shape (count, errors)."""
+    """Draw errors in standard uncertainties, shape (count, errors)."""
     found = _UNIT[cause.distribution](generator, (count, cause.errors))
     freedom = cause.degrees_of_freedom
     if cause.distribution == "normal" and isfinite(freedom):

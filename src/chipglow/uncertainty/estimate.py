@@ -1,6 +1,6 @@
 """The one type of a result with its uncertainty."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, cast
@@ -13,8 +13,6 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from chipglow.uncertainty.component import Cause, Component, Distribution
-
-Partial = Callable[..., Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +36,6 @@ class Estimate:
     warnings : iterable of str
         Why the values may be wrong beyond their uncertainty, a sentence each. Whatever is
         computed of the estimate has them too.
-
-    Raises
-    ------
-    ValueError
-        If a component is there twice, has effects on another number of values, or has an effect
-        that is not finite on a value that is.
 
     Notes
     -----
@@ -85,8 +77,6 @@ class Estimate:
         if not np.isfinite(numbers).all() and not np.isfinite(component.variance[known]).all():
             raise ValueError(f"component {name}: an effect is not finite, expected finite ones")
 
-    # How it is made
-
     def with_component(
         self,
         name: str,
@@ -98,28 +88,13 @@ class Estimate:
         pooled: bool = True,
         distribution: Distribution = "normal",
     ) -> "Estimate":
-        """The same with one more component.
+        """Return the estimate with one more component.
 
-        Parameters
-        ----------
-        name : str
-            Its cause.
-        effect : array_like
-            Its standard uncertainty, with the sign of its effect on each value; one number for
-            all values or one for each.
-        independent : str, optional
-            By default the error is one, and the same wherever the name appears. ``"common"``: it
-            is one for all values, and independent of any other of that name. ``"per element"``:
-            every value has its own.
-        identity : str, optional
-            Tells an independent component apart from others of its name; by default a new one.
-        degrees_of_freedom, pooled, distribution
-            As in `Cause`.
-
-        Raises
-        ------
-        ValueError
-            If a value is impossible.
+        `effect` is its standard uncertainty, with the sign of its effect on each value: one number
+        or one for each value. By default the error is one, and the same wherever the name appears.
+        ``"common"``: it is one for all values, and independent of any other of that name;
+        ``"per element"``: every value has its own. An `identity` tells independent ones apart, by
+        default it is new. The rest is as in `Cause`.
         """
         signed = np.broadcast_to(np.asarray(effect, np.float64), self.values.shape).flatten()
         per_element = independent == "per element"
@@ -136,24 +111,8 @@ class Estimate:
     def from_observations(
         cls, observations: ArrayLike, name: str, identity: str | None = None
     ) -> "Estimate":
-        """Means of repeated observations, of one quantity or of several observed together.
+        """Return means of repeated observations, shape (n, ...), of quantities observed together.
 
-        Parameters
-        ----------
-        observations : array_like
-            Shape (n, ...), n of 2 or more.
-        name : str
-            Name of the component.
-        identity : str, optional
-            As in `with_component`; a new one by default.
-
-        Raises
-        ------
-        ValueError
-            If there are fewer than two observations.
-
-        Notes
-        -----
         Type A evaluation, JCGM 100:2008, 4.2.3 and 5.2.3: variances and covariances of the means,
         with n − 1 degrees of freedom.
         """
@@ -175,22 +134,7 @@ class Estimate:
         identity: str | None = None,
         degrees_of_freedom: float = np.inf,
     ) -> "Estimate":
-        """Values whose covariance matrix is known, as of the parameters of a fit.
-
-        Parameters
-        ----------
-        values : array_like
-            Of any shape.
-        covariance : array_like
-            Shape (values, values), symmetric, without negative variances.
-        name, identity, degrees_of_freedom
-            As in `with_component`; the identity is a new one by default.
-
-        Raises
-        ------
-        ValueError
-            If the matrix is no covariance of the values.
-        """
+        """Return values whose covariance matrix is known, as of the parameters of a fit."""
         center = np.asarray(values, np.float64)
         matrix = np.asarray(covariance, np.float64)
         if matrix.shape != (center.size, center.size):
@@ -204,14 +148,12 @@ class Estimate:
         return cls(center, (Component(cause, effects),))
 
     def with_warnings(self, *warnings: str) -> "Estimate":
-        """The same with more warnings."""
+        """Return the estimate with more warnings."""
         return replace(self, warnings=(*self.warnings, *warnings))
 
     def with_unevaluated(self, *names: str) -> "Estimate":
-        """The same with more causes of which nothing is known."""
+        """Return the estimate with more causes of which nothing is known."""
         return replace(self, unevaluated=(*self.unevaluated, *names))
-
-    # What it says
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -237,43 +179,29 @@ class Estimate:
             return np.where(parts > 0, self.standard_uncertainty**4 / parts, np.inf)
 
     def coverage_factor(self, level: float = 0.95) -> NDArray[np.float64]:
-        """Student's t of a level of confidence (JCGM 100:2008, G.3), of the shape of the values.
-
-        Parameters
-        ----------
-        level : float
-            Between 0 and 1.
-
-        Raises
-        ------
-        ValueError
-            If the level is not between 0 and 1.
-        """
+        """Return Student's t of a level of confidence (JCGM 100:2008, G.3), of that shape."""
         if not 0 < level < 1:
             raise ValueError(f"level of confidence: is {level!r}, expected between 0 and 1")
         return np.asarray(stdtrit(self.degrees_of_freedom, (1 + level) / 2), np.float64)
 
     def expanded_uncertainty(self, level: float = 0.95) -> NDArray[np.float64]:
-        """Coverage factor times standard uncertainty (JCGM 100:2008, 6.2.1)."""
+        """Return coverage factor times standard uncertainty (JCGM 100:2008, 6.2.1)."""
         return self.coverage_factor(level) * self.standard_uncertainty
 
     def contribution(self, name: str) -> NDArray[np.float64]:
-        """Standard uncertainty of one line of the budget, of the shape of the values.
-
-        It is 0 of a cause that plays no part, and NaN of one of which nothing is known.
-        """
+        """Return the standard uncertainty of one line of the budget; NaN if it is unevaluated."""
         found = self.of_line(name)
         if not found.components and name in self.unevaluated:
             return np.full(self.shape, np.nan)
         return found.standard_uncertainty
 
     def of_line(self, name: str) -> "Estimate":
-        """The same, uncertain by one line of the budget alone."""
+        """Return the values, uncertain by one line of the budget alone."""
         parts = (component.of_line(name) for component in self.components)
         return replace(self, components=tuple(part for part in parts if part is not None))
 
     def renamed(self, name: str, new: str) -> "Estimate":
-        """The same, with a component under another name: a line of its own in budgets."""
+        """Return the estimate with a component under another name in budgets."""
         components = tuple(
             Component(replace(one.cause, name=new, parts=()), one.effects)
             if one.cause.name == name
@@ -283,34 +211,27 @@ class Estimate:
         return replace(self, components=components)
 
     def only(self, name: str) -> "Estimate":
-        """The same with the components of a name alone."""
+        """Return the values with the components of a name alone."""
         kept = tuple(one for one in self.components if one.cause.name == name)
         return replace(self, components=kept)
 
     def without(self, name: str) -> "Estimate":
-        """The same without the components of a name."""
+        """Return the estimate without the components of a name."""
         kept = tuple(one for one in self.components if one.cause.name != name)
         return replace(self, components=kept)
 
     def effect(self, name: str) -> NDArray[np.float64]:
-        """Signed effect of the systematic component of a name, of the shape of the values.
-
-        It is 0 if there is none.
-        """
+        """Return the signed effect of the systematic component of a name; 0 if there is none."""
         for component in self.components:
             if component.cause.key == (name, "") and component.cause.errors == 1:
                 return np.asarray(component.effects, np.float64).reshape(self.shape)
         return np.zeros(self.shape)
 
     def budget(self) -> xr.Dataset:
-        """The uncertainty budget: a line for each cause.
+        """Return the uncertainty budget: a line for each cause, NaN where nothing is known.
 
-        Returns
-        -------
-        xarray.Dataset
-            ``standard_uncertainty``, ``fraction`` of the variance and ``degrees_of_freedom`` by
-            ``cause``, and by value unless there is just one. Its `to_dataframe` is a table. NaN
-            where nothing is known.
+        ``standard_uncertainty``, ``fraction`` of the variance and ``degrees_of_freedom`` by
+        ``cause``, and by value unless there is just one. Its `to_dataframe` is a table.
         """
         lines = [self._line(name) for name in self.names]
         dims = ("cause", *(f"dim_{axis}" for axis in range(self.values.ndim)))
@@ -333,7 +254,7 @@ class Estimate:
         return spread, fraction, freedom
 
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of all values, flat, shape (values, values): JCGM 100:2008, H.2.3."""
+        """Return the covariance of all values, flat: JCGM 100:2008, H.2.3."""
         total = np.zeros((self.values.size, self.values.size))
         for component in self.components:
             product = component.effects @ component.effects.T
@@ -341,7 +262,7 @@ class Estimate:
         return total
 
     def correlation(self) -> NDArray[np.float64]:
-        """Correlation of all values, flat; NaN with an exact one (JCGM 100:2008, 5.2.2)."""
+        """Return the correlation of all values, flat; NaN with an exact one."""
         covariance = self.covariance()
         spread = np.sqrt(np.diag(covariance))
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -350,14 +271,12 @@ class Estimate:
     def _summed(self, parts: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
         return sum(parts, np.zeros(self.values.size)).reshape(self.shape)
 
-    # What is computed of it
-
     def __getitem__(self, index: Any) -> "Estimate":
         numbers = np.arange(self.values.size).reshape(self.shape)[index]
         return self._of_rows(self.values[index], np.asarray(numbers))
 
     def reshape(self, *shape: int) -> "Estimate":
-        """The same values in another shape."""
+        """Return the values in another shape."""
         return replace(self, values=self.values.reshape(shape))
 
     def _of_rows(self, values: Any, numbers: NDArray[np.intp]) -> "Estimate":
@@ -372,39 +291,22 @@ class Estimate:
         return self._of_rows(np.broadcast_to(self.values, shape), np.broadcast_to(numbers, shape))
 
     def linear(self, matrix: Any) -> "Estimate":
-        """Linear combinations of the flat values.
-
-        Parameters
-        ----------
-        matrix : ndarray or sparse array
-            Shape (m, values).
-
-        Returns
-        -------
-        Estimate
-            Of shape (m,): y = A x, with the covariance A V Aᵀ.
-        """
+        """Return linear combinations of the flat values, matrix of shape (m, values)."""
         components = tuple(component.through(matrix) for component in self.components)
         return replace(self, values=matrix @ self.values.ravel(), components=components)
 
     def mean(self) -> "Estimate":
-        """Mean of all values."""
+        """Return the mean of all values."""
         size = self.values.size
         return self.linear(np.full((1, size), 1 / size)).reshape()
 
     def sum(self) -> "Estimate":
-        """Sum of all values."""
+        """Return the sum of all values."""
         return self.linear(np.ones((1, self.values.size))).reshape()
 
     @classmethod
     def stack(cls, estimates: Sequence["Estimate"]) -> "Estimate":
-        """Several estimates of one shape as one, along a new first axis.
-
-        Parameters
-        ----------
-        estimates : sequence of Estimate
-            One or more. Their components of the same cause stay the same.
-        """
+        """Return several estimates of one shape as one, along a new first axis."""
         blocks: dict[Cause, list[Any]] = {}
         for number, one in enumerate(estimates):
             for component in one.components:
@@ -420,7 +322,7 @@ class Estimate:
         )
 
     def __neg__(self) -> "Estimate":
-        return chain(-self.values, (self,), (np.array(-1.0),))
+        return self * -1.0
 
     def __pos__(self) -> "Estimate":
         return self
@@ -446,22 +348,18 @@ class Estimate:
         partial = power * self.values ** (power - 1)
         return chain(self.values**power, (self,), (partial,))
 
-    def __radd__(self, other: Any) -> "Estimate":
-        return self.__add__(other)
+    __radd__ = __add__
+    __rmul__ = __mul__
 
     def __rsub__(self, other: Any) -> "Estimate":
-        return chain(other - self.values, (self,), (np.array(-1.0),))
-
-    def __rmul__(self, other: Any) -> "Estimate":
-        return self.__mul__(other)
+        return as_estimate(other) - self
 
     def __rtruediv__(self, other: Any) -> "Estimate":
-        values = other / self.values
-        return chain(values, (self,), (-values / self.values,))
+        return as_estimate(other) / self
 
 
 def as_estimate(value: Any) -> Estimate:
-    """An estimate as it is; numbers as exact ones."""
+    """Return an estimate as it is, and numbers as exact ones."""
     return value if isinstance(value, Estimate) else Estimate(value)
 
 
@@ -470,21 +368,9 @@ def chain(
     inputs: Sequence[Estimate],
     partials: Sequence[NDArray[np.float64]],
 ) -> Estimate:
-    """The estimate of values that were computed from inputs, element by element.
+    """Return the estimate of values that were computed from inputs, element by element.
 
-    Parameters
-    ----------
-    values : ndarray
-        The result, of the shape to which the inputs broadcast.
-    inputs : sequence of Estimate
-        What it was computed from.
-    partials : sequence of ndarray
-        Partial derivatives by each input, of shapes that broadcast to that of the result.
-
-    Raises
-    ------
-    ValueError
-        If two inputs have components of one name that cannot be the same.
+    The inputs, and their partial derivatives, broadcast to the shape of the values.
     """
     shape = np.shape(values)
     found: dict[tuple[str, str], Component] = {}
@@ -501,7 +387,7 @@ def chain(
 
 
 def remarks(estimates: Iterable[Estimate]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Unevaluated causes and warnings of several estimates."""
+    """Return the unevaluated causes and warnings of several estimates."""
     several = list(estimates)
     return (
         tuple(name for one in several for name in one.unevaluated),
@@ -510,13 +396,7 @@ def remarks(estimates: Iterable[Estimate]) -> tuple[tuple[str, ...], tuple[str, 
 
 
 def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-    """Effects of independent errors that have a covariance, shape (values, errors).
-
-    Raises
-    ------
-    ValueError
-        If the matrix is not symmetric, or has a negative variance beyond rounding.
-    """
+    """Return effects of independent errors that have a covariance, shape (values, errors)."""
     scale = np.sqrt(np.abs(np.diag(covariance)))
     scale[scale == 0.0] = 1.0
     # Of correlations: beside a value in kelvins the variance of one in metres is lost in rounding.
@@ -543,7 +423,7 @@ def check_same(one: Cause, other: Cause) -> None:
 
 
 def _diagonal(values: NDArray[np.float64]) -> Any:
-    """A sparse array with values on its diagonal, those that are 0 too."""
+    """Return a sparse array with values on its diagonal, those that are 0 too."""
     return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
 
 

@@ -1,8 +1,7 @@
 """Readers of real cameras' files, and a writer of one."""
 
-from chipglow.io.cameras.formats import CameraFormat, camera_formats
+from chipglow.io.cameras.formats import CameraFormat, camera_formats, read_recording
 from chipglow.io.cameras.hcc import write_hcc
-from chipglow.io.cameras.recordings import read_recording
 
 __all__ = [
     "CameraFormat",

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.io.cameras.binary import (
-    MOST_FRAMES,
     Binary,
     CutShortError,
     Timing,
@@ -19,8 +18,9 @@ from chipglow.io.cameras.binary import (
     common_exposure,
     first_moment,
     layout,
-    note_missing_frames,
+    note_truncation,
     opened,
+    read_pictures,
 )
 from chipglow.io.sources import SourceError
 from chipglow.text import Notes
@@ -52,7 +52,6 @@ _SETUP: Final = layout(
 )
 _BLOCK: Final = np.dtype([("size", "<u4"), ("kind", "<u2"), ("more", "<u2")])
 _TIMES, _EXPOSURES = 1002, 1003
-_MOST_BLOCKS: Final = 1000
 _TICK: Final = 2.0**-32
 _PACKED_10, _PACKED_12 = 256, 1024
 
@@ -64,7 +63,7 @@ def is_cine(head: bytes) -> bool:
 
 @dataclass(frozen=True)
 class _Pictures:
-    """How the pictures of a file are stored."""
+    """How the pictures of a file are stored; `size` in bytes."""
 
     height: int
     width: int
@@ -74,10 +73,77 @@ class _Pictures:
     bits: int
 
     def image(self, raw: bytes) -> NDArray[np.uint16]:
-        """Counts of a picture, row 0 at the top."""
+        """Return the counts of a picture, row 0 at the top."""
         stored = np.frombuffer(raw, np.uint8).reshape(self.height, -1)
         rows = self.unpack(stored)[:, : self.width]
         return rows[::-1] if self.upward else rows
+
+
+@dataclass(frozen=True)
+class _Cine:
+    """A file and its headers."""
+
+    binary: Binary
+    header: dict[str, Any]
+    setup: dict[str, Any]
+    pictures: _Pictures
+
+    @classmethod
+    def of(cls, binary: Binary) -> "_Cine":
+        """Read the headers."""
+        header = binary.record(0, _FILE)
+        if header["mark"] != b"CI":
+            raise SourceError(
+                f"{binary.path}: begins with {header['mark']!r}, expected 'CI' (CINE)"
+            )
+        setup = binary.record(header["setup"], _SETUP)
+        if setup["mark"] != b"ST":
+            raise SourceError(
+                f"{binary.path}: the camera's settings begin with {setup['mark']!r}, not 'ST'"
+            )
+        return cls(binary, header, setup, _pictures(binary, header, setup))
+
+    def start(self, place: int) -> int:
+        """Return where the image of a frame begins, behind its annotation."""
+        length = int(self.binary.numbers(place, 1, "<u4")[0])
+        size = int(self.binary.numbers(place + length - 4, 1, "<u4")[0]) if length >= 8 else 0
+        if size != self.pictures.size:
+            raise SourceError(
+                f"{self.binary.path}: is damaged, a frame has {size} bytes, expected "
+                f"{self.pictures.size}"
+            )
+        return place + length
+
+    def image(self, place: int) -> NDArray[np.uint16]:
+        """Return the counts of a frame."""
+        return self.pictures.image(self.binary.read(self.start(place), self.pictures.size))
+
+    def whole(self, places: NDArray[np.int64]) -> int:
+        """Return how many frames, from the first on, are whole: a cut file lacks the last ones."""
+        beyond = np.flatnonzero(places + self.pictures.size > self.binary.size)
+        count = int(beyond[0]) if beyond.size else places.size
+        while count:
+            try:
+                if self.start(int(places[count - 1])) + self.pictures.size <= self.binary.size:
+                    break
+            except CutShortError:
+                pass
+            count -= 1
+        return count
+
+    def of_frames(self, kind: int, dtype: str) -> NDArray[Any] | None:
+        """Return the numbers of a tagged block before the frames, one a frame; None without it."""
+        count = self.header["count"]
+        size = _BLOCK.itemsize + count * np.dtype(dtype).itemsize
+        place = self.header["setup"] + self.setup["length"]
+        while place + _BLOCK.itemsize <= min(self.header["places"], self.binary.size):
+            block = self.binary.record(place, _BLOCK)
+            if (block["kind"], block["size"]) == (kind, size):
+                return self.binary.numbers(place + _BLOCK.itemsize, count, dtype)
+            if not block["more"] or block["size"] < _BLOCK.itemsize:
+                break
+            place += block["size"]
+        return None
 
 
 def read_cine(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
@@ -88,30 +154,21 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
     light.
     """
     with opened(path) as binary:
-        header = binary.record(0, _FILE, "the header")
-        if header["mark"] != b"CI":
-            raise SourceError(f"{path}: begins with {header['mark']!r}, expected 'CI' (CINE)")
-        setup = binary.record(header["setup"], _SETUP, "the camera's settings")
-        if setup["mark"] != b"ST":
-            raise SourceError(
-                f"{path}: the camera's settings begin with {setup['mark']!r}, not 'ST'"
-            )
-        pictures = _pictures(binary, header, setup)
-        count = header["count"]
-        if not 0 < count <= MOST_FRAMES:
-            raise SourceError(f"{path}: says {count} frames, expected 1 to {MOST_FRAMES}")
-        places = binary.numbers(header["places"], count, "<i8", "the places of the frames")
-        whole = _whole(binary, places, pictures)
+        file = _Cine.of(binary)
+        header, setup, pictures = file.header, file.setup, file.pictures
+        places = binary.numbers(header["places"], header["count"], "<i8")
+        whole = file.whole(places)
         chosen = chosen_frames(path, frames, whole, pictures.height * pictures.width)
-        signal = np.empty((len(chosen), pictures.height, pictures.width), np.uint16)
-        for position, number in enumerate(chosen):
-            start = _image_start(binary, int(places[number]), pictures, number)
-            signal[position] = pictures.image(binary.read(start, pictures.size, f"frame {number}"))
+        signal = read_pictures(
+            chosen,
+            (pictures.height, pictures.width),
+            lambda number: file.image(int(places[number])),
+        )
         notes = Notes(remarks=[f"Frame 0 is number {header['first']} of the recording."])
-        note_missing_frames(notes, count, whole)
-        blocks = _blocks(binary, header, setup)
-        times = _times(binary, blocks, header, setup["rate"], Timing(path, chosen, interval, notes))
-        integration_time = _integration_time(binary, blocks, header, setup, chosen, notes)
+        if whole < header["count"]:
+            note_truncation(notes, whole)
+        times = _times(file, Timing(path, chosen, interval, notes))
+        integration_time = _integration_time(file, chosen, notes)
     return Recording(
         signal=signal,
         quantity="counts",
@@ -125,7 +182,7 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
 
 def _pictures(binary: Binary, header: dict[str, Any], setup: dict[str, Any]) -> _Pictures:
     path = binary.path
-    picture = binary.record(header["picture_header"], _PICTURE, "the pictures' header")
+    picture = binary.record(header["picture_header"], _PICTURE)
     height, width = abs(picture["height"]), picture["width"]
     check_picture(path, height, width)
     bits, packing = picture["bits"], picture["packing"]
@@ -142,33 +199,32 @@ def _pictures(binary: Binary, header: dict[str, Any], setup: dict[str, Any]) -> 
         )
     line = -(-width * bits // 32) * 4  # as in Windows' bitmaps
     real = setup["bits"] if 8 <= setup["bits"] <= bits else bits
-    unpack = _bytes if bits == 8 else _words
-    return _Pictures(height, width, height * line, unpack, picture["height"] > 0, real)
-
-
-def _bytes(stored: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    return stored.astype(np.uint16)
-
-
-def _words(stored: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    return stored.view("<u2").astype(np.uint16)
+    kind = "u1" if bits == 8 else "<u2"
+    return _Pictures(
+        height,
+        width,
+        height * line,
+        lambda stored: stored.view(kind).astype(np.uint16),
+        picture["height"] > 0,
+        real,
+    )
 
 
 def _unpack_10(stored: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Four codes in five bytes, the highest bits first, and what they stand for."""
+    """Unpack four codes in five bytes, the highest bits first, and return their counts."""
     a, b, c, d, e = np.moveaxis(stored.reshape(len(stored), -1, 5).astype(np.uint16), -1, 0)
     codes = (a << 2 | b >> 6, (b & 63) << 4 | c >> 4, (c & 15) << 6 | d >> 2, (d & 3) << 8 | e)
     return _CURVE[np.stack(codes, axis=-1).reshape(len(stored), -1)]
 
 
 def _unpack_12(stored: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """Two counts in three bytes, the highest bits first."""
+    """Unpack two counts in three bytes, the highest bits first."""
     a, b, c = np.moveaxis(stored.reshape(len(stored), -1, 3).astype(np.uint16), -1, 0)
     return np.stack((a << 4 | b >> 4, (b & 15) << 8 | c), axis=-1).reshape(len(stored), -1)
 
 
 def _curve() -> NDArray[np.uint16]:
-    """Counts of 12 bits by code of 10 bits.
+    """Return counts of 12 bits by code of 10 bits.
 
     The maker publishes a table. This is the curve of Recommendation ITU-R BT.709 with constants
     fitted to it: within two counts of the table, and clipped where it is.
@@ -184,97 +240,23 @@ def _curve() -> NDArray[np.uint16]:
 _CURVE: Final = _curve()
 
 
-def _whole(binary: Binary, places: NDArray[np.int64], pictures: _Pictures) -> int:
-    """How many frames, from the first on, are whole: a cut file may lack the last ones.
-
-    Raises
-    ------
-    CutShortError
-        If none is.
-    """
-    _image_start(binary, int(places[0]), pictures, 0)
-    beyond = np.flatnonzero(places + pictures.size > binary.size)
-    count = int(beyond[0]) if beyond.size else places.size
-    while True:
-        try:
-            _image_start(binary, int(places[count - 1]), pictures, count - 1)
-        except CutShortError:
-            count -= 1
-        else:
-            return count
-
-
-def _image_start(binary: Binary, place: int, pictures: _Pictures, number: int) -> int:
-    """Where the image of a frame begins, behind its annotation; refuses one that is not there."""
-    what = f"frame {number}"
-    length = int(binary.numbers(place, 1, "<u4", what)[0])
-    size = int(binary.numbers(place + length - 4, 1, "<u4", what)[0]) if length >= 8 else 0
-    if size != pictures.size or place + length + size > binary.size:
-        kind = SourceError if size != pictures.size else CutShortError
-        raise kind(
-            f"{binary.path}: is cut short or damaged, {what} has {size} bytes from byte "
-            f"{place + length} of {binary.size}, expected {pictures.size}"
-        )
-    return place + length
-
-
-def _blocks(
-    binary: Binary, header: dict[str, Any], setup: dict[str, Any]
-) -> dict[int, tuple[int, int]]:
-    """Where the tagged blocks between settings and frames are, and how long: by their kind."""
-    found: dict[int, tuple[int, int]] = {}
-    place, end = header["setup"] + setup["length"], min(header["places"], binary.size)
-    while place + _BLOCK.itemsize <= end and len(found) < _MOST_BLOCKS:
-        block = binary.record(place, _BLOCK, "a tagged block")
-        if not _BLOCK.itemsize <= block["size"] <= end - place:
-            break
-        found.setdefault(block["kind"], (place + _BLOCK.itemsize, block["size"] - _BLOCK.itemsize))
-        place += block["size"]
-        if not block["more"]:
-            break
-    return found
-
-
-def _of_frames(
-    binary: Binary, blocks: dict[int, tuple[int, int]], kind: int, count: int, dtype: str
-) -> NDArray[Any] | None:
-    """Numbers of a tagged block, one a frame, if the file has it."""
-    place, size = blocks.get(kind, (0, 0))
-    if size != count * np.dtype(dtype).itemsize:
-        return None
-    return binary.numbers(place, count, dtype, "a tagged block")
-
-
-def _times(
-    binary: Binary,
-    blocks: dict[int, tuple[int, int]],
-    header: dict[str, Any],
-    rate: int,
-    timing: Timing,
-) -> NDArray[np.float64]:
+def _times(file: _Cine, timing: Timing) -> NDArray[np.float64]:
     if timing.interval is not None:
         return timing.even(timing.interval)
-    stamps = _of_frames(binary, blocks, _TIMES, header["count"], "<u8")
+    stamps = file.of_frames(_TIMES, "<u8")
     if stamps is None:
-        return timing.stamped(None, rate)
+        return timing.stamped(None, file.setup["rate"])
     ticks = stamps >> 2 << 2  # the two lowest bits are flags
-    after = float(int(header["trigger"]) - int(ticks[0])) * _TICK
+    after = float(int(file.header["trigger"]) - int(ticks[0])) * _TICK
     remarks = timing.notes.remarks
     remarks.extend(first_moment(float(ticks[0]) * _TICK))
     remarks.append(f"The trigger was at {after:.9g} s.")
     since = (ticks[list(timing.frames)] - ticks[0]).astype(np.int64) * _TICK
-    return timing.stamped(since, rate)
+    return timing.stamped(since, file.setup["rate"])
 
 
-def _integration_time(
-    binary: Binary,
-    blocks: dict[int, tuple[int, int]],
-    header: dict[str, Any],
-    setup: dict[str, Any],
-    chosen: range,
-    notes: Notes,
-) -> float | None:
-    exposures = _of_frames(binary, blocks, _EXPOSURES, header["count"], "<u4")
+def _integration_time(file: _Cine, chosen: range, notes: Notes) -> float | None:
+    exposures = file.of_frames(_EXPOSURES, "<u4")
     if exposures is None:
-        return setup["shutter"] * 1e-9 or None
+        return file.setup["shutter"] * 1e-9 or None
     return common_exposure(exposures[list(chosen)] * _TICK, notes)

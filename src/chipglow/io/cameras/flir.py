@@ -14,21 +14,20 @@ from numpy.typing import NDArray
 
 from chipglow.camera import PlanckConversion, Recording
 from chipglow.io.cameras.binary import (
-    MOST_FRAMES,
     Binary,
     CutShortError,
     Timing,
     check_picture,
     chosen_frames,
     first_moment,
-    note_trailing_bytes,
+    note_truncation,
     object_parameters,
     opened,
+    read_pictures,
     text_of,
 )
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import reading
-from chipglow.io.sources.source import required
+from chipglow.io.sources.source import reading, required
 from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes
 
@@ -46,8 +45,6 @@ _RAW, _CAMERA = 1, 32
 _RAW_HEADER: Final = 32
 _BIG_ENDIAN: Final = 1
 _MOST_PADDING: Final = 1 << 20
-_MOST_PACKED: Final = 1100
-"""More samples than that a byte are in no picture that is packed without loss."""
 _ZERO: Final = 273.15
 _LARGE: Final = 100.0
 """An exponent that is possible, and no transmittance."""
@@ -60,7 +57,7 @@ def is_flir(head: bytes) -> bool:
 
 @dataclass(frozen=True)
 class _Frame:
-    """Where the records of a frame are: start and length by their kind, and the raw one's order."""
+    """Start and length of a frame's records by their kind, and the order of its counts."""
 
     records: dict[int, tuple[int, int]]
     big_endian: bool
@@ -74,37 +71,34 @@ class _Fields:
     raw: bytes
 
     def number(self, place: int, kind: str) -> float:
-        """A number; NaN if it is not there."""
+        """Return a number; NaN if it is not there."""
         order = "<" if self.raw[:2] == b"\x02\0" else ">"
         if place + calcsize(kind) > len(self.raw):
             return float("nan")
         return float(unpack_from(order + kind, self.raw, place)[0])
 
     def text(self, place: int, length: int) -> str:
-        """A text; empty if it is not there."""
+        """Return a text; empty if it is not there."""
         return text_of(self.raw[place : place + length])
 
 
 def read_flir(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
     """Read frames of FLIR's radiometric JPEG, FFF, SEQ or CSQ as counts; see `CameraFormat`.
 
-    Notes
-    -----
     The layout is that of ExifTool's documentation of FLIR's tags.
     """
     notes = Notes()
     with _records(path) as binary:
         places = _frames(binary, notes)
-        first = places[0]
-        height, width = _shape(binary, first, 0)
-        chosen = chosen_frames(path, frames, len(places), height * width)
-        signal = np.empty((len(chosen), height, width), np.uint16)
-        stamps = np.empty(len(chosen))
-        start = _moment(_camera_fields(binary, first))
-        for position, number in enumerate(chosen):
-            signal[position] = _image(binary, places[number], number, (height, width))
-            stamps[position] = _moment(_camera_fields(binary, places[number])) - start
-        fields = _camera_fields(binary, places[chosen[0]])
+        shape = _shape(binary, places[0])
+        chosen = chosen_frames(path, frames, len(places), shape[0] * shape[1])
+        signal = read_pictures(
+            chosen, shape, lambda number: _image(binary, places[number], number, shape)
+        )
+        start = _moment(_camera_fields(binary, places[0]))
+        cameras = [_camera_fields(binary, places[number]) for number in chosen]
+    stamps = np.array([_moment(fields) - start for fields in cameras])
+    fields = cameras[0]
     notes.remarks.extend(first_moment(start))
     recording = Recording(
         signal=signal,
@@ -125,9 +119,9 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
 
 @contextmanager
 def _records(path: Path) -> Iterator[Binary]:
-    """The file, or what of a JPEG is FLIR's."""
+    """Open the file, or what of a JPEG is FLIR's."""
     with opened(path) as binary:
-        if binary.read(0, min(3, binary.size), "the signature") != _JPEG:
+        if binary.read(0, min(3, binary.size)) != _JPEG:
             yield binary
             return
         inside = _inside_jpeg(binary)
@@ -135,19 +129,16 @@ def _records(path: Path) -> Iterator[Binary]:
 
 
 def _inside_jpeg(binary: Binary) -> bytes:
-    """FLIR's records, which lie in numbered segments of a JPEG."""
+    """Return FLIR's records, which lie in numbered segments of a JPEG."""
     parts: dict[int, bytes] = {}
-    last, place = 0, 2
-    while True:
-        marker, length = (int(n) for n in binary.numbers(place, 2, ">u2", "a segment of the JPEG"))
+    last, place, marker = 0, 2, 0
+    while marker != 0xFFDA:  # the picture itself
+        marker, length = (int(n) for n in binary.numbers(place, 2, ">u2"))
         if marker >> 8 != 0xFF or length < 2:
             raise SourceError(f"{binary.path}: is damaged, no segment of the JPEG at byte {place}")
-        if marker == 0xFFDA:  # the picture itself
-            break
-        if marker == 0xFFE1 and length >= 10:
-            segment = binary.read(place + 4, length - 2, "a segment of the JPEG")
-            if segment[:5] == b"FLIR\0":
-                parts[segment[6]], last = segment[8:], segment[7]
+        segment = binary.read(place + 4, length - 2) if marker == 0xFFE1 else b""
+        if segment[:5] == b"FLIR\0" and len(segment) >= 8:
+            parts[segment[6]], last = segment[8:], segment[7]
         place += 2 + length
     if not parts:
         raise SourceError(f"{binary.path}: is a JPEG without FLIR's counts in it")
@@ -159,7 +150,7 @@ def _inside_jpeg(binary: Binary) -> bytes:
 
 
 def _frames(binary: Binary, notes: Notes) -> list[_Frame]:
-    """Where all frames are that are whole."""
+    """Find all frames that are whole."""
     found: list[_Frame] = []
     place: int | None = 0
     while place is not None:
@@ -168,19 +159,17 @@ def _frames(binary: Binary, notes: Notes) -> list[_Frame]:
         except CutShortError:
             if not found:
                 raise
-            note_trailing_bytes(notes, len(found), binary.size - place)
+            note_truncation(notes, len(found))
             break
-        if len(found) > MOST_FRAMES:
-            raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
         place = _next(binary, found[-1].end, notes)
     return found
 
 
 def _next(binary: Binary, end: int, notes: Notes) -> int | None:
-    """Where the next frame begins: there may be zeros or something else before it."""
-    if binary.read(end, min(4, binary.size - end), "what follows a frame") == _MAGIC:
+    """Find the next frame: there may be zeros or something else before it."""
+    if binary.read(end, min(4, binary.size - end)) == _MAGIC:
         return end
-    rest = binary.read(end, min(_MOST_PADDING, binary.size - end), "what follows a frame")
+    rest = binary.read(end, min(_MOST_PADDING, binary.size - end))
     begin = rest.find(_MAGIC)
     if begin >= 0:
         return end + begin
@@ -190,7 +179,7 @@ def _next(binary: Binary, end: int, notes: Notes) -> int | None:
 
 
 def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
-    header = binary.read(start, _HEADER_LENGTH, f"the header of frame {number}")
+    header = binary.read(start, _HEADER_LENGTH)
     if header[:4] != _MAGIC:
         raise SourceError(f"{binary.path}: begins with {header[:4]!r}, expected 'FFF' (FLIR)")
     order = "<" if 100 <= unpack_from("<I", header, 20)[0] < 200 else ">"
@@ -200,13 +189,11 @@ def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
             f"{binary.path}: frame {number} says {count} records, expected 1 to {_MOST_RECORDS}"
         )
     length = count * _ENTRY_LENGTH
-    table = binary.read(start + place, length, f"the list of records of frame {number}")
+    table = binary.read(start + place, length)
     records: dict[int, tuple[int, int]] = {}
     big_endian, end = False, start + place + length
-    for entry in range(count):
-        kind, sort, _, _, offset, size, *_ = unpack_from(
-            order + _ENTRY, table, _ENTRY_LENGTH * entry
-        )
+    for entry in range(0, length, _ENTRY_LENGTH):
+        kind, sort, _, _, offset, size, *_ = unpack_from(order + _ENTRY, table, entry)
         if kind == 0:
             continue
         missing = start + offset + size - binary.size
@@ -214,8 +201,8 @@ def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
             size -= missing
             if kind != _RAW or not _whole_picture(binary, start + offset, size):
                 raise CutShortError(
-                    f"{binary.path}: is cut short or damaged, a record of frame {number} ends at "
-                    f"byte {binary.size + missing} of {binary.size}"
+                    f"{binary.path}: is cut short or damaged, {missing} bytes of a record of frame "
+                    f"{number} are missing"
                 )
             notes.remarks.append(
                 f"The last {missing} bytes of the file are missing; the picture of frame {number} "
@@ -233,7 +220,7 @@ def _whole_picture(binary: Binary, place: int, length: int) -> bool:
     """Whether a record of counts, of which the end is missing, has all of them."""
     if length <= _RAW_HEADER:
         return False
-    stored = binary.read(place, length, "counts")
+    stored = binary.read(place, length)
     counts = stored[_RAW_HEADER:]
     packing = _packing(counts)
     if packing:
@@ -245,30 +232,18 @@ def _whole_picture(binary: Binary, place: int, length: int) -> bool:
 # Counts
 
 
-def _shape(binary: Binary, frame: _Frame, number: int) -> tuple[int, int]:
-    fields = _Fields(binary.read(frame.records[_RAW][0], _RAW_HEADER, f"counts of frame {number}"))
+def _shape(binary: Binary, frame: _Frame) -> tuple[int, int]:
+    fields = _Fields(binary.read(frame.records[_RAW][0], _RAW_HEADER))
     width, height = (int(fields.number(place, "H")) for place in (2, 4))
     check_picture(binary.path, height, width)
-    length = frame.records[_RAW][1]
-    if height * width > _MOST_PACKED * length:
-        raise SourceError(
-            f"{binary.path}: frame {number} says {width} columns and {height} rows, which are not "
-            f"in {length} bytes"
-        )
     return height, width
 
 
 def packed_counts(path: Path) -> bool:
-    """Whether the counts of a file are packed as PNG or JPEG-LS, so that libraries unpack them.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    """
+    """Whether the counts of a file are packed as PNG or JPEG-LS, so that libraries unpack them."""
     with _records(path) as binary:
         place, length = _frame(binary, 0, 0, Notes()).records[_RAW]
-        return _packing(binary.read(place, length, "counts of frame 0")[_RAW_HEADER:]) != ""
+        return _packing(binary.read(place, length)[_RAW_HEADER:]) != ""
 
 
 def _packing(stored: bytes) -> str:
@@ -280,59 +255,38 @@ def _packing(stored: bytes) -> str:
 def _image(
     binary: Binary, frame: _Frame, number: int, shape: tuple[int, int]
 ) -> NDArray[np.uint16]:
-    if _shape(binary, frame, number) != shape:
+    name = f"{binary.path}: frame {number}"
+    if _shape(binary, frame) != shape:
         raise SourceError(
-            f"{binary.path}: frame {number} has another shape than frame 0, expected {shape[1]} "
-            f"columns and {shape[0]} rows"
+            f"{name} has another shape than frame 0, expected {shape[1]} columns and {shape[0]} "
+            "rows"
         )
     place, length = frame.records[_RAW]
-    stored = binary.read(place, length, f"counts of frame {number}")[_RAW_HEADER:]
+    stored = binary.read(place, length)[_RAW_HEADER:]
     packing = _packing(stored)
-    if not packing:
-        return _plain(binary.path, stored, frame.big_endian, number, shape)
-    name = f"{binary.path}: frame {number}"
     with reading(name):
-        values = (
-            _from_png(stored, shape) if packing == "PNG" else _from_jpeg_ls(name, stored, shape)
-        )
+        if not packing:
+            order = ">u2" if frame.big_endian else "<u2"
+            return np.frombuffer(stored, order, shape[0] * shape[1]).reshape(shape)
+        values = _unpacked(name, packing, stored)
     if values.shape != shape or values.dtype != np.uint16:
         raise SourceError(f"{name}: its {packing} is {values.dtype} of shape {values.shape}")
     return _in_order(values)
 
 
-def _plain(
-    path: Path, stored: bytes, big_endian: bool, number: int, shape: tuple[int, int]
-) -> NDArray[np.uint16]:
-    count = shape[0] * shape[1]
-    if len(stored) < 2 * count:
-        raise SourceError(
-            f"{path}: frame {number} has {len(stored)} bytes of counts, expected {2 * count}"
-        )
-    values = np.frombuffer(stored, ">u2" if big_endian else "<u2", count)
-    return values.reshape(shape).astype(np.uint16)
+def _unpacked(name: str, packing: str, stored: bytes) -> NDArray[Any]:
+    if packing == "PNG":
+        from PIL import Image
 
-
-def _from_png(stored: bytes, shape: tuple[int, int]) -> NDArray[Any]:
-    from PIL import Image
-
-    with Image.open(BytesIO(stored), formats=["PNG"]) as picture:
-        if picture.size != shape[::-1]:
-            raise ValueError(f"PNG of {picture.size} pixels, expected {shape[::-1]}")
-        if not picture.mode.startswith("I"):
-            raise ValueError(f"PNG of kind {picture.mode}, expected 16 bits of grey")
-        return np.asarray(picture).astype(np.uint16)
-
-
-def _from_jpeg_ls(name: str, stored: bytes, shape: tuple[int, int]) -> NDArray[Any]:
+        with Image.open(BytesIO(stored), formats=["PNG"]) as picture:
+            counts = np.asarray(picture)
+            return counts.astype(np.uint16) if picture.mode == "I" else counts
     imagecodecs = required("imagecodecs", name, "camera", "imagecodecs for JPEG-LS")
-    height, width = unpack_from(">HH", stored, stored.index(_JPEG_LS) + 5)
-    if (height, width) != shape:
-        raise ValueError(f"JPEG-LS of {(width, height)} pixels, expected {shape[::-1]}")
     return np.asarray(imagecodecs.jpegls_decode(stored))
 
 
 def _in_order(values: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Counts whose bytes are in order: most cameras, not all, write PNG with them swapped.
+    """Return counts with their bytes in order: most cameras, not all, write PNG with them swapped.
 
     Neighbours of a picture are alike, unless the bytes of its counts are swapped.
     """
@@ -350,11 +304,11 @@ def _roughness(values: NDArray[np.uint16]) -> int:
 
 def _camera_fields(binary: Binary, frame: _Frame) -> _Fields:
     place, length = frame.records.get(_CAMERA, (0, 0))
-    return _Fields(binary.read(place, min(length, 4096), "what the camera says"))
+    return _Fields(binary.read(place, min(length, 4096)))
 
 
 def _moment(fields: _Fields) -> float:
-    """When a frame was taken in s since 1970; NaN if it is not said."""
+    """Return the time of a frame in s since 1970; NaN if it is not said."""
     seconds, milliseconds = fields.number(0x384, "I"), fields.number(0x388, "I")
     if not (seconds > 0 and isfinite(milliseconds)):
         return float("nan")
@@ -376,7 +330,7 @@ def _camera(fields: _Fields) -> str:
 
 
 def _saturation(fields: _Fields) -> float | None:
-    """The greatest count of the camera's range; cameras that do not know it say all 16 bits."""
+    """Return the greatest count of the camera's range; cameras without it say all 16 bits."""
     low, high = fields.number(0x310, "H"), fields.number(0x312, "H")
     return high if low < high < 65_535 else None
 
@@ -423,7 +377,7 @@ def _object(fields: _Fields, notes: Notes) -> ObjectParameters:
 
 
 def _through_air(fields: _Fields, distance: float, humidity: float, temperature: float) -> float:
-    """Transmission of the air by FLIR's formula, from the constants of the camera.
+    """Return the transmission of the air by FLIR's formula, from the camera's constants.
 
     Minkina and Dudzik, Infrared Thermography: Errors and Uncertainties (2009), Section 2.3.
     """

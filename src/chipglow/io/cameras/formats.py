@@ -1,6 +1,6 @@
 """Formats of cameras' files: which they are, how they are recognised, and who reads them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -12,20 +12,17 @@ from chipglow.io.cameras.flir import is_flir, packed_counts, read_flir
 from chipglow.io.cameras.hcc import is_hcc, read_hcc
 from chipglow.io.cameras.ptw import is_ptw, read_ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
+from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.file_order import files_of
+from chipglow.io.sources.source import reading
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
 """Bytes by which a kind of file is recognised: those of HDF5 may follow 512 of the user's."""
 
-
 Begins = Callable[[bytes], bool]
 Read = Callable[[Path, slice | None, float | None], Recording]
-
-
-def _no_subprocess(path: Path) -> bool:
-    return False
 
 
 @dataclass(frozen=True)
@@ -55,7 +52,7 @@ class CameraFormat:
     suffixes: tuple[str, ...]
     begins: Begins | None = None
     read: Read | None = None
-    in_subprocess: Callable[[Path], bool] = _no_subprocess
+    in_subprocess: Callable[[Path], bool] = lambda path: False
     inside_hdf5: bool = False
 
     @property
@@ -75,10 +72,6 @@ _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _FLIR: Final = (".jpg", ".jpeg", ".fff", ".seq", ".csq")
 
 
-def _is_hdf5(head: bytes) -> bool:
-    return _HDF5 in (head[:8], head[512:520])
-
-
 _OWN: Final[Mapping[str, CameraFormat]] = {
     "flir": CameraFormat(
         "FLIR radiometric JPEG, FFF, SEQ, CSQ", _FLIR, is_flir, read_flir, packed_counts
@@ -91,7 +84,11 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "npz": _array("NumPy arrays, zipped", (".npz",)),
     "mat": _hdf5("MATLAB, versions 5 to 7.3", (".mat",), _starts(b"MATLAB ")),
     "netcdf": _hdf5("NetCDF", (".nc", ".nc4", ".cdf"), _starts(b"CDF\x01", b"CDF\x02", b"CDF\x05")),
-    "hdf5": _hdf5("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), _is_hdf5),
+    "hdf5": _hdf5(
+        "HDF5",
+        (".h5", ".hdf5", ".hdf", ".he5"),
+        lambda head: _HDF5 in (head[:8], head[512:520]),
+    ),
     "zarr": _array("Zarr, a folder or zipped", (".zarr", ".zip")),
     "csv": _array("table of numbers in text, a file a frame", (".csv", ".txt", ".dat")),
 }
@@ -99,7 +96,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
 
 @cache
 def camera_formats() -> Mapping[str, CameraFormat]:
-    """The formats that `read_recording` reads, by their names.
+    """Return the formats that `read_recording` reads, by their names.
 
     Other packages add theirs by an entry point in the group ``chipglow.camera_file``.
     """
@@ -107,47 +104,97 @@ def camera_formats() -> Mapping[str, CameraFormat]:
 
 
 def find_format(path: Path) -> str:
-    """Format of a file by how it begins, or else by the ending of its name.
-
-    Raises
-    ------
-    SourceError
-        If neither is known, or it is empty.
-    OSError
-        If it is missing or not accessible.
-    """
+    """Return the format of a file by how it begins, or else by the ending of its name."""
     first = files_of(path)[0]
-    by_name = {
-        suffix: name for name, one in camera_formats().items() for suffix in one.suffixes
-    }.get(first.suffix.lower())
     if first.is_dir():
         return "zarr"
     with first.open("rb") as stream:
         head = stream.read(_HEAD)
     if not head:
         raise SourceError(f"{first}: is empty")
-    found = _by_content(head)
-    if found is None or (
-        by_name and all(camera_formats()[n].inside_hdf5 for n in (found, by_name))
-    ):
-        found = by_name or found
-    if found is None:
-        raise SourceError(
-            f"{first}: is of an unknown kind, expected one of {', '.join(camera_formats())}"
+    formats = camera_formats()
+    suffix = first.suffix.lower()
+    by_name = next((name for name, one in formats.items() if suffix in one.suffixes), None)
+    found = next((name for name, one in formats.items() if one.begins and one.begins(head)), None)
+    if found and by_name and formats[found].inside_hdf5 and formats[by_name].inside_hdf5:
+        found = by_name
+    if kind := found or by_name:
+        return kind
+    raise SourceError(f"{first}: is of an unknown kind, expected one of {', '.join(formats)}")
+
+
+def read_recording(
+    path: str | Path,
+    frames: slice | None = None,
+    format: str | None = None,
+    *,
+    quantity: str | None = None,
+    unit: str | None = None,
+    interval: float | None = None,
+    dataset: str | None = None,
+    axes: Sequence[str] | None = None,
+) -> Recording:
+    """Read frames of a camera's file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file. Of TIFF and tables also a pattern with ``*``: a file a frame.
+    frames : slice, optional
+        Which frames to read, all by default; the others are not read.
+    format : str, optional
+        One of `camera_formats`; found by the file's content and name by default.
+    quantity : {"counts", "radiance", "temperature"}, optional
+        What was measured, for files that do not say it.
+    unit : {"counts", "W/m2/sr", "K", "degC"}, optional
+        Unit of the samples, for files that do not say it.
+    interval : float, optional
+        Time between frames in s, for files that do not say it or say it wrong.
+    dataset : str, optional
+        Which array of the file, if it has several.
+    axes : sequence of str, optional
+        What its axes are: ``time``, ``y`` and ``x`` in their order.
+
+    Returns
+    -------
+    Recording
+        The frames; times count from the first frame of the file.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, cut short or of an unknown kind (`SourceError`), what it does not
+        say is not given, or what is given is impossible.
+    OSError
+        If it is missing or not accessible.
+    """
+    stated = Stated(quantity, unit, interval, dataset, axes)
+    path = Path(path)
+    if format is not None and format not in camera_formats():
+        raise ValueError(f"format: is {format!r}, expected one of {', '.join(camera_formats())}")
+    kind = format or find_format(path)
+    one = camera_formats()[kind]
+    if one.states_quantity and stated != Stated(interval=interval):
+        raise ValueError(
+            f"{path}: is {one.description}, which says itself what was measured: "
+            "expected no quantity, unit, dataset or axes"
         )
-    return found
+    if not one.in_subprocess(path):
+        return read_here(path, kind, frames, stated)
+    sandbox = Sandbox(str(path), patience_for((str(path),)))
+    with sandbox.answers(partial(_answer, path, kind, frames, stated)) as answers:
+        recording: Recording = next(answers)
+        return recording
 
 
-def _by_content(head: bytes) -> str | None:
-    for name, one in camera_formats().items():
-        if one.begins is not None and one.begins(head):
-            return name
-    return None
+def _answer(path: Path, kind: str, frames: slice | None, stated: Stated) -> Iterator[Recording]:
+    yield read_here(path, kind, frames, stated)
 
 
 def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:
     """Read frames of one of `camera_formats` in this process; see `read_recording`."""
     one = camera_formats()[kind]
-    if one.read is not None:
-        return one.read(path, frames, stated.interval)
-    return read_stack(path, one.suffixes[0], frames, stated)
+    with reading(path):
+        if one.read is not None:
+            return one.read(path, frames, stated.interval)
+        return read_stack(path, one.suffixes[0], frames, stated)

@@ -11,16 +11,14 @@ from chipglow.camera import Recording
 from chipglow.camera.recording import Quantity
 from chipglow.io import atomic_path
 from chipglow.io.cameras.binary import (
-    MOST_FRAMES,
     Binary,
-    CutShortError,
     Timing,
     check_picture,
     chosen_frames,
     common_exposure,
     first_moment,
     layout,
-    note_trailing_bytes,
+    note_truncation,
     opened,
 )
 from chipglow.io.sources import SourceError
@@ -77,30 +75,27 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
     sample · 2^DataExp + DataOffset, frame by frame.
     """
     with opened(path) as binary:
-        first = binary.record(0, _HEADER, "the first header")
-        width, height = int(first["width"]), int(first["height"])
+        first = binary.record(0, _HEADER)
         if first["signature"] != b"TC":
             raise SourceError(f"{path}: begins with {first['signature']!r}, expected 'TC' (Telops)")
-        check_picture(path, height, width)
+        check_picture(path, first["height"], first["width"])
         label, quantity = _MODES.get(first["mode"], (f"mode {first['mode']}", None))
         if quantity is None:
             raise SourceError(
                 f"{path}: holds {label}, expected counts, temperature or in-band radiance"
             )
-        header_length = _header_length(binary, first, width, height)
-        stride = header_length + 2 * height * width
-        whole, rest = divmod(binary.size, stride)
-        chosen = chosen_frames(path, frames, whole, height * width)
-        stored = np.empty(len(chosen), _frame(header_length, height, width))
+        frame = _frame(_header_length(binary, first), first["height"], first["width"])
+        whole, rest = divmod(binary.size, frame.itemsize)
+        chosen = chosen_frames(path, frames, whole, first["height"] * first["width"])
+        stored = np.empty(len(chosen), frame)
         for position, number in enumerate(chosen):
-            frame = binary.numbers(number * stride, 1, stored.dtype, f"frame {number}")
-            stored[position] = frame[0]
+            stored[position] = binary.numbers(number * frame.itemsize, 1, frame)[0]
     headers = stored["header"]
     _check_alike(path, headers, first, chosen)
     version = f"Telops header {first['major']}.{first['minor']}"
     notes = Notes(remarks=[f"The samples are {label} ({version})."])
     if rest:
-        note_trailing_bytes(notes, whole, rest)
+        note_truncation(notes, whole)
     return Recording(
         signal=_signal(stored, quantity, path),
         quantity=quantity,
@@ -117,25 +112,21 @@ def _frame(header_length: int, height: int, width: int) -> np.dtype[Any]:
     return np.dtype([("header", _HEADER), ("", f"V{rest}"), ("image", "<u2", (height, width))])
 
 
-def _header_length(binary: Binary, first: dict[str, Any], width: int, height: int) -> int:
-    """Length of a frame's header: two lines of the picture, or what the header says."""
-    said, pixels = int(first["header_length"]), 2 * width * height
-    lengths = [one for one in dict.fromkeys((4 * width, said)) if one >= _HEADER.itemsize]
+def _header_length(binary: Binary, first: dict[str, Any]) -> int:
+    """Return the length of a frame's header: two lines of the picture, or what the header says."""
+    pixels = 2 * first["width"] * first["height"]
+    said: list[int] = [4 * first["width"], first["header_length"]]
+    lengths = [length for length in said if length >= _HEADER.itemsize]
     # A file without a frame that is cut tells it by its size, else the second header does.
-    lengths.sort(key=lambda one: binary.size % (one + pixels) != 0)
+    lengths.sort(key=lambda length: binary.size % (length + pixels) != 0)
     for length in lengths:
-        stride = length + pixels
-        if binary.size < stride or (
-            binary.size >= stride + 2 and binary.read(stride, 2, "the second header") != b"TC"
-        ):
-            continue
-        if binary.size // stride > MOST_FRAMES:
-            raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
-        return length
-    stride = max(4 * width, _HEADER.itemsize) + pixels
-    raise CutShortError(
-        f"{binary.path}: is cut short or damaged, it has {binary.size} bytes and no whole frame "
-        f"of {stride} bytes ({width} columns, {height} rows) with a second one behind it"
+        second = length + pixels
+        rest = binary.size - second
+        if rest >= 0 and b"TC".startswith(binary.read(second, min(2, rest))):
+            return length
+    raise SourceError(
+        f"{binary.path}: is cut short or damaged, it has {binary.size} bytes and no whole frame of "
+        f"{first['width']} columns and {first['height']} rows with a second one behind it"
     )
 
 

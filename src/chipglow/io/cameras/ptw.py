@@ -8,16 +8,15 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.io.cameras.binary import (
-    MOST_FRAMES,
     Binary,
-    CutShortError,
     Timing,
     check_picture,
     chosen_frames,
     layout,
-    note_missing_frames,
+    note_truncation,
     object_parameters,
     opened,
+    read_pictures,
     text_of,
 )
 from chipglow.io.sources import SourceError
@@ -84,26 +83,26 @@ def is_ptw(head: bytes) -> bool:
 def read_ptw(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
     """Read frames of FLIR's PTW as counts; see `CameraFormat`."""
     with opened(path) as binary:
-        signature = binary.read(0, 3, "the signature")
-        if signature != b"CED":
-            raise SourceError(f"{path}: begins with {signature!r}, expected 'CED' (PTW)")
-        header = binary.record(0, _HEADER, "the header")
-        rows, columns = int(header["rows"]), int(header["columns"])
+        header = binary.record(0, _HEADER)
+        if header["signature"] != b"CED":
+            raise SourceError(f"{path}: begins with {header['signature']!r}, expected 'CED' (PTW)")
+        rows, columns = header["rows"], header["columns"]
         check_picture(path, rows, columns)
-        stride = _stride(binary, header, rows, columns)
+        stride = _stride(path, header)
         whole = min(header["frames"], (binary.size - header["header_size"]) // stride)
         chosen = chosen_frames(path, frames, whole, rows * columns)
-        skipped, rows = _lock_in(binary, header, stride, rows, columns)
-        signal = np.empty((len(chosen), rows, columns), np.uint16)
+        skipped, rows = _lock_in(binary, header, stride)
         start = header["header_size"] + header["frame_header_size"] + 2 * columns * skipped
-        for position, number in enumerate(chosen):
-            what = f"frame {number}"
-            signal[position] = binary.numbers(
-                start + number * stride, rows * columns, "<u2", what
-            ).reshape(rows, columns)
+
+        def picture(number: int) -> NDArray[Any]:
+            counts = binary.numbers(start + number * stride, rows * columns, "<u2")
+            return counts.reshape(rows, columns)
+
+        signal = read_pictures(chosen, (rows, columns), picture)
         notes = Notes(remarks=_notes(header, skipped))
-        note_missing_frames(notes, header["frames"], whole)
-        times = _times(binary, header, stride, Timing(path, chosen, interval, notes))
+        if whole < header["frames"]:
+            note_truncation(notes, whole)
+        times = _times(binary, header, stride, whole, Timing(path, chosen, interval, notes))
     return Recording(
         signal=signal,
         quantity="counts",
@@ -122,34 +121,25 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
     )
 
 
-def _stride(binary: Binary, header: dict[str, Any], rows: int, columns: int) -> int:
-    """Bytes from frame to frame; refuses a header that does not fit the file."""
-    path, count, size = binary.path, header["frames"], header["frame_size"]
-    needed = header["frame_header_size"] + 2 * rows * columns
+def _stride(path: Path, header: dict[str, Any]) -> int:
+    """Return the bytes from frame to frame; refuse a header that does not fit its pictures."""
+    size = header["frame_size"]
+    needed = header["frame_header_size"] + 2 * header["rows"] * header["columns"]
     # Files of Altair 5.60 count words of 16 bits, others bytes.
     stride = next((length for length in (size, 2 * size) if length >= needed), 0)
-    if not stride:
+    if not stride or header["header_size"] < _HEADER.itemsize:
         raise SourceError(
-            f"{path}: a frame has {size} bytes or words, {rows} rows of {columns} columns need "
-            f"{needed} bytes"
-        )
-    if not 0 < count <= MOST_FRAMES:
-        raise SourceError(f"{path}: says {count} frames, expected 1 to {MOST_FRAMES}")
-    end = header["header_size"] + stride
-    if header["header_size"] < _HEADER.itemsize or end > binary.size:
-        raise CutShortError(
-            f"{path}: is cut short or damaged, its first frame ends at byte {end}, it has "
-            f"{binary.size} bytes"
+            f"{path}: is damaged, its header has {header['header_size']} bytes, a frame {size} "
+            f"bytes or words, and its picture needs {needed} bytes"
         )
     return stride
 
 
-def _lock_in(
-    binary: Binary, header: dict[str, Any], stride: int, rows: int, columns: int
-) -> tuple[int, int]:
-    """Lines to skip before the picture, and rows of it: lock-in data may come first."""
+def _lock_in(binary: Binary, header: dict[str, Any], stride: int) -> tuple[int, int]:
+    """Return the lines to skip before the picture, and its rows: lock-in data may come first."""
+    rows, columns = header["rows"], header["columns"]
     start = header["header_size"] + header["frame_header_size"]
-    first = binary.numbers(start, min(columns, 4), "<u2", "the first line")
+    first = binary.numbers(start, min(columns, 4), "<u2")
     if tuple(first) != _LOCK_IN or rows == 1:
         return 0, rows
     lines = (stride - header["frame_header_size"]) // (2 * columns)
@@ -157,7 +147,7 @@ def _lock_in(
 
 
 def _times(
-    binary: Binary, header: dict[str, Any], stride: int, timing: Timing
+    binary: Binary, header: dict[str, Any], stride: int, whole: int, timing: Timing
 ) -> NDArray[np.float64]:
     if timing.interval is not None:
         return timing.even(timing.interval)
@@ -165,8 +155,7 @@ def _times(
     rate = 1 / period if period else 0.0
     if header["frame_header_size"] < _STAMP.itemsize:
         return timing.stamped(None, rate)
-    last = (binary.size - header["header_size"]) // stride - 1
-    numbers = (0, *timing.frames, min(last, header["frames"] - 1))
+    numbers = (0, *timing.frames, whole - 1)
     stamps = np.array([_stamp(binary, header["header_size"] + n * stride) for n in numbers])
     since = np.mod(stamps[1:] - stamps[0], _DAY)
     since, mean = since[:-1], since[-1] / max(numbers[-1], 1)
@@ -178,10 +167,9 @@ def _times(
 def _clocked_times(
     since: NDArray[np.float64], mean: float, period: float, timing: Timing
 ) -> NDArray[np.float64]:
-    """Times by the header's period, or by the frames' own stamps where these say something else.
+    """Return times by the header's period, or by the stamps where they do not fit it.
 
-    The stamps are in s after the first frame of the file, in whole milliseconds; their mean step is
-    that of all frames.
+    The stamps are in s after the file's first frame, in whole milliseconds, with a mean step.
     """
     allowed = _STAMPED + _CLOCK * float(since.max())
     times = timing.even(period)
@@ -205,7 +193,7 @@ def _clocked_times(
 
 
 def _stamp(binary: Binary, start: int) -> float:
-    stamp = binary.record(start, _STAMP, "a frame's header")
+    stamp = binary.record(start, _STAMP)
     seconds = stamp["second"] + stamp["hundredths"] / 100 + stamp["thousandths"] / 1000
     return float(3600 * stamp["hour"] + 60 * stamp["minute"] + seconds)
 

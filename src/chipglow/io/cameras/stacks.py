@@ -60,12 +60,12 @@ _SPELLINGS: Final = {
 
 
 class MissingError(SourceError):
-    """What neither a file nor the user says, and is needed."""
+    """A value is needed that neither the file nor the user states."""
 
 
 @dataclass(frozen=True)
 class Stated:
-    """What the user says of a file that does not say it itself; see `read_recording`."""
+    """Statements of the user on a file without them; see `read_recording`."""
 
     quantity: str | None = None
     unit: str | None = None
@@ -91,25 +91,9 @@ class Stated:
 
 
 def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:
-    """Read frames of an array in a file.
+    """Read frames of an array in a file, or, by a pattern with ``*``, of a file a frame.
 
-    Parameters
-    ----------
-    path : Path
-        The file, or a pattern with ``*``: a file a frame.
-    kind : str
-        Ending of the names of such files; the file's own may be another.
-    frames : slice, optional
-        Which frames to read.
-    stated : Stated
-        What the user says of it.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, or what is needed is neither said by the user nor by the file.
-    OSError
-        If it is missing or not accessible.
+    `kind` is the ending of the names of such files; the file's own may be another.
     """
     with ExitStack() as stack:
         reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
@@ -135,17 +119,17 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
 
 
 def _dataset(path: Path, arrays: Mapping[str, StoredArray], name: str | None) -> Chosen:
-    if name is not None:
-        found = [label for label in arrays if name in (label, label.rsplit("/", 1)[-1])]
-        if name in arrays:
-            found = [name]
-        if len(found) != 1:
-            raise SourceError(f"{path}: has no dataset {name!r}, it has {_listed(arrays)}")
-        return Chosen(str(path), found[0], arrays[found[0]])
-    pictures = [label for label, array in arrays.items() if _may_be_pictures(array)]
-    if len(pictures) != 1:
-        raise SourceError(f"{path}: give the dataset with the frames, it has {_listed(arrays)}")
-    return Chosen(str(path), pictures[0], arrays[pictures[0]])
+    if name is None:
+        labels = [label for label, array in arrays.items() if _may_be_pictures(array)]
+        wrong = "give the dataset with the frames"
+    else:
+        labels = [label for label in arrays if name in (label, label.rsplit("/", 1)[-1])]
+        labels = [name] if name in arrays else labels
+        wrong = f"has no dataset {name!r}"
+    if len(labels) == 1:
+        return Chosen(str(path), labels[0], arrays[labels[0]])
+    listed = ", ".join(f"{name!r} of shape {arrays[name].shape}" for name in sorted(arrays)[:10])
+    raise SourceError(f"{path}: {wrong}, it has {listed}")
 
 
 def _may_be_pictures(array: StoredArray) -> bool:
@@ -153,12 +137,7 @@ def _may_be_pictures(array: StoredArray) -> bool:
     return len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
 
 
-def _listed(arrays: Mapping[str, StoredArray]) -> str:
-    return ", ".join(f"{name!r} of shape {arrays[name].shape}" for name in sorted(arrays)[:10])
-
-
 def _missing(one: Chosen, unit: str | None, times: NDArray[np.float64] | None) -> str:
-    """What neither the file nor the user says."""
     parts = []
     if unit is None:
         parts.append(
@@ -171,7 +150,7 @@ def _missing(one: Chosen, unit: str | None, times: NDArray[np.float64] | None) -
 
 
 def _unit(one: Chosen, stated: Stated) -> str | None:
-    """Unit of the samples, as the user or the file says; None if neither does."""
+    """Return the unit of the samples, as the user or the file says; None if neither does."""
     if stated.unit is not None:
         return stated.unit
     said = one.unit if isinstance(one.unit, str) else ""
@@ -193,7 +172,7 @@ def _times(
     stated: Stated,
     notes: Notes,
 ) -> NDArray[np.float64] | None:
-    """Times of the chosen frames in s; None if neither the user nor the file says them."""
+    """Return times of the chosen frames in s; None if neither the user nor the file says them."""
     if stated.interval is not None:
         return np.asarray(chosen, np.float64) * stated.interval
     count = one.array.shape[axes.index("time")] if "time" in axes else 1
@@ -211,7 +190,7 @@ def _times(
 
 
 def _signal(one: Chosen, axes: tuple[str, ...], chosen: range) -> NDArray[Any]:
-    """Samples of the chosen frames, shape (time, y, x)."""
+    """Return samples of the chosen frames, shape (time, y, x)."""
     if abs(chosen.step) == 1:
         first, last = min(chosen[0], chosen[-1]), max(chosen[0], chosen[-1])
         signal = read_frames(one, axes, slice(first, last + 1))[:: chosen.step]

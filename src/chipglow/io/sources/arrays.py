@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import files_of
-from chipglow.io.sources.source import SourceError, check_hdf5, damaged, required
+from chipglow.io.sources.source import SourceError, check_hdf5, reading, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -69,23 +69,6 @@ class StoredArray:
 
 ArrayReader: TypeAlias = Callable[[Path, ExitStack], Iterator[StoredArray]]
 """Opens a file, which the stack closes, and gives its arrays."""
-
-
-@contextmanager
-def reading(name: object) -> Iterator[None]:
-    """Turn whatever a library raises over a damaged file into one `SourceError`.
-
-    Parameters
-    ----------
-    name : object
-        The file, as the error calls it.
-    """
-    try:
-        yield
-    except (SourceError, FileNotFoundError, PermissionError, MemoryError):
-        raise
-    except Exception as error:  # readers of damaged files raise anything
-        raise damaged(name, error) from error
 
 
 def check_samples(name: str, count: int) -> None:

@@ -1,4 +1,4 @@
-"""What a source's names, units and axes mean."""
+"""Names, units and axes of fields in other programs' files."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ SI_UNITS: Final[Mapping[str, str]] = {
     "velocity": "m/s",
     "time": "s",
 }
-"""SI unit of every field of a scene and of the coordinates; 1 for a mere number."""
+"""SI units of the fields of a scene and of the coordinates; 1 for a dimensionless number."""
 
 COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "temperature": (
@@ -47,35 +47,42 @@ COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 """Names that the major codes give to fields, simplified by `simple`, the surest first."""
 
+OTHER_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
+    "time": ("time", "times", "t_s", "t"),
+    **{
+        axis: (
+            axis, f"{axis}_coordinate", f"{axis}c", f"coord_{axis}", f"pos_{axis}",
+            f"position_{axis}", f"points_{number}",
+        )
+        for number, axis in enumerate("xyz")
+    },
+    "velocity_z": ("velocity_z", "velocityz", "v3", "vz", "vel_z"),
+    "part": (
+        "part", "part_id", "partid", "parts", "type", "material_id", "materialid", "materialids",
+        "material", "mat", "body", "phase", "region", "region_id", "regionid", "object_id",
+        "objectid", "elementblockids", "block_id", "gmsh_physical", "cell_tags",
+    ),
+    "volume": ("volume", "vol", "particle_volume"),
+}  # fmt: skip
+"""The same of coordinates and of what is no field of a scene."""
+
 
 def simple(name: str) -> str:
-    """A name in lower case, with one underscore in the place of all that is no letter or digit.
-
-    A unit in brackets at the end is left out.
-    """
+    """Return a name in lower case with words joined by underscores, without a unit in brackets."""
     text = name.split("(")[0].split("[")[0].strip().lower()
     words = "".join(letter if letter.isalnum() else " " for letter in text).split()
     return "_".join(words)
 
 
 def match_names(
-    available: Iterable[str], given: Mapping[str, str], known: Iterable[str] = READABLE
+    available: Iterable[str],
+    given: Mapping[str, str],
+    known: Iterable[str] = READABLE,
+    among: Iterable[str] | None = None,
 ) -> dict[str, str]:
-    """Which fields of a source are which of a scene.
+    """Return a source's fields by the names of a scene: those given, then guesses for those known.
 
-    Parameters
-    ----------
-    available : iterable of str
-        Names of the source's fields.
-    given : mapping
-        Names that the user gave, by the names of a scene; they come before what is guessed.
-    known : iterable of str
-        Names of a scene that are looked for; ``velocity`` is a vector.
-
-    Raises
-    ------
-    SourceError
-        If a given name is not there, or is given to something a scene does not have.
+    The guesses are ``among`` some of the available fields; ``velocity`` is a vector.
     """
     names = sorted(available)
     for ours, theirs in given.items():
@@ -86,7 +93,8 @@ def match_names(
         if theirs not in names:
             listed = ", ".join(names) or "none"
             raise SourceError(f"fields: {ours}: there is no field {theirs!r}, it has {listed}")
-    simplified = {simple(name): name for name in reversed(names)}
+    guessable = names if among is None else sorted(among)
+    simplified = {simple(name): name for name in reversed(guessable)}
     result = dict(given)
     for ours in known:
         if ours not in result:
@@ -101,13 +109,12 @@ METRE, SECOND, KELVIN = (Unit(1.0, text=text) for text in ("m", "s", "K"))
 
 @dataclass(frozen=True)
 class _UnitText:
-    """Lets a field hold a unit that descriptions write as text."""
+    """Schema of a field that holds a unit, which descriptions write as text."""
 
     name: str
     base: str
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        """Schema of the field."""
         return core_schema.no_info_plain_validator_function(
             lambda value: (
                 value if isinstance(value, Unit) else parse_unit(str(value), self.base, self.name)
@@ -118,7 +125,6 @@ class _UnitText:
         )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
-        """JSON schema of the field."""
         return {"type": "string"}
 
 
@@ -152,7 +158,7 @@ class Units(Part):
     ] = None
 
     def of(self, name: str) -> Unit:
-        """Unit of a field of a scene."""
+        """Return the unit of a field of a scene."""
         if name == "temperature":
             return self.temperature
         if name.startswith("velocity"):
@@ -169,14 +175,9 @@ _AXES: Final = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Placement(Part):
-    """How the source's axes lie in the scene, whose x runs along the cut and whose y goes up.
+    """Axes of the source in the scene, whose x runs along the cut and whose y goes up.
 
-    A sign before an axis is changed after the origin is subtracted.
-
-    Raises
-    ------
-    ValueError
-        If an axis is unknown or used twice, or the origin is not finite.
+    A negative axis is reversed after the origin is subtracted.
     """
 
     horizontal: Annotated[
@@ -216,7 +217,7 @@ class Placement(Part):
 
     @property
     def axes(self) -> tuple[int, int]:
-        """Numbers of the horizontal and the vertical axis."""
+        """Indices of the horizontal and the vertical axis."""
         first, second = (_AXES.index(name.removeprefix("-")) for name in self._names)
         return first, second
 
@@ -228,27 +229,27 @@ class Placement(Part):
 
     @property
     def depth(self) -> int:
-        """Number of the axis that is neither."""
+        """Index of the third axis."""
         return 3 - sum(self.axes)
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Positions in the scene in m, shape (n, 2), of points of shape (n, 3) in m."""
+        """Return positions in the scene in m, shape (n, 2), of points of shape (n, 3) in m."""
         placed: NDArray[np.float64] = (points[:, self.axes] - self.origin) * self.signs
         return placed
 
     def turn(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
+        """Return components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
         turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
         return turned
 
     def in_file(self, name: str) -> str:
-        """Name that a field of the scene, which may be a component, has in the file's axes."""
+        """Return the name of a field, which may be a component, in the file's axes."""
         if not name.endswith(("_x", "_y")):
             return name
         return name[:-1] + _AXES[self.axes["xy".index(name[-1])]]
 
     def field(self, name: str, values: NDArray[Floats]) -> NDArray[Floats]:
-        """Values of a field in the scene, of those in SI along the axes of the file."""
+        """Return values of a field in the scene from values in SI along the axes of the file."""
         if not name.endswith(("_x", "_y")):
             return values
         number = "xy".index(name[-1])

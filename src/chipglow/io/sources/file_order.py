@@ -11,20 +11,15 @@ from chipglow.io.sources.source import SourceError
 
 
 def natural(name: str) -> tuple[tuple[int, str], ...]:
-    """Key that sorts 9 before 10."""
+    """Return a key that sorts 9 before 10."""
     words = re.split(r"(\d+)", name)
     return tuple((int(word), "") if word.isdecimal() else (-1, word) for word in words)
 
 
 def files_of(pattern: str | Path, *, gaps_allowed: bool = True) -> tuple[Path, ...]:
-    """Files of a path or a pattern such as ``chip_*.vtu``, by the numbers in their names.
+    """Return the files of a path or pattern such as ``chip_*.vtu``, by the numbers in their names.
 
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
-    SourceError
-        If a number is missing where the others are evenly apart, unless gaps are allowed.
+    A missing number in an otherwise regular series is a `SourceError` unless gaps are allowed.
     """
     if Path(pattern).exists():
         return (Path(pattern),)

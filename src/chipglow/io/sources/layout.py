@@ -7,9 +7,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.arrays import StoredArray, check_samples, reading
+from chipglow.io.sources.arrays import StoredArray, check_samples
 from chipglow.io.sources.conventions import SI_UNITS, match_names, simple
-from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.source import SourceError, naming, reading
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
 

@@ -1,7 +1,7 @@
 """Meshes over time, from the programs that compute them."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, ClassVar, Final, Literal
@@ -10,19 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
-from chipglow.io.sources.conventions import Placement, Units, match_names, simple
+from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, match_names, simple
 from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
-from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_of, flatten
 from chipglow.io.sources.mesh_dyna import DynaReader
-from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.mesh_restricted import RestrictedFields
+from chipglow.io.sources.mesh_flat import FlatMesh, flatten
+from chipglow.io.sources.mesh_reader import Block, MeshReader, check_grid, fields_of
+from chipglow.io.sources.mesh_restricted import label_of, restricted_fields, with_own_fields
 from chipglow.io.sources.source import (
     Source,
     SourceError,
     Survey,
     even_times,
     naming,
+    reading,
     required,
     span_of,
 )
@@ -32,11 +33,6 @@ from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.rasterise import NOTHING, rasterise
 from chipglow.text import Notes
 
-_PART_FIELDS: Final = (
-    "part", "part_id", "partid", "parts", "material_id", "materialid", "materialids", "material",
-    "region", "region_id", "regionid", "object_id", "objectid", "elementblockids", "block_id",
-    "gmsh_physical", "cell_tags",
-)  # fmt: skip
 MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
     **dict.fromkeys(mesh_vtk.KINDS, mesh_vtk.VtkReader),
     **dict.fromkeys(mesh_meshio.KINDS, mesh_meshio.MeshioReader),
@@ -49,6 +45,7 @@ _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
 _VECTOR_SIZES: Final = (2, 3)
 _TENSOR_SIZES: Final = (6, 9)
+_MOST_PARTS: Final = 1000
 
 
 @dataclass(frozen=True)
@@ -57,30 +54,11 @@ class MeshSource(Source, Part):
 
     Elements are sampled exactly as they are: fields of nodes by the element's own shape, fields of
     elements constant in each. Where there is no element there is no material. Every frame may have
-    a mesh of its own. Where elements lie over one another the later one in the file is taken.
-
-    Parameters
-    ----------
-    files : Path
-        A file with one mesh or with meshes over time, an LS-DYNA d3plot, or a pattern such as
-        ``chip_*.vtu`` with a file for each time.
-    names : mapping
-        The file's names of fields, by those of a scene; guessed where nothing is given.
-        ``velocity`` is a vector along the file's axes; ``velocity_x`` and ``velocity_y`` are
-        components along the placement's two axes.
-    units : Units
-        Units of the file.
-    placement : Placement
-        How the file's axes lie in the scene.
-    times : tuple of float
-        Times of the frames in s, in the place of the file's.
-    interval : float, optional
-        Time from frame to frame in s, in the place of the file's.
-
-    Raises
-    ------
-    ValueError
-        If a time is not finite, an interval is not positive, or both are given.
+    a mesh of its own. Where elements overlap the later one in the file is taken. ``files`` are a
+    file with one mesh or with meshes over time, an LS-DYNA d3plot, or a pattern such as
+    ``chip_*.vtu``; ``times`` in s or an ``interval`` replace the times of the files. ``names`` are
+    the file's names of fields by those of a scene: ``velocity`` is a vector along the file's axes,
+    ``velocity_x`` and ``velocity_y`` are components along the placement's axes.
     """
 
     title: ClassVar[str] = "a mesh"
@@ -127,215 +105,219 @@ class MeshSource(Source, Part):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The path or pattern; with its folder if such files name others."""
         suffix = self.files.suffix.lower()
         alone = suffix in (*mesh_vtk.ALONE, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS)
         return (str(self.files),) if alone else (str(self.files), str(self.files.parent))
 
     def survey(self) -> Survey:
-        """Look at the first and the last mesh; see `Source.survey`."""
-        reader = self._reader()
-        ends, restricted = self._ends(reader)
-        blocks = ends[0]
-        found = self._found(reader, blocks, restricted)
-        flat = [self._flat(reader, number, there, found) for number, there in ends.items()]
-        notes = Notes(
-            self._assumed(blocks, found),
-            remarks=[*self._lacking(blocks, found), *_lacking_values(found, tuple(ends.values()))],
-        )
-        times = self._times(reader, notes)
-        every = fields_of(blocks)
+        meshes = _Meshes(self)
+        found, notes = meshes.found, Notes(meshes.assumptions(), remarks=meshes.remarks())
+        times = meshes.times(notes)
+        flat = [meshes.flat(number, blocks) for number, blocks in meshes.ends.items()]
         return Survey(
-            reader.kind,
+            meshes.reader.kind,
             times,
-            self._extent(reader, flat),
+            meshes.extent(flat),
             {ours: found[ours] for ours in READABLE if ours in found},
-            tuple(sorted(set(every) - set(found.values()))),
-            temperatures=self._temperatures(flat, found),
+            tuple(sorted(set(fields_of(meshes.ends[0])) - set(found.values()))),
+            temperatures=meshes.temperatures(flat),
             notes=notes,
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the meshes one after the other; see `Source.frames`."""
-        reader = self._reader()
-        times = self._times(reader, Notes())
-        ends, restricted = self._ends(reader)
-        found = self._found(reader, ends[0], restricted)
-        for number in range(start, reader.count):
-            blocks = restricted.of_blocks(self._read(reader, number))
-            mesh = self._flat(reader, number, blocks, found)
-            yield self._sampled(mesh, float(times[number]), raster, found)
+        meshes = _Meshes(self)
+        times = meshes.times(Notes())
+        for number in range(start, meshes.reader.count):
+            mesh = meshes.flat(number, meshes.read(number))
+            yield meshes.sampled(mesh, float(times[number]), raster)
 
-    def _ends(self, reader: MeshReader) -> tuple[dict[int, tuple[Block, ...]], RestrictedFields]:
-        """The first and the last mesh, and whose fields are whose in them."""
-        ends = {number: self._read(reader, number) for number in sorted({0, reader.count - 1})}
-        restricted = RestrictedFields.of(tuple(ends.values()), self.names)
-        return {number: restricted.of_blocks(there) for number, there in ends.items()}, restricted
 
-    def _reader(self) -> MeshReader:
-        required("pyvista", self.files, "mesh", "PyVista")
-        suffix = self.files.suffix.lower()
-        dyna = suffix in ("", ".d3plot") or "d3plot" in self.files.name.lower()
-        reader = MESH_READERS.get(suffix, DynaReader if dyna else None)
-        if reader is None:
-            known = " ".join(sorted(MESH_READERS))
-            raise SourceError(
-                f"{self.files}: {suffix} is no mesh, expected d3plot or one of {known}"
-            )
-        return reader(files_of(self.files, gaps_allowed=bool(self.times)))
+class _Meshes:
+    """A source that is open."""
 
-    def _read(self, reader: MeshReader, number: int) -> tuple[Block, ...]:
-        blocks = reader.read(number)
+    def __init__(self, source: MeshSource) -> None:
+        self._source = source
+        self.reader = _reader(source)
+        ends = {number: self._read(number) for number in sorted({0, self.reader.count - 1})}
+        self._restricted = restricted_fields(tuple(ends.values()), source.names)
+        self.ends = {n: with_own_fields(blocks, self._restricted) for n, blocks in ends.items()}
+        """The first and the last mesh."""
+        self.found = self._find()
+        """The file's fields by the names of a scene; a vector of velocity is both components."""
+
+    def read(self, number: int) -> tuple[Block, ...]:
+        """Return the mesh of a frame."""
+        return with_own_fields(self._read(number), self._restricted)
+
+    def _read(self, number: int) -> list[Block]:
+        file = self.reader.file(number)
+        with reading(file):
+            blocks = self.reader.read(number)
         for block in blocks:
-            check_grid(reader.file(number), block.grid)
-        return tuple(self._moved(block, reader.file(number)) for block in blocks)
+            check_grid(file, block.grid)
+        return [self._displaced(block, file) for block in blocks]
 
-    def _moved(self, block: Block, file: Path) -> Block:
-        if self.displacement is None:
+    def _displaced(self, block: Block, file: Path) -> Block:
+        name = self._source.displacement
+        if name is None:
             return block
-        if self.displacement not in block.grid.point_data:
-            raise SourceError(f"{file}: displacement: no node has {self.displacement!r}")
-        by = np.asarray(block.grid.point_data[self.displacement], np.float64)
+        if name not in block.grid.point_data:
+            raise SourceError(f"{file}: displacement: no node has {name!r}")
+        by = np.asarray(block.grid.point_data[name], np.float64)
         if by.ndim != 2 or by.shape[1] not in _VECTOR_SIZES:
-            raise SourceError(f"{file}: displacement: {self.displacement!r} is no vector")
+            raise SourceError(f"{file}: displacement: {name!r} is no vector")
         points = np.array(block.grid.points, np.float64)
         points[:, : by.shape[1]] += by
         grid = block.grid.copy(deep=False)
         grid.points = points
-        return Block(block.names, grid, block.sets)
+        return replace(block, grid=grid)
 
-    def _found(
-        self, reader: MeshReader, blocks: Sequence[Block], restricted: RestrictedFields
-    ) -> dict[str, str]:
-        """The file's fields by the names of a scene; a vector of velocity is both components."""
-        sizes, file = fields_of(blocks), reader.file(0)
-        known_here = {ours: theirs for ours, theirs in reader.known.items() if theirs in sizes}
-        given = {**known_here, **restricted.names, **self.names}
+    def _find(self) -> dict[str, str]:
+        sizes, file = fields_of(self.ends[0]), self.reader.file(0)
+        given = {ours: theirs for ours, theirs in self.reader.known.items() if theirs in sizes}
+        given |= {ours: label_of(fields) for ours, fields in self._restricted.items()}
+        given |= self._source.names
         for ours, theirs in given.items():
             _check_size(file, ours, theirs, sizes)
-        fitting = {name: size for name, size in sizes.items() if size not in _TENSOR_SIZES}
-        vectors = [name for name, size in fitting.items() if size in _VECTOR_SIZES]
-        scalars = [name for name, size in fitting.items() if size not in _VECTOR_SIZES]
+        vectors = [name for name, size in sizes.items() if size in _VECTOR_SIZES]
+        others = (*_VECTOR_SIZES, *_TENSOR_SIZES)
+        scalars = [name for name, size in sizes.items() if size not in others]
+        by_components = bool(set(_COMPONENTS) & set(given))
         known = [name for name in READABLE if name not in _COMPONENTS]
-        if not {_VECTOR, *_COMPONENTS} & set(given) and self.placement.axes == (0, 1):
+        if not by_components and _VECTOR not in given and self._source.placement.axes == (0, 1):
             known += _COMPONENTS
         with naming(file):
-            found = match_names(sizes, given, ())
-            found |= match_names(scalars, {k: v for k, v in given.items() if v in scalars}, known)
-            if not set(_COMPONENTS) & set(given):
-                found |= match_names(
-                    vectors, {k: v for k, v in given.items() if v in vectors}, (_VECTOR,)
-                )
+            found = match_names(sizes, given, known, scalars)
+            if not by_components:
+                found = match_names(sizes, found, (_VECTOR,), vectors)
         if _VECTOR in found:
             found |= dict.fromkeys(_COMPONENTS, found.pop(_VECTOR))
         elif not set(_COMPONENTS) <= set(found):
             found = {ours: theirs for ours, theirs in found.items() if ours not in _COMPONENTS}
         return found
 
-    def _flat(
-        self,
-        reader: MeshReader,
-        number: int,
-        blocks: Sequence[Block],
-        found: Mapping[str, str],
-    ) -> FlatMesh:
-        file = reader.file(number)
-        missing = set(found.values()) - set(fields_of(blocks))
+    def flat(self, number: int, blocks: Sequence[Block]) -> FlatMesh:
+        """Return the triangles of a mesh, without workpiece that has no temperature."""
+        source, file = self._source, self.reader.file(number)
+        missing = sorted(set(self.found.values()) - set(fields_of(blocks)))
         if missing:
-            name = sorted(missing)[0]
-            raise SourceError(f"{file}: frame {number} has no field {name!r}, the first one has")
-        try:
-            with mesh_vtk.reading(file):
-                known, tool = _with_temperature(blocks, self._tool(blocks), found)
-                return flatten(
-                    known,
-                    found.values(),
-                    tool,
-                    self.placement,
-                    self.section,
-                    self.units.length.scale,
-                )
-        except SourceError as error:
-            raise error if str(file) in str(error) else SourceError(f"{file}: {error}") from None
+            raise SourceError(
+                f"{file}: frame {number} has no field {missing[0]!r}, the first one has"
+            )
+        with mesh_vtk.reading_vtk(file), naming(file):
+            known, of_tool = [], []
+            for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
+                if self._has_temperature(block):
+                    known.append(block)
+                    of_tool.append(is_tool)
+                elif is_tool.any():
+                    grid = block.grid.extract_cells(np.flatnonzero(is_tool))
+                    known.append(Block(block.names, grid))
+                    of_tool.append(is_tool[is_tool])
+            return flatten(
+                known,
+                self.found.values(),
+                of_tool,
+                source.placement,
+                source.section,
+                source.units.length.scale,
+            )
+
+    def _has_temperature(self, block: Block) -> bool:
+        return "temperature" not in self.found or block.has(self.found["temperature"])
 
     def _tool(self, blocks: Sequence[Block]) -> list[NDArray[np.bool_]]:
-        """Which elements of each block are of the tool."""
-        parts = [_parts(block, self.part_field) for block in blocks]
+        """Return which elements of each block belong to the tool."""
+        parts = [_parts(block, self._source.part_field) for block in blocks]
         known = {name for block in parts for name in block}
-        tool_parts = [str(part) for part in self.tool_parts]
-        for name in tool_parts:
+        wanted = [str(part) for part in self._source.tool_parts]
+        for name in wanted:
             if name not in known:
                 listed = ", ".join(sorted(known)) or "none"
                 raise SourceError(f"tool_parts: there is no part {name!r}, it has {listed}")
-        return [
-            np.any(
-                [block[name] for name in tool_parts if name in block]
-                or [np.zeros(grid.n_cells, np.bool_)],
-                axis=0,
-            )
-            for block, grid in zip(parts, (block.grid for block in blocks), strict=True)
-        ]
+        tool = [np.zeros(block.grid.n_cells, np.bool_) for block in blocks]
+        for of_block, masks in zip(tool, parts, strict=True):
+            for name in set(wanted) & set(masks):
+                of_block |= masks[name]
+        return tool
 
-    def _lacking(self, blocks: Sequence[Block], found: Mapping[str, str]) -> Iterator[str]:
-        """Describe blocks without a temperature."""
-        for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
-            name = found.get("temperature")
-            if block.grid.n_cells and name and not _has_field(block, name):
-                named = block.names[0] if block.names else "a block"
-                what = "tool at the surroundings' temperature" if is_tool.any() else "void"
-                yield f"{named} has no temperature: it is treated as {what}."
-
-    def _times(self, reader: MeshReader, notes: Notes) -> NDArray[np.float64]:
-        count = reader.count
-        if self.times:
-            if len(self.times) != count:
+    def times(self, notes: Notes) -> NDArray[np.float64]:
+        """Return the times of the frames in s."""
+        source, count = self._source, self.reader.count
+        if source.times:
+            if len(source.times) != count:
                 raise SourceError(
-                    f"{self.files}: times: {len(self.times)} for {count} frames, expected {count}"
+                    f"{source.files}: times: {len(source.times)} for {count} frames, expected "
+                    f"{count}"
                 )
-            return np.array(self.times, np.float64)
-        if self.interval is None and reader.times is not None:
-            return np.array(reader.times, np.float64) * self.units.time.scale
-        return even_times(count, self.interval, notes)
+            return np.array(source.times, np.float64)
+        if source.interval is None and self.reader.times is not None:
+            return np.array(self.reader.times, np.float64) * source.units.time.scale
+        return even_times(count, source.interval, notes)
 
-    def _assumed(self, blocks: Sequence[Block], found: Mapping[str, str]) -> list[str]:
-        sentences = []
-        sizes = fields_of(blocks)
-        for ours, theirs in found.items():
+    def assumptions(self) -> list[str]:
+        """Return the assumptions about the first mesh."""
+        sizes, sentences = fields_of(self.ends[0]), []
+        for ours, theirs in self.found.items():
             if ours not in _COMPONENTS and sizes[theirs] > 1:
                 sentences.append(
                     f"{ours}: {theirs} has {sizes[theirs]} values for each place, such as those "
                     "of integration points; their mean is used."
                 )
-        names = {simple(name): name for name in sizes}
         moving = [
-            names[name]
-            for name in ("displacement", "u")
-            if name in names and names[name] not in found.values()
+            name
+            for name in sizes
+            if simple(name) in ("displacement", "u") and name not in self.found.values()
         ]
-        if moving and self.displacement is None and not _is_exodus(self.files):
+        if moving and self._source.displacement is None and not self._is_exodus:
             sentences.append(f"Positions are those of the file; {moving[0]} is not added.")
-        if not self.tool_parts:
+        if not self._source.tool_parts:
             sentences.append("No part is named as tool: all elements are workpiece.")
         return sentences
 
-    def _extent(
-        self, reader: MeshReader, meshes: Sequence[FlatMesh]
-    ) -> tuple[float, float, float, float]:
+    @property
+    def _is_exodus(self) -> bool:
+        """Its reader adds the displacement by itself."""
+        return mesh_vtk.kind_of(self._source.files) == "Exodus II"
+
+    def remarks(self) -> list[str]:
+        """Describe blocks without a temperature, and missing values in the first and last mesh."""
+        blocks, sentences = self.ends[0], []
+        for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
+            if block.grid.n_cells and not self._has_temperature(block):
+                named = block.names[0] if block.names else "a block"
+                what = "tool at the surroundings' temperature" if is_tool.any() else "void"
+                sentences.append(f"{named} has no temperature: it is treated as {what}.")
+        for when, mesh in zip(("first", "last"), self.ends.values(), strict=False):
+            for theirs in self.found.values():
+                for of in ("nodes", "elements"):
+                    lacking, count = _without_value(mesh, theirs, of)
+                    if lacking:
+                        sentences.append(
+                            f"{theirs}: {lacking} of {count} {of} have no value in the {when} "
+                            "frame; adjacent samples are filled from the nearest and marked in "
+                            "quality."
+                        )
+        if any("STATUS" in block.grid.cell_data for mesh in self.ends.values() for block in mesh):
+            sentences.append("Elements whose STATUS is 0 are deleted.")
+        return list(dict.fromkeys(sentences))
+
+    def extent(self, meshes: Sequence[FlatMesh]) -> tuple[float, float, float, float]:
+        """Return left, right, bottom and top of meshes in m."""
         used = [mesh.points[np.unique(mesh.triangles)] for mesh in meshes]
-        placed = self.placement.place(np.concatenate(used) * self.units.length.scale)
+        source = self._source
+        placed = source.placement.place(np.concatenate(used) * source.units.length.scale)
         placed = placed[np.isfinite(placed).all(axis=1)]
         if not len(placed):
-            raise SourceError(f"{reader.file(0)}: no element has finite positions")
+            raise SourceError(f"{self.reader.file(0)}: no element has finite positions")
         (left, bottom), (right, top) = placed.min(axis=0), placed.max(axis=0)
         return float(left), float(right), float(bottom), float(top)
 
-    def _temperatures(
-        self, meshes: Sequence[FlatMesh], found: Mapping[str, str]
-    ) -> tuple[float, float] | None:
-        """Least and greatest temperature of what is not tool."""
-        if "temperature" not in found:
+    def temperatures(self, meshes: Sequence[FlatMesh]) -> tuple[float, float] | None:
+        """Return the smallest and the largest temperature of the workpiece."""
+        if "temperature" not in self.found:
             return None
-        name = found["temperature"]
+        name = self.found["temperature"]
         values = [np.empty(0, np.float32)]
         for mesh in meshes:
             if name in mesh.of_nodes:
@@ -345,20 +327,19 @@ class MeshSource(Source, Part):
                 values.append(self._values("temperature", mesh.of_elements[name][~mesh.tool]))
         return span_of(np.concatenate(values))
 
-    def _sampled(
-        self, mesh: FlatMesh, time: float, raster: Raster, found: Mapping[str, str]
-    ) -> SampledFrame:
-        """The mesh on the raster; a field may be of nodes in some blocks, of elements in others."""
-        names = [name for name in READABLE if name in found]
-        nodes = [name for name in names if found[name] in mesh.of_nodes]
-        elements = [name for name in names if found[name] in mesh.of_elements]
+    def sampled(self, mesh: FlatMesh, time: float, raster: Raster) -> SampledFrame:
+        """Sample a mesh; a field may be of nodes in some blocks and of elements in others."""
+        source = self._source
+        names = [name for name in READABLE if name in self.found]
+        nodes = [name for name in names if self.found[name] in mesh.of_nodes]
+        elements = [name for name in names if self.found[name] in mesh.of_elements]
         sampled = rasterise(
             raster,
-            self.placement.place(mesh.points * self.units.length.scale),
+            source.placement.place(mesh.points * source.units.length.scale),
             mesh.triangles,
-            _columns([self._values(name, mesh.of_nodes[found[name]]) for name in nodes]),
-            _columns([self._values(name, mesh.of_elements[found[name]]) for name in elements]),
-            self._height(mesh) if self.section == "facing" else None,
+            _columns([self._values(name, mesh.of_nodes[self.found[name]]) for name in nodes]),
+            _columns([self._values(name, mesh.of_elements[self.found[name]]) for name in elements]),
+            self._height(mesh) if source.section == "facing" else None,
         )
         fields: dict[str, NDArray[np.float32]] = {}
         for name, values in zip((*nodes, *elements), sampled.fields, strict=True):
@@ -370,44 +351,36 @@ class MeshSource(Source, Part):
         return SampledFrame(time, fields, material.astype(np.uint8))
 
     def _values(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float32]:
-        """One value for each place, in SI."""
-        unit = self.units.of(name)
+        """Return one value for each place, in SI."""
+        placement, unit = self._source.placement, self._source.units.of(name)
         if name not in _COMPONENTS:
             return unit.to_si(values.mean(axis=1))
         along = _COMPONENTS.index(name)
         if values.shape[1] == 1:
-            return unit.to_si(values[:, 0] * self.placement.signs[along])
+            return unit.to_si(values[:, 0] * placement.signs[along])
         vectors = np.zeros((len(values), 3))
         vectors[:, : values.shape[1]] = values
-        return unit.to_si(self.placement.turn(vectors)[:, along])
+        return unit.to_si(placement.turn(vectors)[:, along])
 
     def _height(self, mesh: FlatMesh) -> NDArray[np.float64]:
-        """How far the nodes are toward the camera; x, y and this are right-handed."""
-        axes = (*self.placement.axes, self.placement.depth)
-        parity = float(np.linalg.det(np.eye(3)[list(axes)]))
-        sign = np.prod(self.placement.signs) * parity
-        height: NDArray[np.float64] = sign * mesh.points[:, self.placement.depth]
+        """Return how far the nodes are toward the camera; x, y and this are right-handed."""
+        placement = self._source.placement
+        axes = (*placement.axes, placement.depth)
+        sign = np.prod(placement.signs) * float(np.linalg.det(np.eye(3)[list(axes)]))
+        height: NDArray[np.float64] = sign * mesh.points[:, placement.depth]
         return height
 
 
-def _with_temperature(
-    blocks: Sequence[Block], tool: Sequence[NDArray[np.bool_]], found: Mapping[str, str]
-) -> tuple[list[Block], list[NDArray[np.bool_]]]:
-    """What has a temperature, and the tool: of what has none the scene can say nothing."""
-    kept: list[Block] = []
-    of_tool: list[NDArray[np.bool_]] = []
-    for block, is_tool in zip(blocks, tool, strict=True):
-        if "temperature" not in found or _has_field(block, found["temperature"]):
-            kept.append(block)
-            of_tool.append(is_tool)
-        elif is_tool.any():
-            kept.append(Block(block.names, block.grid.extract_cells(np.flatnonzero(is_tool))))
-            of_tool.append(is_tool[is_tool])
-    return kept, of_tool
-
-
-def _has_field(block: Block, name: str) -> bool:
-    return name in block.grid.point_data or name in block.grid.cell_data
+def _reader(source: MeshSource) -> MeshReader:
+    required("pyvista", source.files, "mesh", "PyVista")
+    suffix = source.files.suffix.lower()
+    dyna = suffix in ("", ".d3plot") or "d3plot" in source.files.name.lower()
+    reader = MESH_READERS.get(suffix, DynaReader if dyna else None)
+    if reader is None:
+        known = " ".join(sorted(MESH_READERS))
+        raise SourceError(f"{source.files}: {suffix} is no mesh, expected d3plot or one of {known}")
+    with reading(source.files):
+        return reader(files_of(source.files, gaps_allowed=bool(source.times)))
 
 
 def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) -> None:
@@ -423,25 +396,8 @@ def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) ->
         )
 
 
-def _lacking_values(found: Mapping[str, str], frames: Sequence[Sequence[Block]]) -> Iterable[str]:
-    """Describe missing values in the first and the last frame."""
-    sentences = []
-    for when, blocks in zip(("first", "last"), frames, strict=False):
-        for theirs in dict.fromkeys(found.values()):
-            for of in ("nodes", "elements"):
-                lacking, count = _without_value(blocks, theirs, of)
-                if lacking:
-                    sentences.append(
-                        f"{theirs}: {lacking} of {count} {of} have no value in the {when} frame; "
-                        "adjacent samples are filled from the nearest and marked in quality."
-                    )
-    if any("STATUS" in block.grid.cell_data for blocks in frames for block in blocks):
-        sentences.append("Elements whose STATUS is 0 are deleted.")
-    return dict.fromkeys(sentences)
-
-
-def _without_value(blocks: Sequence[Block], name: str, of: str) -> tuple[int, int]:
-    """How many nodes or elements of those that could have no value of a field."""
+def _without_value(blocks: Iterable[Block], name: str, of: str) -> tuple[int, int]:
+    """Return how many nodes or elements have no finite value of a field, and how many have it."""
     lacking = count = 0
     for block in blocks:
         data = block.grid.point_data if of == "nodes" else block.grid.cell_data
@@ -457,23 +413,15 @@ def _columns(columns: Sequence[NDArray[np.float32]]) -> NDArray[np.float64] | No
 
 
 def _parts(block: Block, part_field: str | None) -> dict[str, NDArray[np.bool_]]:
-    """Elements of a block by the names that a part may be called."""
+    """Return elements of a block by the names of its parts."""
     grid = block.grid
     parts = dict(block.sets)
     for name in block.names:
         parts[name] = np.ones(grid.n_cells, np.bool_)
     for name in list(grid.cell_data.keys()):
-        if name == part_field or (part_field is None and simple(name) in _PART_FIELDS):
+        if name == part_field or (part_field is None and simple(name) in OTHER_NAMES["part"]):
             values = np.asarray(grid.cell_data[name])
             if values.ndim == 1 and np.isfinite(values).all():
                 for number in np.unique(values)[:_MOST_PARTS]:
                     parts[f"{number:g}"] = values == number
     return parts
-
-
-_MOST_PARTS: Final = 1000
-
-
-def _is_exodus(path: Path) -> bool:
-    """Its reader adds the displacement by itself."""
-    return mesh_vtk.KINDS.get(path.suffix.lower()) == "Exodus II"

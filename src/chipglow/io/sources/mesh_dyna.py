@@ -8,56 +8,45 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.mesh_block import Block, grid_of
-from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError, damaged, required
+from chipglow.io.sources.mesh_reader import Block, MeshReader, grid_of
+from chipglow.io.sources.source import SourceError, reading, required
 
 _KIND: Final = "LS-DYNA d3plot"
-_FAMILIES: Final = ("shell", "solid")
-_AVERAGED: Final = ("effective_plastic_strain", "thermal_data")
 _TRIANGLE, _QUAD, _TETRA, _HEXA = 5, 9, 10, 12
 
 
 class DynaReader(MeshReader):
-    """The states of a d3plot file and of those that follow it, ``d3plot01`` and so on."""
+    """States of a d3plot file and of those that follow it, ``d3plot01`` and so on."""
 
     def __init__(self, files: Sequence[Path]) -> None:
         super().__init__(files, _KIND)
-        self._file = files[0]
-        arrays = self._arrays(state_array_filter=["timesteps"]).arrays
+        arrays = self._arrays(state_array_filter=["timesteps"])
         self.times = tuple(float(time) for time in arrays.get("timesteps", ()))
         self.count = len(self.times)
         self.kind = f"mesh, {_KIND} with {self.count} states"
         if not self.count:
-            raise SourceError(f"{self._file}: has no state, expected a d3plot with one or more")
+            raise SourceError(f"{files[0]}: has no state, expected a d3plot with one or more")
 
-    def read(self, number: int) -> tuple[Block, ...]:
-        """The mesh of a state; see `MeshReader.read`."""
-        plot = self._arrays(state_filter={number})
-        try:
-            blocks = tuple(_blocks(plot.arrays))
-        except (KeyError, IndexError, ValueError) as error:
-            raise damaged(self._file, error, _KIND) from error
+    def read(self, number: int) -> Sequence[Block]:
+        blocks = tuple(_blocks(self._arrays(state_filter={number})))
         if not blocks:
-            raise SourceError(f"{self._file}: has no shells or solids, expected a mesh")
+            raise SourceError(f"{self.files[0]}: has no shells or solids, expected a mesh")
         return blocks
 
-    def _arrays(self, **filters: Any) -> Any:
-        dyna = required("lasso.dyna", self._file, "dyna", "lasso-python")
+    def _arrays(self, **filters: Any) -> Mapping[str, Any]:
+        file = self.files[0]
+        dyna = required("lasso.dyna", file, "dyna", "lasso-python")
         logging.getLogger("lasso").setLevel(logging.CRITICAL)
-        if self._file.stat().st_size == 0:
-            raise SourceError(f"{self._file}: is empty, expected an {_KIND}")
-        try:
-            return dyna.D3plot(str(self._file), buffered_reading=True, **filters)
-        except (OSError, MemoryError):
-            raise
-        except Exception as error:  # lasso raises what it likes for what is no d3plot
-            raise damaged(self._file, error, _KIND) from error
+        with reading(file, _KIND):
+            arrays: Mapping[str, Any] = dyna.D3plot(
+                str(file), buffered_reading=True, **filters
+            ).arrays
+        return arrays
 
 
 def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
     points, of_nodes = _of_nodes(arrays)
-    for family in _FAMILIES:
+    for family in ("shell", "solid"):
         prefix = f"element_{family}_"
         nodes = arrays.get(prefix + "node_indexes")
         if nodes is None or not len(nodes):
@@ -84,9 +73,9 @@ def _of_nodes(arrays: Mapping[str, Any]) -> tuple[NDArray[Any], dict[str, NDArra
 
 
 def _of_elements(arrays: Mapping[str, Any], prefix: str) -> dict[str, NDArray[Any]]:
-    """Fields of elements: integration points and layers of an element are averaged."""
+    """Return fields of elements, means over integration points and layers."""
     found: dict[str, NDArray[Any]] = {}
-    for name in _AVERAGED:
+    for name in ("effective_plastic_strain", "thermal_data"):
         if prefix + name in arrays:
             values = arrays[prefix + name][0]
             found[name] = values.reshape(len(values), -1).mean(axis=1)
@@ -102,7 +91,7 @@ def _of_elements(arrays: Mapping[str, Any], prefix: str) -> dict[str, NDArray[An
 
 
 def _cells(nodes: NDArray[Any], family: str) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Cells as VTK wants them; triangles and tetrahedra repeat their last node."""
+    """Return cells in VTK's form; triangles and tetrahedra repeat their last node."""
     full, less, least = (_QUAD, _TRIANGLE, 3) if family == "shell" else (_HEXA, _TETRA, 4)
     repeated = (nodes[:, least:] == nodes[:, least - 1 : least]).all(axis=1)
     counts = np.where(repeated, least, nodes.shape[1])
@@ -114,14 +103,13 @@ def _cells(nodes: NDArray[Any], family: str) -> tuple[NDArray[Any], NDArray[np.u
 def _parts(
     arrays: Mapping[str, Any], prefix: str, alive: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.bool_]]:
-    """Which elements are of a part, by its number and its title."""
+    """Return the elements of each part, by its number and its title."""
     index = arrays.get(prefix + "part_indexes")
     if index is None:
         return {}
     ids = arrays.get("part_titles_ids", arrays.get("part_ids", np.unique(index) + 1))
-    titles = arrays.get("part_titles", ())
     parts = {str(int(number)): index[alive] == at for at, number in enumerate(ids)}
-    for at, title in enumerate(titles):
+    for at, title in enumerate(arrays.get("part_titles", ())):
         text = title.decode(errors="replace") if isinstance(title, bytes) else str(title)
         parts.setdefault(text.strip(), index[alive] == at)
     return parts

@@ -1,121 +1,101 @@
-"""Fields that a mesh has in some of its blocks only, such as the temperatures of two materials."""
+"""Fields that a mesh has in some of its blocks only, such as the temperatures of two materials.
+
+A file of Exodus has every field of nodes at every node: where a block does not have it, it is 0. At
+some of the nodes that blocks share, MOOSE writes the sum over the elements that have the field,
+divided by the number of all elements there.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from chipglow.io.sources.conventions import COMMON_NAMES, match_names, simple
-from chipglow.io.sources.mesh_block import Block, fields_of, offsets_of
+from chipglow.io.sources.mesh_reader import Block, fields_of, offsets_of
 
-Names: TypeAlias = tuple[str, ...]
+Frames: TypeAlias = Sequence[Sequence[Block]]
+BlockFields: TypeAlias = Mapping[tuple[str, ...], str | None]
+"""The file's field of each block, by the block's names; None if the block has none."""
 
 _TEMPERATURE: Final = "temperature"
 _RESTRICTED: Final = (_TEMPERATURE, "plastic_strain", "plastic_strain_rate")
 NODE_NUMBER: Final = "GlobalNodeId"
-"""What VTK calls the numbers that nodes have in a whole file of Exodus."""
+"""VTK's name for the numbers that nodes have in a whole file of Exodus."""
 
-_BETWEEN: Final = ", "
-_BLANK: Final = 0.5
-"""Fraction of a block's elements from which on blank ones mean that it does not have the field."""
+_LARGEST_BLANK_FRACTION: Final = 0.5
+"""Fraction of a block's elements above which blank ones mean that it does not have the field."""
 
 
-@dataclass(frozen=True)
-class RestrictedFields:
-    """Which field of a file is whose, where blocks have fields of their own.
+def restricted_fields(frames: Frames, given: Mapping[str, str]) -> dict[str, BlockFields]:
+    """Return the fields that differ from block to block in the first and the last frame.
 
-    A file of Exodus has every field of nodes at every node: where a block does not have it, it is
-    0. At some of the nodes that blocks share, MOOSE writes the sum over the elements that have the
-    field, divided by the number of all elements there: this is undone.
-
-    Parameters
-    ----------
-    names : mapping
-        What fields that were put together are called, by the names of a scene.
-    own : mapping
-        The file's field of each block, by the names of a scene; None where a block has none.
+    They are by the names of a scene, some of which the user gave.
     """
-
-    names: Mapping[str, str]
-    own: Mapping[str, Mapping[Names, str | None]]
-
-    @classmethod
-    def of(cls, frames: Sequence[Sequence[Block]], given: Mapping[str, str]) -> "RestrictedFields":
-        """Look for them in the first and the last frame.
-
-        Parameters
-        ----------
-        frames : sequence of sequence of Block
-            Meshes of these frames.
-        given : mapping
-            The file's names of fields that the user gave, by those of a scene.
-        """
-        scalars = [name for name, size in fields_of(frames[0]).items() if size == 1]
-        own: dict[str, Mapping[Names, str | None]] = {}
-        for ours in _RESTRICTED if len(frames[0]) > 1 else ():
-            plain = given.get(ours) or match_names(scalars, {}, (ours,)).get(ours)
-            chosen = (
-                _put_together(ours, frames, scalars)
-                if plain is None
-                else _of_some(ours, frames, plain)
-            )
-            if chosen:
-                own[ours] = {block.names: chosen.get(block.names) for block in frames[0]}
-        names = {
-            ours: _BETWEEN.join(dict.fromkeys(name for name in chosen.values() if name))
-            for ours, chosen in own.items()
-        }
-        return cls(names, own)
-
-    def of_blocks(self, blocks: Sequence[Block]) -> tuple[Block, ...]:
-        """Blocks with the fields that they have, under the names of those put together."""
-        factors = {ours: _factors(blocks, own) for ours, own in self.own.items()}
-        return tuple(
-            self._of_block(block, {ours: of[number] for ours, of in factors.items()})
-            for number, block in enumerate(blocks)
-        )
-
-    def _of_block(self, block: Block, factors: Mapping[str, Any]) -> Block:
-        grid = block.grid.copy(deep=False)
-        if NODE_NUMBER in grid.point_data:
-            del grid.point_data[NODE_NUMBER]
-        for ours, label in self.names.items():
-            own = self.own[ours].get(block.names, label)
-            for data in (grid.point_data, grid.cell_data):
-                there = {name: data[name] for name in label.split(_BETWEEN) if name in data}
-                for name in there:
-                    del data[name]
-                if own in there:
-                    of_nodes = data.association is grid.point_data.association
-                    data[label] = there[own] * (factors[ours] if of_nodes else 1.0)
-        return replace(block, grid=grid)
+    blocks = frames[0]
+    scalars = [name for name, size in fields_of(blocks).items() if size == 1]
+    found: dict[str, BlockFields] = {}
+    for ours in _RESTRICTED if len(blocks) > 1 else ():
+        name = given.get(ours) or match_names(scalars, {}, (ours,)).get(ours)
+        if name is None:
+            chosen = _fields_by_block(ours, frames, scalars)
+        else:  # strains may well be 0 in a whole block
+            having = [block.names for block in blocks if _has_values(frames, block, name)]
+            some = ours == _TEMPERATURE and len(having) < len(blocks)
+            chosen = dict.fromkeys(having, name) if some else {}
+        if chosen:
+            found[ours] = {block.names: chosen.get(block.names) for block in blocks}
+    return found
 
 
-def _of_some(ours: str, frames: Sequence[Sequence[Block]], name: str) -> dict[Names, str]:
-    """The blocks that have a field, if there are others; strains may well be 0 in a whole block."""
-    having = [block for block in frames[0] if _has(frames, block, name)]
-    if ours != _TEMPERATURE or len(having) == len(frames[0]):
-        return {}
-    return {block.names: name for block in having}
+def label_of(fields: BlockFields) -> str:
+    """Return the name of a field that is put together from those of the blocks."""
+    return ", ".join(dict.fromkeys(name for name in fields.values() if name))
 
 
-def _put_together(
-    ours: str, frames: Sequence[Sequence[Block]], names: Sequence[str]
-) -> dict[Names, str]:
-    """The field of each block, if two blocks or more have one of their own."""
+def with_own_fields(
+    blocks: Sequence[Block], restricted: Mapping[str, BlockFields]
+) -> tuple[Block, ...]:
+    """Return blocks with the fields that they have, under the names of those put together."""
+    numbered = all(NODE_NUMBER in block.grid.point_data for block in blocks)
+    counts = _elements_at_nodes(blocks) if numbered and restricted else None
+    return tuple(_with_own(block, restricted, counts) for block in blocks)
+
+
+def _with_own(
+    block: Block, restricted: Mapping[str, BlockFields], counts: "pd.Series[int] | None"
+) -> Block:
+    grid = block.grid.copy(deep=False)
+    for fields in restricted.values():
+        label = label_of(fields)
+        own = fields.get(block.names, label)
+        for data in (grid.point_data, grid.cell_data):
+            values = data.get(own)
+            for name in set(fields.values()) & set(data.keys()):
+                del data[name]
+            if values is not None:
+                of_nodes = data.association == grid.point_data.association
+                data[label] = _undivided(grid, values, counts) if of_nodes else values
+    if NODE_NUMBER in grid.point_data:
+        del grid.point_data[NODE_NUMBER]
+    return replace(block, grid=grid)
+
+
+def _fields_by_block(ours: str, frames: Frames, names: Sequence[str]) -> dict[Any, str]:
+    """Return the field of each block, if two blocks or more have one of their own."""
     for stem in COMMON_NAMES[ours]:
         fields = {simple(name): name for name in names if simple(name).startswith(f"{stem}_")}
-        chosen: dict[Names, str] = {}
+        chosen = {}
         for block in frames[0]:
-            called = [fields.get(f"{stem}_{simple(name)}") for name in block.names]
-            fitting = [name for name in called if name]
+            own = [fields.get(f"{stem}_{simple(name)}") for name in block.names]
+            fitting = [name for name in own if name]
             if not fitting and ours == _TEMPERATURE:
-                fitting = [name for name in fields.values() if _has(frames, block, name)]
+                fitting = [name for name in fields.values() if _has_values(frames, block, name)]
                 if len(fitting) > 1:
-                    chosen.clear()
-                    break
+                    return {}
             if fitting:
                 chosen[block.names] = fitting[0]
         if len(set(chosen.values())) > 1:
@@ -123,72 +103,69 @@ def _put_together(
     return {}
 
 
-def _has(frames: Sequence[Sequence[Block]], block: Block, name: str) -> bool:
+def _has_values(frames: Frames, block: Block, name: str) -> bool:
     """Whether a block has a field in the first or the last frame."""
-    same = [other for frame in frames for other in frame if other.names == block.names]
-    return any(blank <= _BLANK for other in same for blank in _blank(other.grid, name))
+    same = [other.grid for frame in frames for other in frame if other.names == block.names]
+    return any(
+        fraction <= _LARGEST_BLANK_FRACTION
+        for grid in same
+        for fraction in _blank_fractions(grid, name)
+    )
 
 
-def _blank(grid: Any, name: str) -> Iterator[float]:
-    """Fraction of the elements that have a value of 0 or none: of their own, of their nodes."""
+def _blank_fractions(grid: Any, name: str) -> Iterator[float]:
+    """Yield the fraction of elements with a value of 0 or none: of their own, of their nodes."""
     if not grid.n_cells:
         return
     if name in grid.cell_data:
-        yield float(_nothing(grid.cell_data[name]).mean())
+        yield float(_is_blank(grid.cell_data[name]).mean())
     if name in grid.point_data:
-        nodes = _nothing(grid.point_data[name])[np.asarray(grid.cell_connectivity)]
-        before = np.append(0, np.cumsum(nodes))[offsets_of(grid)]
-        yield float((np.diff(before) > 0).mean())
+        nodes = _is_blank(grid.point_data[name]).astype(np.float64)
+        yield float(((_incidence(grid) @ nodes) > 0).mean())
 
 
-def _nothing(values: Any) -> NDArray[np.bool_]:
+def _is_blank(values: Any) -> NDArray[np.bool_]:
     numbers = np.asarray(values, np.float64)
     return np.asarray(~np.isfinite(numbers) | (numbers == 0.0))
 
 
-def _factors(blocks: Sequence[Block], own: Mapping[Names, str | None]) -> Sequence[Any]:
-    """By what the nodes' values of each block are to be multiplied.
+def _incidence(grid: Any) -> csr_array:
+    """Return a matrix of ones where an element, by rows, has a node."""
+    nodes = np.asarray(grid.cell_connectivity)
+    shape = (grid.n_cells, grid.n_points)
+    return csr_array((np.ones(len(nodes)), nodes, offsets_of(grid)), shape=shape)
 
-    At a node that blocks share it is the number of all elements there over those of the block, if
-    the values of all blocks there then are nearer to those beside them; else 1.
+
+def _elements_at_nodes(blocks: Sequence[Block]) -> "pd.Series[int]":
+    """Return how many elements of all blocks are at each node, by the node's number."""
+    counts = [
+        pd.Series(
+            np.bincount(np.asarray(block.grid.cell_connectivity), minlength=block.grid.n_points),
+            np.asarray(block.grid.point_data[NODE_NUMBER]),
+        )
+        for block in blocks
+    ]
+    return pd.concat(counts).groupby(level=0).sum()
+
+
+def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None") -> NDArray[Any]:
+    """Return a block's values at its nodes, those that MOOSE divided restored.
+
+    At a node that blocks share the restored value is taken if it is nearer to the mean of the
+    other nodes of the block's elements there.
     """
-    having = [own.get(block.names) in block.grid.point_data for block in blocks]
-    if not any(having) or not all(NODE_NUMBER in block.grid.point_data for block in blocks):
-        return [1.0] * len(blocks)
-    numbers = [np.asarray(block.grid.point_data[NODE_NUMBER]) for block in blocks]
-    place = np.split(
-        np.unique(np.concatenate(numbers), return_inverse=True)[1],
-        np.cumsum([len(of) for of in numbers])[:-1],
-    )
-    counts = [_elements_at(block.grid) for block in blocks]
-    together = np.bincount(np.concatenate(place), np.concatenate(counts))
-    apart = np.zeros((2, len(together)))
-    factors = []
-    for block, at, count, has in zip(blocks, place, counts, having, strict=True):
-        factors.append(together[at] / np.maximum(count, 1.0))
-        if has:
-            values = np.asarray(block.grid.point_data[own[block.names]], np.float64)
-            beside = _mean_beside(block.grid, values, factors[-1] > 1.0)
-            np.add.at(apart[0], at, np.nan_to_num(np.abs(values - beside)))
-            np.add.at(apart[1], at, np.nan_to_num(np.abs(values * factors[-1] - beside)))
-    divided = apart[1] < apart[0]
-    return [np.where(divided[at], of, 1.0) for at, of in zip(place, factors, strict=True)]
-
-
-def _elements_at(grid: Any) -> NDArray[np.float64]:
-    nodes = np.asarray(grid.cell_connectivity)
-    return np.bincount(nodes, minlength=grid.n_points).astype(np.float64)
-
-
-def _mean_beside(
-    grid: Any, values: NDArray[np.float64], shared: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """At shared nodes, the mean of the other nodes of their elements; NaN elsewhere."""
-    nodes = np.asarray(grid.cell_connectivity)
-    element = np.repeat(np.arange(grid.n_cells), np.diff(offsets_of(grid)))
-    free = ~shared[nodes]
-    of_elements = np.bincount(element[free], values[nodes[free]], grid.n_cells)
-    count = np.bincount(element[free], minlength=grid.n_cells).astype(np.float64)
-    total, number = (np.bincount(nodes, of[element], grid.n_points) for of in (of_elements, count))
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(shared, total / number, np.nan))
+    values = np.array(values, np.float64)
+    if counts is None:
+        return values
+    incidence = _incidence(grid)
+    own = np.asarray(incidence.sum(axis=0))
+    everywhere = counts.loc[np.asarray(grid.point_data[NODE_NUMBER])].to_numpy()
+    factors = everywhere / np.maximum(own, 1.0)
+    free = (factors <= 1.0).astype(np.float64)
+    sums, number = (incidence.T @ (incidence @ of) for of in (np.where(free, values, 0.0), free))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        beside = sums / number
+        nearer = np.abs(values * factors - beside) < np.abs(values - beside)
+    restored = (factors > 1.0) & nearer
+    values[restored] *= factors[restored]
+    return values

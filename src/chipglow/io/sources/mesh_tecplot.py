@@ -2,8 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -11,9 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.mesh_block import Block
-from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.mesh_reader import Block, MeshReader
+from chipglow.io.sources.source import SourceError, naming
 from chipglow.io.sources.tecplot_binary import MAGIC, binary_zones
 from chipglow.io.sources.tecplot_zone import ELEMENTS, ORDERED, Zone, block_of
 
@@ -29,7 +27,7 @@ class TecplotReader(MeshReader):
     """One file for each frame, or one file with zones of different times.
 
     Times are ``SOLUTIONTIME`` of ASCII files and the solution times of zones in strands of binary
-    ones. Zones without are there at all times.
+    ones. Zones without exist at all times.
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
@@ -38,13 +36,12 @@ class TecplotReader(MeshReader):
         self.times = _times(self._zones) if self._zones else _times_of_series(files)
         self.count = max(len(self.times or ()), len(files))
 
-    def read(self, number: int) -> tuple[Block, ...]:
-        """The mesh of a frame; see `MeshReader.read`."""
+    def read(self, number: int) -> Sequence[Block]:
         zones = self._zones or _zones(self.file(number))
         if self.times:
             wanted = self.times[number]
             zones = tuple(zone for zone in zones if zone.time in (None, wanted))
-        return tuple(zone.read() for zone in zones)
+        return tuple(zone.load() for zone in zones)
 
 
 def _is_binary(file: Path) -> bool:
@@ -57,7 +54,7 @@ def _times(zones: Sequence[Zone]) -> tuple[float, ...] | None:
 
 
 def _times_of_series(files: Sequence[Path]) -> tuple[float, ...] | None:
-    """Times of a file each, if those are binary: ASCII ones would have to be read as a whole."""
+    """Return a time per file, if those are binary: ASCII ones would have to be read as a whole."""
     if not _is_binary(files[0]):
         return None
     times = [_times(_zones(file)) or () for file in files]
@@ -68,55 +65,6 @@ def _times_of_series(files: Sequence[Path]) -> tuple[float, ...] | None:
 
 def _zones(file: Path) -> tuple[Zone, ...]:
     return binary_zones(file) if _is_binary(file) else _ascii_zones(file)
-
-
-@dataclass(frozen=True)
-class _AsciiZone(Zone):
-    """Where a zone is in a file, and what its header says."""
-
-    file: Path
-    number: int
-    names: tuple[str, ...]
-    keys: Mapping[str, str]
-    begin: int
-    end: int
-
-    @cached_property
-    def time(self) -> float | None:
-        """Its time, if it says one."""
-        text = self.keys.get("SOLUTIONTIME")
-        try:
-            return None if text is None else float(text)
-        except ValueError:
-            raise SourceError(
-                f"{self.file}: zone {self.number}: SOLUTIONTIME is {text!r}, expected a number"
-            ) from None
-
-    def _block(self) -> Block:
-        keys = self.keys
-        for key in _NOT_READ:
-            if key in keys:
-                raise ValueError(f"{key} is not read")
-        kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", "ORDERED"))).upper()
-        kind = kind.removeprefix("FE")
-        with self.file.open("rb") as stream:
-            stream.seek(self.begin)
-            text = stream.read(self.end - self.begin)
-            words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
-        if kind in _ORDERED:
-            across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
-            counts = (across, down, deep)
-            nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
-        else:
-            nodes = int(keys.get("N") or keys["NODES"])
-            elements = int(keys.get("E") or keys["ELEMENTS"])
-        columns, rest = _columns(self, words, nodes, elements)
-        names = tuple(filter(None, (keys.get("T", "").strip(), str(self.number))))
-        centred = _centred(keys, self.names)
-        if kind in _ORDERED:
-            return block_of(names, columns, centred, ORDERED, counts)
-        cells = np.array(rest, np.int64).reshape(elements, ELEMENTS[kind][0]) - 1
-        return block_of(names, columns, centred, kind, cells)
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
@@ -145,9 +93,14 @@ def _ascii_zones(file: Path) -> tuple[Zone, ...]:
         raise SourceError(
             f"{file}: has no VARIABLES and ZONE with data, expected an ASCII file of Tecplot"
         )
-    keys = [_keys(text.decode(errors="replace")) for text in texts]
-    rows = zip(keys, begins, [*ends[1:], at], strict=True)
-    return tuple(_AsciiZone(file, 1 + k, names, *row) for k, row in enumerate(rows))
+    zones = []
+    for number, rows in enumerate(zip(texts, begins, [*ends[1:], at], strict=True), start=1):
+        text, begin, end = rows
+        keys = _keys(text.decode(errors="replace"))
+        with naming(f"{file}: zone {number}: SOLUTIONTIME"):
+            time = float(keys["SOLUTIONTIME"]) if "SOLUTIONTIME" in keys else None
+        zones.append(Zone(time, partial(_load, file, number, names, keys, begin, end)))
+    return tuple(zones)
 
 
 def _names(header: str) -> tuple[str, ...]:
@@ -163,27 +116,44 @@ def _keys(text: str) -> dict[str, str]:
     return {key.upper(): value.strip('"') for key, value in pairs}
 
 
-def _columns(
-    zone: _AsciiZone, words: Sequence[bytes], nodes: int, elements: int
-) -> tuple[dict[str, NDArray[np.float64]], Sequence[bytes]]:
-    """Values of each variable, and the words after them."""
-    packing = zone.keys.get("DATAPACKING", zone.keys.get("F", "POINT")).upper()
-    names = zone.names
-    centred = _centred(zone.keys, names)
-    counts = [elements if name in centred else nodes for name in names]
-    total = sum(counts)
-    if min(nodes, elements) < 1 or len(words) < total:
-        raise ValueError(f"{len(words)} numbers, expected {total} or more")
-    values = np.array(words[:total], np.float64)
-    if packing.endswith("BLOCK"):
-        parts = np.split(values, np.cumsum(counts)[:-1])
-    else:
-        parts = list(values.reshape(nodes, len(names)).T)
-    return dict(zip(names, parts, strict=True)), words[total:]
+def _load(
+    file: Path, number: int, names: tuple[str, ...], keys: Mapping[str, str], begin: int, end: int
+) -> Block:
+    """Read a zone with variables of some names between two bytes of a file."""
+    with file.open("rb") as stream:
+        stream.seek(begin)
+        words = re.sub(rb"(?m)^\s*#.*$", b"", stream.read(end - begin)).split()
+    kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", ORDERED))).upper().removeprefix("FE")
+    with naming(f"{file}: zone {number}"):
+        for key in _NOT_READ:
+            if key in keys:
+                raise ValueError(f"{key} is not read")
+        across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
+        counts = (across, down, deep)
+        if kind in _ORDERED:
+            nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
+        else:
+            nodes = int(keys.get("N") or keys["NODES"])
+            elements = int(keys.get("E") or keys["ELEMENTS"])
+        centred = _centred(keys, names)
+        sizes = [elements if name in centred else nodes for name in names]
+        if min(nodes, elements) < 1 or len(words) < sum(sizes):
+            raise ValueError(f"{len(words)} numbers, expected {sum(sizes)} or more")
+        values = np.array(words[: sum(sizes)], np.float64)
+        if keys.get("DATAPACKING", keys.get("F", "POINT")).upper().endswith("BLOCK"):
+            parts = np.split(values, np.cumsum(sizes)[:-1])
+        else:
+            parts = list(values.reshape(nodes, len(names)).T)
+        columns = dict(zip(names, parts, strict=True))
+        title = tuple(filter(None, (keys.get("T", "").strip(), str(number))))
+        if kind in _ORDERED:
+            return block_of(title, columns, centred, ORDERED, counts)
+        cells: NDArray[np.int64] = np.array(words[sum(sizes) :], np.int64) - 1
+        return block_of(title, columns, centred, kind, cells.reshape(elements, ELEMENTS[kind][0]))
 
 
 def _centred(keys: Mapping[str, str], names: Sequence[str]) -> set[str]:
-    """Names of the variables whose values are those of elements."""
+    """Return names of the variables with values of elements."""
     centred: set[str] = set()
     for numbers, place in re.findall(r"\[([\d,\s-]+)\]\s*=\s*(\w+)", keys.get("VARLOCATION", "")):
         for word in numbers.split(",") if place.upper() == "CELLCENTERED" else ():

@@ -17,12 +17,11 @@ from chipglow.io.sources.arrays import (
     StoredArray,
     check_samples,
     open_arrays,
-    reading,
 )
 from chipglow.io.sources.conventions import COMMON_NAMES, simple
 from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.lammps_dump import ENDINGS, LammpsDump, is_dump
-from chipglow.io.sources.source import SourceError, required
+from chipglow.io.sources.source import SourceError, reading, required
 from chipglow.io.sources.text_table import TextTable, line_of
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")

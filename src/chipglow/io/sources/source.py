@@ -1,4 +1,4 @@
-"""What every reader of other people's fields offers: a survey, and frames sampled on a raster."""
+"""What every reader of fields offers: a survey, and frames sampled on a raster."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
@@ -20,35 +20,18 @@ class SourceError(ValueError):
 
 
 def required(module: str, file: object, extra: str, called: str = "") -> Any:
-    """A library that reads a file and comes with an extra of chipglow.
-
-    Parameters
-    ----------
-    module : str
-        What is imported.
-    file : object
-        The file, as the error calls it.
-    extra : str
-        The extra.
-    called : str
-        The library's name, if it is not the module's.
-
-    Raises
-    ------
-    SourceError
-        If it is not installed.
-    """
+    """Import a library of an extra of chipglow; raise `SourceError` if it is not installed."""
     try:
         return import_module(module)
     except ImportError:
-        needs = called or module
-        expected = f"expected pip install 'chipglow[{extra}]'"
-        raise SourceError(f"{file}: needs {needs}, {expected}") from None
+        raise SourceError(
+            f"{file}: needs {called or module}, expected pip install 'chipglow[{extra}]'"
+        ) from None
 
 
 @contextmanager
 def naming(name: object) -> Iterator[None]:
-    """Put a name, such as that of the file, before what is wrong, which is a SourceError then."""
+    """Put a name, such as that of the file, before any ValueError, which becomes a SourceError."""
     try:
         yield
     except ValueError as error:
@@ -56,7 +39,7 @@ def naming(name: object) -> Iterator[None]:
 
 
 def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
-    """The error for a file whose reader, of a kind of files, stumbles over it."""
+    """Return the error for a file, of a kind of files, whose reader raised another error."""
     said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
     as_kind = f" as {kind}" if kind else ""
     return SourceError(
@@ -64,79 +47,73 @@ def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
     )
 
 
+@contextmanager
+def reading(file: object, kind: str = "") -> Iterator[None]:
+    """Turn whatever a library raises over a damaged file into one `SourceError`."""
+    try:
+        yield
+    except (SourceError, FileNotFoundError, PermissionError, MemoryError):
+        raise
+    except (Exception, SystemExit) as error:  # meshio ends the program for some files
+        raise damaged(file, error, kind) from error
+
+
 def check_hdf5(file: Path) -> None:
     """Refuse an HDF5 file that is damaged or takes data from other files."""
-    try:
-        with naming(file):
-            check_own_data(file)
-    except (OSError, RuntimeError, KeyError) as error:
-        raise damaged(file, error, "HDF5") from None
+    with reading(file, "HDF5"), naming(file):
+        check_own_data(file)
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What is in a source, before its frames are read.
-
-    Parameters
-    ----------
-    kind : str
-        What it is, for people: ``mesh, 12 files of VTK XML``.
-    times : ndarray
-        Times of the frames in s, ascending, shape (frames,).
-    extent : tuple of float
-        Left, right, bottom and top of what is there in m, in the scene's frame of reference: of
-        the first and the last frame together.
-    found : mapping
-        Which of `chipglow.scene.READABLE` come from which field of the source.
-    unused : tuple of str
-        Fields of the source that nothing is taken from.
-    spacing : float, optional
-        Side of the source's own samples in m, if they are regular.
-    temperatures : tuple of float, optional
-        Least and greatest temperature in K of the frames that were looked at, as samples may have
-        them; NaN if there is none at all.
-    notes : Notes
-        Assumptions, and what the file states or lacks.
-    """
+    """Contents of a source before its frames are read."""
 
     kind: str
+    """Human-readable description: ``mesh, 12 files of VTK XML``."""
     times: NDArray[np.float64]
+    """Times of the frames in s, ascending, shape (frames,)."""
     extent: tuple[float, float, float, float]
+    """Left, right, bottom and top in m in the scene, of the first and the last frame together."""
     found: Mapping[str, str]
+    """The source's fields by the names of `chipglow.scene.READABLE`."""
     unused: tuple[str, ...] = ()
+    """Fields of the source that are not used."""
     spacing: float | None = None
+    """Side of the source's own samples in m, if they are regular."""
     temperatures: tuple[float, float] | None = None
+    """Smallest and largest temperature in K of some frames; NaN if they contain no number."""
     notes: Notes = field(default_factory=Notes)
+    """Assumptions, and what the file states or lacks."""
 
 
 def even_times(count: int, interval: float | None, notes: Notes) -> NDArray[np.float64]:
-    """Times in s of frames that are as far apart: by 1 s if nobody says it, which is remarked."""
+    """Return evenly spaced times in s: 1 s apart, which is noted, unless an interval is given."""
     if interval is None and count > 1:
         notes.assumed.append("The files contain no times: frames are 1 s apart.")
     return (1.0 if interval is None else interval) * np.arange(count, dtype=np.float64)
 
 
 def span_of(values: ArrayLike) -> tuple[float, float]:
-    """Least and greatest of what is a number; NaN if nothing is."""
+    """Return the smallest and the largest finite value; NaN if there is none."""
     numbers = np.asarray(values, np.float64)
     known = numbers[np.isfinite(numbers)]
     return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
 
 
 class Source(ABC):
-    """Someone else's fields.
+    """Fields of another program or of a measurement.
 
-    A source is a frozen dataclass that says where the fields are and what they mean; it opens files
-    only in its methods, so that it can be handed to another process. Its declared
-    fields are the section of an import's description, which sets the fields ``files``, ``names``,
-    ``units``, ``placement`` and ``interval``, as far as it has them; all need a default.
+    A source is a frozen dataclass that opens files only in its methods, so that it can be sent to
+    another process. Its declared fields are the section of an import's description, which sets
+    the fields ``files``, ``names``, ``units``, ``placement`` and ``interval`` if they exist; all
+    need a default.
 
     Attributes
     ----------
     title : str
-        What such sources are, for the comment on the section.
+        Name of such sources for the comment on the section.
     endings : tuple of str
-        Endings of such files' names, in small letters.
+        Endings of the names of their files, in lower case.
     """
 
     title: ClassVar[str] = ""
@@ -144,12 +121,12 @@ class Source(ABC):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Its files, as paths and patterns, and folders where there may be more of them."""
+        """Paths and patterns of its files, and folders that may contain more of them."""
         return ()
 
     @abstractmethod
     def survey(self) -> Survey:
-        """Look at what is there.
+        """Return what the source contains.
 
         Raises
         ------
@@ -161,14 +138,14 @@ class Source(ABC):
 
     @abstractmethod
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the frames one after the other; no more than a few are in memory.
+        """Sample the frames one by one; only a few are in memory at a time.
 
         Parameters
         ----------
         raster : Raster
-            Where the samples shall be.
+            Positions of the samples.
         start : int
-            Number of the first frame to sample; those before it are skipped.
+            Index of the first frame to sample.
 
         Raises
         ------

@@ -1,15 +1,13 @@
-"""A zone of Tecplot as a block of a mesh, whichever kind of file it was in."""
+"""A zone of Tecplot as a block of a mesh, from either kind of file."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.mesh_block import Block
-from chipglow.io.sources.source import SourceError, damaged
+from chipglow.io.sources.conventions import simple
+from chipglow.io.sources.mesh_reader import Block
 
 ORDERED: Final = "ORDERED"
 ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
@@ -19,42 +17,13 @@ ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
 """Number of nodes of the elements, and their type in VTK."""
 
 
-class Zone(ABC):
-    """A zone in a file.
+class Zone(NamedTuple):
+    """A zone in a file."""
 
-    Attributes
-    ----------
-    file : Path
-        The file.
-    number : int
-        Its place among the file's zones, from 1.
-    """
-
-    file: Path
-    number: int
-
-    @property
-    @abstractmethod
-    def time(self) -> float | None:
-        """Its time; None if it is there at all times."""
-
-    @abstractmethod
-    def _block(self) -> Block: ...
-
-    def read(self) -> Block:
-        """Its mesh and fields.
-
-        Raises
-        ------
-        SourceError
-            If it cannot be read.
-        """
-        try:
-            return self._block()
-        except SourceError:
-            raise
-        except (ValueError, KeyError, IndexError) as error:
-            raise damaged(f"{self.file}: zone {self.number}", error) from None
+    time: float | None
+    """Its time; None if it exists at all times."""
+    load: Callable[[], Block]
+    """Reads its mesh and fields."""
 
 
 def block_of(
@@ -64,25 +33,10 @@ def block_of(
     kind: str,
     cells: NDArray[np.int64] | tuple[int, int, int],
 ) -> Block:
-    """A block with the fields of a zone.
+    """Return a block with the variables of a zone, its positions among them.
 
-    Parameters
-    ----------
-    names : tuple of str
-        What the zone is called.
-    columns : mapping
-        Values of the variables, those of positions among them.
-    centred : set of str
-        Variables whose values are those of elements.
-    kind : str
-        `ORDERED` or one of `ELEMENTS`.
-    cells : ndarray or tuple of int
-        Numbers of the nodes of each element from 0, or how many points are along i, j and k.
-
-    Raises
-    ------
-    ValueError
-        If there are no positions, or elements have nodes that do not exist.
+    Some variables are ``centred`` in elements. The cells are the nodes of each element, from 0, or
+    the numbers of points along i, j and k.
     """
     import pyvista
 
@@ -105,15 +59,11 @@ def block_of(
 
 
 def _points(fields: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Positions of the nodes, taken out of the fields."""
+    """Take the positions of the nodes out of the fields."""
     found: list[NDArray[np.float64]] = []
-    for axis in "XYZ":
-        own = next((own for own in fields if _simple(own) in (axis, f"COORDINATE{axis}")), None)
-        if own is None and axis != "Z":
-            raise ValueError(f"there is no {axis}")
+    for axis in "xyz":
+        own = next((own for own in fields if simple(own) in (axis, f"coordinate{axis}")), None)
+        if own is None and axis != "z":
+            raise ValueError(f"there is no {axis.upper()}")
         found.append(np.zeros_like(found[0]) if own is None else fields.pop(own))
     return np.stack(found, axis=1)
-
-
-def _simple(name: str) -> str:
-    return name.split("[")[0].split("(")[0].strip().upper()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
 from math import isfinite, nan, sqrt
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -17,8 +17,13 @@ from scipy.ndimage import map_coordinates
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
-from chipglow.laboratory.chip.frames import budget_columns, celsius, frame_numbers
-from chipglow.laboratory.chip.ridge import NoShearBandError, arc_length, normals_of
+from chipglow.laboratory.chip.frames import budget_columns, frame_numbers, unit_table
+from chipglow.laboratory.chip.ridge import (
+    NoShearBandError,
+    across_curve,
+    arc_length,
+    normals_of,
+)
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
@@ -35,6 +40,8 @@ POSITION: Final = "position"
 
 BAND_BUDGET: Final = (CALIBRATION, POSITION, *TOOL_BUDGET)
 """Lines of the budget of a temperature along the band."""
+
+_DIMS: Final = ("time", "distance")
 
 CALIBRATION_UNKNOWN: Final = (
     "The measurement does not state the uncertainty of its calibration, which is therefore "
@@ -84,24 +91,20 @@ class BandProfile:
     curve's first point, then along the curve.
     """
     points: Array
-    """Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
-    band does not reach.
-    """
+    """Points of each frame's band at these distances in m, shape (frames, n, 2), or NaN."""
     estimate: Estimate
-    """Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
-    is not usable. Its components are ``calibration``, which is the same in all that was
-    measured by it; ``position`` of the curve, of every point by itself; and ``tool``, the same
-    in all that is read by this tool, of which `TOOL_BUDGET` are parts: it moves the edge from
-    which the distance counts.
+    """Mean radiance temperature in K over the width, shape (frames, n); NaN where not usable.
+    Components: ``calibration``; ``position`` of the curve, of every point by itself; and, with the
+    parts `TOOL_BUDGET`, ``tool``, which moves the edge from which the distance counts.
     """
     offset: Array
-    """Median distance in m of each frame's band from the reference, shape (frames,): positive
-    toward the chip, negative toward the workpiece; NaN without a band.
+    """Median distance in m of each frame's band from the reference, shape (frames,), positive
+    toward the chip; NaN without a band.
     """
     stage: tuple[Stage, ...]
-    """How far each frame's band has developed."""
+    """Development of each frame's band."""
     times: Array
-    """When each frame's integration began in s, shape (frames,)."""
+    """Start of each frame's integration in s, shape (frames,)."""
     width: float
     """Width of the mean across the curve in m."""
     notes: Notes = field(default_factory=Notes)
@@ -113,69 +116,55 @@ class BandProfile:
 
     @property
     def in_place(self) -> NDArray[np.bool_]:
-        """Which frames have a band that has not moved, as the paper compares, shape (frames,)."""
+        """Which frames have a band that has not moved, shape (frames,)."""
         kept = (Stage.DEVELOPING, Stage.DEVELOPED)
         return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each frame's band; one row each."""
-        there = np.isfinite(self.points[..., 0]).ravel()
-        frame, point = (index.ravel() for index in np.indices(self.temperature.shape))
-        stages = np.array([stage.value for stage in self.stage], dtype=object)
-        columns = {
-            "time_us": 1e6 * self.times[frame],
-            "stage": stages[frame],
-            "distance_um": 1e6 * self.distance[point],
-            "x_um": 1e6 * self.points[..., 0].ravel(),
-            "y_um": 1e6 * self.points[..., 1].ravel(),
-            "radiance_temperature_degC": celsius(self.temperature.ravel()),
-            **budget_columns(self.estimate, BAND_BUDGET),
+        """Return every point of each frame's band; one row each."""
+        budget = budget_columns(self.estimate, BAND_BUDGET)
+        data = self.to_dataset().assign({name: (_DIMS, part) for name, part in budget.items()})
+        names = {
+            **{"time": "time_us", "stage": "stage", "distance": "distance_um"},
+            **{"x": "x_um", "y": "y_um", "temperature": "radiance_temperature_degC"},
+            **{name: name for name in budget},
         }
-        return pd.DataFrame(columns)[there].reset_index(drop=True)
+        return unit_table(data, names).dropna(subset="x_um", ignore_index=True)
 
     def to_dataset(self) -> xr.Dataset:
-        """Every point of each frame's band as arrays in SI units."""
-        both = ("time", "distance")
-        data = to_xarray(self.estimate, "temperature", both, "K")
+        """Return every point of each frame's band as arrays in SI units."""
+        data = to_xarray(self.estimate, "temperature", _DIMS, "K")
         data["temperature"].attrs["long_name"] = "radiance temperature"
         metres = {"units": "m"}
-        return (
-            data.assign(
-                standard_uncertainty=(both, self.estimate.standard_uncertainty, {"units": "K"}),
-                x=(both, self.points[..., 0], metres),
-                y=(both, self.points[..., 1], metres),
-                offset=("time", self.offset, metres),
-                stage=("time", [stage.value for stage in self.stage]),
-                reference_x=("reference_distance", self.reference.points[:, 0], metres),
-                reference_y=("reference_distance", self.reference.points[:, 1], metres),
-            )
-            .assign_coords(
-                time=("time", self.times, {"units": "s"}),
-                distance=("distance", self.distance, metres),
-                reference_distance=("reference_distance", self.reference.distance, metres),
-            )
-            .assign_attrs(width=self.width, **self.notes.attrs())
-        )
+        variables = {
+            "standard_uncertainty": (_DIMS, self.estimate.standard_uncertainty, {"units": "K"}),
+            "x": (_DIMS, self.points[..., 0], metres),
+            "y": (_DIMS, self.points[..., 1], metres),
+            "offset": ("time", self.offset, metres),
+            "stage": ("time", [stage.value for stage in self.stage]),
+            "reference_x": ("reference_distance", self.reference.points[:, 0], metres),
+            "reference_y": ("reference_distance", self.reference.points[:, 1], metres),
+        }
+        coordinates = {
+            "time": ("time", self.times, {"units": "s"}),
+            "distance": ("distance", self.distance, metres),
+            "reference_distance": ("reference_distance", self.reference.distance, metres),
+        }
+        data = data.assign(variables).assign_coords(coordinates)
+        return data.assign_attrs(width=self.width, **self.notes.attrs())
 
     def stage_frame(self) -> pd.DataFrame:
-        """Each frame's band; one row each."""
-        return pd.DataFrame([self._stage_row(frame) for frame in range(self.times.size)])
-
-    def _stage_row(self, frame: int) -> dict[str, float | str]:
-        known = np.isfinite(self.temperature[frame])
-        values = celsius(self.temperature[frame, known])
-        ends = 1e6 * self.distance[known]
-        uncertainty = self.estimate.standard_uncertainty[frame, known]
-        return {
-            "time_us": 1e6 * self.times[frame],
-            "stage": self.stage[frame].value,
-            "offset_um": 1e6 * self.offset[frame],
-            "from_um": ends[0] if known.any() else nan,
-            "to_um": ends[-1] if known.any() else nan,
-            "mean_degC": values.mean() if known.any() else nan,
-            "greatest_degC": values.max() if known.any() else nan,
-            "standard_uncertainty_K": np.sqrt((uncertainty**2).mean()) if known.any() else nan,
-        }
+        """Return each frame's band; one row each."""
+        points = self.to_frame().dropna(subset="radiance_temperature_degC").groupby("time_us")
+        table = points.agg(
+            from_um=("distance_um", "min"),
+            to_um=("distance_um", "max"),
+            mean_degC=("radiance_temperature_degC", "mean"),
+            greatest_degC=("radiance_temperature_degC", "max"),
+            standard_uncertainty_K=("standard_uncertainty_K", lambda u: np.sqrt((u**2).mean())),
+        )
+        names = {"time": "time_us", "stage": "stage", "offset": "offset_um"}
+        return unit_table(self.to_dataset(), names).join(table, on="time_us")
 
 
 def band_profile(
@@ -222,18 +211,13 @@ def band_profile(
 
     Notes
     -----
-    The stage is judged as in the paper, "by the location of the shear band in the images compared
-    to the reference fully developed shear band": a band within one pixel of the reference is fully
-    developed, one on the workpiece's side is developing, one on the chip's side has moved.
+    As in the paper, a band within one pixel of the reference is fully developed, one on the
+    workpiece's side is developing, one on the chip's side has moved.
 
     A curve that is off by a small random vector of standard uncertainty u reads a temperature of
-    the mean square error (grad T)² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve: on a ridge,
-    where the gradient across vanishes, the bend is what counts.
-
-    The curve itself is where the image shows it, or where it was given. The distance along it
-    counts from the edge of the tool: what is uncertain about the edge's place, in the direction to
-    the curve's first point, contributes half the difference of the temperatures so far up and down
-    the curve.
+    the mean square error (grad T)² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve. The uncertainty
+    of the edge's place, in the direction to the curve's first point, contributes half the
+    difference of the temperatures so far up and down the curve.
     """
     tool, pitch = tool_of(measurement, tool), measurement.raster.spacing
     width = pitch if width is None else width
@@ -249,14 +233,20 @@ def band_profile(
     if measurement.calibration_errors is None:
         notes.warnings.append(CALIBRATION_UNKNOWN)
     if given is None and not any(found):
-        raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
+        several = f"shear band: none is found in any of {numbers.size} frames; in the last: "
+        raise NoShearBandError(several * (numbers.size > 1) + reason)
     base = _reference(measurement, images, tool, found, numbers, given, reference, notes)
     lines = found if given is None else [given] * numbers.size
     distance = _common(lines, pitch) if given is None else given.distance
     points = np.stack([_laid(line, distance) for line in lines])
-    reader = _Reader(measurement, images, width, position)
-    read = [reader(int(k), p) for k, p in zip(numbers, points, strict=True)]
-    temperature, off = (np.stack([one[part] for one in read]) for part in (0, 2))
+    reader, moves = _Reader(measurement, images, width, position), np.zeros((0, 2))
+    if uncertainty is not None:
+        moves = uncertainty.displacements(tool, tool.edge_point)
+    read = [
+        reader(int(k), p, _toward(moves, line, tool))
+        for k, p, line in zip(numbers, points, lines, strict=True)
+    ]
+    temperature, calibration, off, edge = map(np.stack, zip(*read, strict=True))
     if not np.isfinite(temperature).any():
         raise ValueError(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
@@ -264,17 +254,12 @@ def band_profile(
         )
     if given is None:
         notes.warnings.extend(_joined(temperature, measurement.times[numbers]))
-    estimate = measurement.estimate(temperature, [calibration for _, calibration, _ in read])
+    estimate = measurement.estimate(temperature, calibration)
     known = np.isfinite(temperature)
     off = np.where(known, off, nan)
     estimate = estimate.with_component(POSITION, off, independent="per element")
     if uncertainty is not None:
-        moves = uncertainty.displacements(tool, tool.edge_point)
-        changes = [
-            reader.of_the_edge(int(k), p, _toward(moves, line, tool))
-            for k, p, line in zip(numbers, points, lines, strict=True)
-        ]
-        effects = np.where(known, np.swapaxes(changes, 0, 1), nan)
+        effects = np.where(known, np.swapaxes(edge, 0, 1), nan)
         component = uncertainty.component(tool, effects)
         estimate = replace(estimate, components=(*estimate.components, component))
     offset = np.array([_offset(line, base) for line in found])
@@ -292,7 +277,7 @@ def band_profile(
 
 
 def _given(curve: Array, tool: Tool, pitch: float) -> Line:
-    """A given polyline at steps of half a pixel."""
+    """Resample a given polyline at steps of half a pixel."""
     if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
         raise ValueError(
             f"curve: points of shape {curve.shape}, expected 2 or more of x and y, all finite"
@@ -315,7 +300,7 @@ def _given(curve: Array, tool: Tool, pitch: float) -> Line:
 def _found(
     images: _Images, tool: Tool, numbers: NDArray[np.int64]
 ) -> tuple[list[Line | None], str]:
-    """The ridge of every frame, and why the last one without has none."""
+    """Find the ridge of every frame, and the reason why the last one without has none."""
     lines: list[Line | None] = []
     reason = ""
     for number in numbers.tolist():
@@ -325,10 +310,6 @@ def _found(
             lines.append(None)
             reason = str(error)
     return lines, reason
-
-
-def _none(count: int, reason: str) -> str:
-    return f"shear band: none is found in any of {count} frames; in the last: {reason}"
 
 
 def _reference(
@@ -341,7 +322,7 @@ def _reference(
     reference: int | None,
     notes: Notes,
 ) -> Line:
-    """The curve of the fully developed band."""
+    """Return the curve of the fully developed band."""
     if reference is not None:
         frame_numbers([reference], measurement.times.size)
         return find_band(images(reference), tool)
@@ -368,13 +349,15 @@ def _reference(
 
 
 def _joined(temperature: Array, times: Array) -> tuple[str, ...]:
-    """A warning of found curves that cross a deep valley between two hot places."""
-    valleys = [_valley(values[np.isfinite(values)]) for values in temperature]
-    crossing = [
-        (depth, time)
-        for (depth, fraction), time in zip(valleys, times, strict=True)
-        if depth > _DEEP and fraction > _DEEP_FRACTION
-    ]
+    """Return a warning of found curves that cross a deep valley between two hot places."""
+    crossing = []
+    for values, time in zip(temperature, times, strict=True):
+        known = values[np.isfinite(values)]
+        before = np.maximum.accumulate(known)
+        after = np.maximum.accumulate(known[::-1])[::-1]
+        depth = float(np.max(np.minimum(before, after) - known, initial=0.0))
+        if depth > _DEEP and depth > _DEEP_FRACTION * float(np.ptp(known)):
+            crossing.append((depth, time))
     if not crossing:
         return ()
     when = ", ".join(f"{time * 1e6:.6g}" for _, time in crossing)
@@ -384,18 +367,8 @@ def _joined(temperature: Array, times: Array) -> tuple[str, ...]:
     )
 
 
-def _valley(values: Array) -> tuple[float, float]:
-    """Depth of the deepest valley along a curve in K, and its fraction of the curve's range."""
-    if values.size == 0:
-        return 0.0, 0.0
-    before = np.maximum.accumulate(values)
-    after = np.maximum.accumulate(values[::-1])[::-1]
-    depth = float((np.minimum(before, after) - values).max())
-    return depth, depth / max(float(np.ptp(values)), 1e-9)
-
-
 def _heat(measurement: Measurement, line: Line, number: int) -> float:
-    """Integral along a line of the temperature over the lower range limit in K m."""
+    """Integrate the temperature over the lower range limit along a line in K m."""
     frame = measurement.data["radiance_temperature"][number].values
     lower_limit = float(measurement.data.attrs.get("lower_limit", np.nanmin(frame)))
     values = np.nan_to_num(sample(frame, measurement.raster, line.points) - lower_limit)
@@ -403,7 +376,7 @@ def _heat(measurement: Measurement, line: Line, number: int) -> float:
 
 
 def _common(lines: Sequence[Line | None], pitch: float) -> Array:
-    """Distances that cover all lines, at steps of half a pixel."""
+    """Return distances that cover all lines, at steps of half a pixel."""
     first = min(float(line.distance[0]) for line in lines if line)
     last = max(float(line.distance[-1]) for line in lines if line)
     step = _STEP * pitch
@@ -411,7 +384,7 @@ def _common(lines: Sequence[Line | None], pitch: float) -> Array:
 
 
 def _laid(line: Line | None, distance: Array) -> Array:
-    """Points of a line at these distances, NaN beyond its ends."""
+    """Return points of a line at these distances, NaN beyond its ends."""
     if line is None:
         return np.full((distance.size, 2), nan)
     slack = 1e-9 * float(line.distance[-1])
@@ -421,7 +394,7 @@ def _laid(line: Line | None, distance: Array) -> Array:
 
 
 def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
-    """How far the edge moves toward a line's first point in m, shape (k,)."""
+    """Return how far the edge moves toward a line's first point in m, shape (k,)."""
     if line is None:
         return np.zeros(len(moves))
     way = line.points[0] - tool.edge_point
@@ -431,7 +404,7 @@ def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
 
 
 class _Reader:
-    """Reads means across a curve, and what makes them uncertain, in one frame after another."""
+    """Reader of means across a curve, and of their uncertainty, in one frame after another."""
 
     def __init__(
         self, measurement: Measurement, images: _Images, width: float, position: float
@@ -442,63 +415,50 @@ class _Reader:
         count = max(round(width / self.pitch * _FINE), 1)
         self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
 
-    def __call__(self, number: int, points: Array) -> tuple[Array, Array, Array]:
-        """Temperature at points of a frame, NaN beyond the ends of its curve, and its changes.
+    def __call__(self, number: int, points: Array, nearer: Array) -> tuple[Array, ...]:
+        """Return the temperature at points of a frame, NaN beyond the ends of its curve.
 
-        By each error of the calibration, shape (errors, n), and by the place of the curve, (n,).
+        Then its changes by each error of the calibration, shape (errors, n), by the place of the
+        curve, (n,), and by an edge that is nearer to the curve by each of `nearer` in m, (k, n).
         """
         effects = self.measurement.calibration_effects(number)
-        temperature, position = np.full(len(points), nan), np.zeros(len(points))
-        calibration = np.zeros((len(effects), len(points)))
+        size = len(points)
+        temperature, position = np.full(size, nan), np.zeros(size)
+        calibration, edge = np.zeros((len(effects), size)), np.zeros((nearer.size, size))
         there = np.isfinite(points[:, 0])
-        if there.sum() < 2:
-            return temperature, calibration, position
-        curve = points[there]
-        places = curve[:, None] + self.offsets[:, None] * normals_of(curve)[:, None]
-        frame = self.measurement.data["radiance_temperature"][number].values
-        temperature[there] = self._mean(frame, places)
-        for error, image in enumerate(effects):
-            calibration[error, there] = self._mean(image, places)
-        position[there] = self._position(number, curve)
-        return temperature, calibration, position
+        if there.sum() >= 2:
+            curve = points[there]
+            places = across_curve(curve, self.offsets)
+            frame = self.measurement.data["radiance_temperature"][number].values
+            temperature[there] = self._mean(frame, places)
+            for error, image in enumerate(effects):
+                calibration[error, there] = self._mean(image, places)
+            position[there] = self._position(number, curve)
+            normal = normals_of(curve)
+            tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+            for step, changes in zip(nearer, edge, strict=True):
+                changes[there] = contribution(self.images(number), curve, step * tangent)
+        return temperature, calibration, position, edge
 
     def _mean(self, image: NDArray[np.floating], places: Array) -> Array:
         return np.asarray(sample(image, self.measurement.raster, places).mean(axis=-1))
 
     def _position(self, number: int, curve: Array) -> Array:
-        image = self.images(number)
-        slopes = (
-            map_coordinates(slope, image.index(curve), order=1, mode="nearest")
-            for slope in np.gradient(image.temperature, self.pitch)
-        )
-        squared = sum(slope**2 for slope in slopes)
-        ahead, here, behind = (
-            map_coordinates(image.temperature, image.index(place), order=1, mode="nearest")
-            for place in (curve + self.pitch * k * normals_of(curve) for k in (-1, 0, 1))
-        )
-        bend = (ahead - 2 * here + behind) / self.pitch**2
-        u = self.position
-        return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
+        image, u = self.images(number), self.position
 
-    def of_the_edge(self, number: int, points: Array, nearer: Array) -> Array:
-        """Changes in K of what is read at a distance from an edge that is nearer to the curve.
+        def read(values: Any, points: Array) -> Any:
+            return map_coordinates(values, image.index(points), order=1, mode="nearest")
 
-        By each of `nearer` in m, shape (k, n).
-        """
-        found = np.zeros((nearer.size, len(points)))
-        there = np.isfinite(points[:, 0])
-        if there.sum() >= 2:
-            curve = points[there]
-            normal = normals_of(curve)
-            tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-            image = self.images(number)
-            for step, changes in zip(nearer, found, strict=True):
-                changes[there] = contribution(image, curve, step * tangent)
-        return found
+        down, right = (read(slope, curve) for slope in np.gradient(image.temperature, self.pitch))
+        behind, here, ahead = (
+            read(image.temperature, curve + self.pitch * k * normals_of(curve)) for k in (-1, 0, 1)
+        )
+        bend = (behind - 2 * here + ahead) / self.pitch**2
+        return np.asarray(np.sqrt((down**2 + right**2) * u**2 + 0.75 * bend**2 * u**4))
 
 
 def _offset(line: Line | None, reference: Line) -> float:
-    """Median distance of a band from the reference in m, positive toward the chip."""
+    """Return the median distance of a band from the reference in m, positive toward the chip."""
     if line is None:
         return nan
     away = line.points[:, None] - reference.points[None]

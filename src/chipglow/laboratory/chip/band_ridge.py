@@ -12,10 +12,10 @@ from chipglow.camera import Flag, Measurement
 from chipglow.laboratory.chip.ridge import (
     NoShearBandError,
     PolarGrid,
+    across_curve,
     arc_length,
+    climbed,
     even_steps,
-    highest,
-    normals_of,
     strongest_part,
 )
 from chipglow.quantities import Array
@@ -46,16 +46,15 @@ class ThermalImage:
     """A frame in which every pixel has a temperature, so that slopes and bends exist."""
 
     temperature: Array
-    """Radiance temperature in K, shape (y, x). Pixels under the camera's range have its
-    lower limit, or the lowest temperature of the frame where none is stated; saturated and
-    dead ones have that of their nearest usable neighbour.
+    """Radiance temperature in K, shape (y, x): under the camera's range its lower limit, else the
+    lowest of the frame; at saturated and dead pixels that of the nearest usable one.
     """
     usable: NDArray[np.bool_]
     raster: Raster
 
     @classmethod
     def of(cls, measurement: Measurement, frame: int) -> "ThermalImage":
-        """A frame of a measurement."""
+        """Fill a frame of a measurement."""
         known = np.asarray(measurement.data["radiance_temperature"][frame].values, dtype=np.float64)
         flags = np.asarray(measurement.data["flags"][frame].values)
         usable = np.isfinite(known)
@@ -68,18 +67,13 @@ class ThermalImage:
         return cls(filled, usable, measurement.raster)
 
     def index(self, points: Array) -> Array:
-        """Row and column of points in m, shape (2, ...)."""
+        """Return row and column of points in m, shape (2, ...)."""
         column = (points[..., 0] - self.raster.left) / self.raster.spacing - 0.5
         row = (self.raster.top - points[..., 1]) / self.raster.spacing - 0.5
         return np.stack([row, column])
 
     def noise(self) -> float:
-        """Standard deviation in K of what differs from pixel to pixel.
-
-        Immerkaer (1996): the difference of two Laplacians takes away what is linear or bent; its
-        mean magnitude over the usable pixels is that of the noise. An edge that is one pixel sharp
-        counts as noise.
-        """
+        """Estimate the standard deviation of the noise in K by the method of Immerkaer (1996)."""
         t = self.temperature
         rows = t[:-2] - 2 * t[1:-1] + t[2:]
         both = rows[:, :-2] - 2 * rows[:, 1:-1] + rows[:, 2:]
@@ -93,14 +87,12 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     """Find the shear band in a measured image.
 
     A ridge is where the second derivative across it is negative (Lindeberg 1998: eigenvalues of
-    the Hessian after Gaussians of several widths, times the square of the width). What runs along
-    the rake face is left out, for there friction heats the chip. In polar coordinates about the
-    edge a band has one angle at every radius: dynamic programming finds the path of the largest
-    sum of log(1 + response / 5 K). A band that begins at the edge comes first; without one, the
-    best anywhere, such as a band that has left the edge with the chip. The path is moved to the
-    maximum across it, on a cubic spline, and smoothed by local parabolas. Where that leads to no
-    band, a cold strip below the edge may have drawn the path onto its border, which is bent as a
-    ridge is: it is looked for again without what lies below the edge.
+    the Hessian after Gaussians of several widths, times the square of the width). Ridges along the
+    rake face, where friction heats the chip, are left out. The band is the path, with one angle at
+    every radius about the edge, of the largest sum of log(1 + response / 5 K): one that begins at
+    the edge, else the best anywhere. It is moved to the maximum across it and smoothed. Where that
+    leads to no band, the border of a cold strip below the edge may have drawn the path: the search
+    is repeated without what lies below the edge.
     """
     _check_edge(image.raster, tool)
     try:
@@ -114,7 +106,7 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
 
 
 def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
-    """The image with the pixels just over the cutting edge in the place of those below it."""
+    """Replace the pixels below the cutting edge by those just over it."""
     above = np.flatnonzero(image.raster.y > tool.edge_point[1])
     if not above.size:
         return image
@@ -124,12 +116,13 @@ def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
 
 
 def _ridge(image: ThermalImage, tool: Tool, response: Array) -> Line:
-    """The ridge of the strongest path through a response."""
+    """Return the ridge of the strongest path through a response."""
     pitch = image.raster.spacing
     points = _path(image, response, tool)
     coefficients = spline_filter(image.temperature, order=3)
     for _ in range(3):
-        points = even_steps(_climbed(points, image, coefficients), _STEP * pitch)
+        points = climbed(points, *_profiles(points, image, coefficients, _SEARCH))
+        points = even_steps(points, _STEP * pitch)
     points = _within(points, image)
     _check(points, image, coefficients)
     return Line(arc_length(points) + float(np.hypot(*(points[0] - tool.edge_point))), points)
@@ -147,7 +140,7 @@ def _check_edge(raster: Raster, tool: Tool) -> None:
 
 
 def _response(image: ThermalImage, tool: Tool) -> Array:
-    """Height in K of ridges that do not run along the rake face, shape (y, x)."""
+    """Return the height in K of ridges that do not run along the rake face, shape (y, x)."""
     x, y = tool.rake_direction
     best = np.zeros(image.temperature.shape)
     for scale in _SCALES:
@@ -188,34 +181,19 @@ def _path(image: ThermalImage, response: Array, tool: Tool) -> Array:
     return polar.points[i, j]
 
 
-def _climbed(points: Array, image: ThermalImage, coefficients: Array) -> Array:
-    """Each point moved to the maximum across the curve, if there is one."""
-    pitch = image.raster.spacing
-    offsets, profiles = _profiles(points, image, coefficients, _SEARCH)
-    place, inside = highest(profiles, offsets)
-    # A parabola of nearly equal values may leave its interval.
-    moved = np.where(inside, np.clip(place, -_SEARCH * pitch, _SEARCH * pitch), 0.0)
-    return points + moved[:, None] * normals_of(points)
-
-
 def _profiles(
-    points: Array,
-    image: ThermalImage,
-    coefficients: Array,
-    reach: float,
+    points: Array, image: ThermalImage, coefficients: Array, reach: float
 ) -> tuple[Array, Array]:
-    """Offsets in m up to a reach in pixels, and the smoothed temperature across every point."""
+    """Return offsets in m up to a reach in pixels, and the smoothed temperature across points."""
     count = ceil(reach * _FINE)
     offsets = image.raster.spacing / _FINE * np.arange(-count, count + 1, dtype=np.float64)
-    across = points[:, None] + offsets[:, None] * normals_of(points)[:, None]
-    values = map_coordinates(
-        coefficients, image.index(across), order=3, mode="nearest", prefilter=False
-    )
+    index = image.index(across_curve(points, offsets))
+    values = map_coordinates(coefficients, index, order=3, mode="nearest", prefilter=False)
     return offsets, gaussian_filter(values, _CLIMB_BLUR, mode="nearest")
 
 
 def _within(points: Array, image: ThermalImage) -> Array:
-    """The points whose pixel is usable, from the first to the last of them."""
+    """Return the points from the first to the last whose pixel is usable."""
     row, column = np.rint(image.index(points)).astype(np.int64)
     rows, columns = image.usable.shape
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)

@@ -19,7 +19,7 @@ from chipglow.scene import PlacedTool, Tool
 from chipglow.text import Notes, load_described
 
 _FACE: Final = 200e-6
-"""Length of the face in m on which a tool that was given is compared with one that is seen."""
+"""Length of the face in m on which a given tool is compared with the detected one."""
 _CLEARLY: Final = 4.0
 """Two places of the face differ if they are this many standard uncertainties apart, or more."""
 
@@ -38,7 +38,7 @@ class ToolDescription(ToolSection):
     ] = None
 
     def build(self) -> Tool:
-        """The tool in the measurement's coordinates."""
+        """Return the tool in the measurement's coordinates."""
         tool = super().build()
         return tool if self.tip is None else PlacedTool(tool, self.tip)
 
@@ -66,7 +66,7 @@ class ChosenTool:
     notes: Notes = field(default_factory=Notes)
     """Assumptions, warnings and, as remarks, what was found."""
     uncertainty: ToolUncertainty | None = None
-    """How well its place is known, if it was found and no option gives an uncertainty."""
+    """Uncertainty of its place, if it was found and no option gives one."""
 
 
 def chosen_tool(
@@ -80,8 +80,7 @@ def chosen_tool(
         return ChosenTool(given, Notes(warnings=_contradictions(measurement, given)))
     found = find_tool(measurement)
     used = found.uncertainty if position is None else None
-    remarks = [_found(found), _position(found.uncertainty, position)]
-    return ChosenTool(found.tool, found.notes + Notes(remarks=remarks), used)
+    return ChosenTool(found.tool, found.notes + Notes(remarks=_found(found, position)), used)
 
 
 def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
@@ -104,24 +103,18 @@ def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
     ]
 
 
-def _found(found: FoundTool) -> str:
-    """What was found."""
-    x, y = (1e6 * part for part in found.tool.tip)
-    return (
+def _found(found: FoundTool, position: float | None) -> list[str]:
+    """Describe a detected tool and the uncertainty of its position."""
+    (x, y), known = (1e6 * part for part in found.tool.tip), found.uncertainty
+    spread = (
+        f"± {1e6 * known.along:.0f} um along the face, ± {1e6 * known.across:.1f} um across it and "
+        f"± {degrees(known.angle):.1f} deg (standard uncertainties)"
+    )
+    used = "found, "
+    if position is not None:
+        used = f"--position {1e6 * position:g} um instead of the detected one, "
+    return [
         f"Found: rake angle {degrees(found.tool.rake_angle):.1f} deg, tip at x {x:.1f} um, "
-        f"y {y:.1f} um."
-    )
-
-
-def _position(uncertainty: ToolUncertainty, position: float | None) -> str:
-    """Describe the uncertainty of the position of a detected tool."""
-    found = (
-        f"± {1e6 * uncertainty.along:.0f} um along the face, ± {1e6 * uncertainty.across:.1f} um "
-        f"across it and ± {degrees(uncertainty.angle):.1f} deg (standard uncertainties)"
-    )
-    if position is None:
-        return f"Position of the tool: found, {found}."
-    return (
-        f"Position of the tool: --position {1e6 * position:g} um instead of the detected one, "
-        f"{found}."
-    )
+        f"y {y:.1f} um.",
+        f"Position of the tool: {used}{spread}.",
+    ]

@@ -70,8 +70,7 @@ def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
 
 def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     several = grid.times.size > 1
-    mean = grid.frame_mean - ZERO_CELSIUS
-    bars = grid.frame_standard_deviation if several else grid.standard_deviation[0]
+    mean, bars = grid.frame_mean - ZERO_CELSIUS, grid.bars
     uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
     for m, depth in enumerate(grid.depth):

@@ -1,4 +1,4 @@
-"""The rake face in an image: the line where the chip's radiance ends and the tool's begins."""
+"""Detection of the rake face: the line where the chip's radiance ends and the tool's begins."""
 
 from dataclasses import dataclass, replace
 from math import atan, cos, degrees, radians, sqrt, tan
@@ -39,7 +39,7 @@ _SHIFT: Final = 0.5 / sqrt(3.0)
 
 @dataclass(frozen=True)
 class FoundTool:
-    """A tool that was found in an image."""
+    """A tool detected in an image."""
 
     tool: PlacedTool
     """The tool in the measurement's coordinates."""
@@ -57,8 +57,8 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     measurement : Measurement
         Frames in which the tool stands still; their mean is looked at.
     shape : ToolGeometry, optional
-        What the tool is thought to be. Its rake angle is looked for within 20 degrees; its edge and
-        its clearance angle are taken as they are. The paper's tool by default.
+        Assumed tool, the paper's by default. Its rake angle is looked for within 20 degrees; its
+        edge and its clearance angle are taken as they are.
 
     Raises
     ------
@@ -67,60 +67,56 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
 
     Notes
     -----
-    Along each row, the mean radiance beside the rake face follows one smooth course in the chip and
-    another one in the tool, blurred by the camera: emissivity, temperature gradient, or both,
-    change where the tool begins. First, for every straight line, the part of the image is summed
-    over the rows that a break between two parabolas on the line explains beyond one polynomial. Of
-    the lines that explain about as much as the best, the rightmost is the rake face: the chip's
-    back is further left. Then the line and the width of the blur are fitted to all rows at once by
-    least squares, with courses that fall with the distance from the face as heat does, over 2 and
-    6 pixels and a constant, of any strength in each row and on either side. Radiance is used, not
-    temperature, because the camera blurs radiance.
+    Along each row the radiance has one smooth course in the chip and another in the tool, blurred
+    by the camera. Every straight line is scored by what a break between two parabolas on it
+    explains beyond one polynomial. Of the lines that explain about as much as the best, the
+    rightmost is the rake face: the chip's back is further left. Then the line and the width of the
+    blur are fitted to all rows at once, with courses that fall with the distance from the face over
+    2 and 6 pixels and a constant, of any strength in each row and on either side.
 
-    The uncertainties are those of the jackknife over blocks of rows (JCGM 100 type A) and, as no
-    row says how far the courses are from those of the model, of limits of a rectangular
-    distribution (type B): half a pixel for the position as a whole, a pixel for either end of the
-    face. The tip is where the radiance along the face has fallen to half of its largest value; its
-    uncertainty is set to 2 pixels and half the edge radius.
+    The uncertainties are those of the jackknife over blocks of rows (type A) and of limits of a
+    rectangular distribution (type B): half a pixel for the position as a whole, a pixel for either
+    end of the face. The tip is where the radiance along the face has fallen to half of its largest
+    value; its uncertainty is set to 2 pixels and half the edge radius.
     """
-    shape = shape or ToolGeometry()
-    raster = measurement.raster
-    image = _mean_radiance(measurement)
+    shape, raster, pitch = shape or ToolGeometry(), measurement.raster, measurement.raster.spacing
+    received = measurement.radiance
+    image = np.where(np.isfinite(received), received, 0.0).mean(axis=0)
     angles = shape.rake_angle + np.arange(-_SEARCH, _SEARCH + _STEP / 2, _STEP)
-    coarse = _best_line(image, angles)
-    start = np.array([coarse.place, tan(coarse.angle), _COARSE_BLUR])
+    start, prominence = _best_line(image, angles)
     rows = _rows_with_face(image, start)
     if rows.size < _FEWEST_ROWS:
         raise _not_found(f"only {rows.size} rows of the image show one")
     fit = _fit(image, rows, _best_start(image, rows, start))
-    rows = rows[_good_rows(_Strip.along(fit, image, rows).residuals(fit))]
+    residuals = np.sqrt((_Strip.along(fit, image, rows).residuals(fit) ** 2).mean(axis=-1))
+    rows = rows[residuals <= _WORST_ROWS * np.median(residuals)]
     fit = _fit(image, rows, fit)
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
     tip_row, tip_seen = _tip_row(image, fit, rows)
-    assumed = (
-        f"The clearance angle is {degrees(shape.clearance_angle):.3g} deg, the edge radius "
-        f"{1e6 * shape.corner_radius:.3g} um."
-    )
-    warnings = _warnings(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
-    pitch = raster.spacing
     tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
+    middle = raster.top - pitch * (float(rows.mean()) + 0.5)
     uncertainty = ToolUncertainty(
         along=sqrt((_TIP_PIXELS * pitch) ** 2 + (shape.edge_radius / 2) ** 2),
         across=pitch * sqrt(place_error**2 + _SHIFT**2),
         angle=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
-        pivot=_up_the_face(tool, raster, float(rows.mean())),
+        pivot=(middle - float(tool.rake_foot[1])) / cos(tool.rake_angle),
     )
+    assumed = (
+        f"The clearance angle is {degrees(shape.clearance_angle):.3g} deg, the edge radius "
+        f"{1e6 * shape.corner_radius:.3g} um."
+    )
+    doubts = {
+        "The rake face hardly stands out from the noise of the image.": prominence < _SURE,
+        "The rows of the image do not agree on the rake angle.": angle_error > _WORST_ANGLE,
+        "The rows of the image do not agree on a line within a pixel.": place_error > 1.0,
+        f"The rake angle of {degrees(angle):.1f} degrees is at the limit of the search range.": (
+            not angles[0] < angle < angles[-1]
+        ),
+        "The tip is not in the image: lengths count from its lower end.": not tip_seen,
+    }
+    warnings = [text for text, applies in doubts.items() if applies]
     return FoundTool(tool, uncertainty, Notes([assumed], warnings))
-
-
-@dataclass(frozen=True)
-class _CoarseLine:
-    """A line through an image: column in the middle row, rake angle in rad, score over noise."""
-
-    place: float
-    angle: float
-    prominence: float
 
 
 def _not_found(reason: str) -> ValueError:
@@ -130,14 +126,8 @@ def _not_found(reason: str) -> ValueError:
     )
 
 
-def _mean_radiance(measurement: Measurement) -> Array:
-    """Mean over the frames, shape (y, x); 0 where nothing was received."""
-    radiance = measurement.radiance
-    return np.asarray(np.where(np.isfinite(radiance), radiance, 0.0).mean(axis=0))
-
-
-def _best_line(image: Array, angles: Array) -> _CoarseLine:
-    """The rightmost line that explains about as much of the image as the best."""
+def _best_line(image: Array, angles: Array) -> tuple[Array, float]:
+    """Return the rightmost line that explains about as much as the best, and its prominence."""
     if image.shape[1] < 2 * _REACH + 2:
         raise _not_found(f"the image is {image.shape[1]} pixels wide")
     scores = np.stack([_scores(image, tan(angle)) for angle in angles])
@@ -150,11 +140,12 @@ def _best_line(image: Array, angles: Array) -> _CoarseLine:
     peaks = (scores == maximum_filter(scores, size=_APART)) & (scores >= _AS_GOOD * best)
     at_angle, at_place = np.nonzero(peaks)
     right = int(at_place.argmax())
-    return _CoarseLine(float(at_place[right] + _REACH), float(angles[at_angle[right]]), prominence)
+    place, slope = at_place[right] + _REACH, tan(angles[at_angle[right]])
+    return np.array([place, slope, _COARSE_BLUR]), prominence
 
 
 def _scores(image: Array, slope: float) -> Array:
-    """How much a break explains on lines of one slope, by the column in the middle row."""
+    """Score lines of one slope, by the column in the middle row."""
     indices = np.indices(image.shape, dtype=np.float64)
     rows, columns = indices[0], indices[1]
     shift = _up(image, rows) * slope
@@ -167,22 +158,23 @@ def _scores(image: Array, slope: float) -> Array:
 
 
 def _up(image: Array, rows: NDArray[Any]) -> Array:
-    """Rows counted up from the middle one."""
+    """Count rows up from the middle one."""
     return np.asarray((image.shape[0] - 1) / 2 - rows, dtype=np.float64)
 
 
 def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
-    """Root mean square that a break explains beyond a smooth course, as a fraction of the level."""
+    """Return the root mean square that a break explains, as a fraction of the level."""
     steps = np.arange(-_REACH, _REACH + 1.0)
     basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)
     smooth = np.stack([steps**power for power in range(5)], axis=-1)
-    explained = _left(windows, smooth) - _left(windows, basis)
+    explained = (_residuals(windows, smooth) ** 2).sum(axis=-1)
+    explained -= (_residuals(windows, basis) ** 2).sum(axis=-1)
     level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0) + 1e-300
     return np.asarray(np.sqrt(np.maximum(explained, 0.0) / steps.size) / level)
 
 
 def _parabolas(offset: Array, blur: float) -> Array:
-    """Parabola, and another one that begins at offset 0, blurred by a Gaussian; shape (..., 6)."""
+    """Return a parabola and one that begins at offset 0, blurred by a Gaussian, (..., 6)."""
     step = ndtr(offset / blur)
     bell = blur * np.exp(-0.5 * (offset / blur) ** 2) / sqrt(2 * np.pi)
     begun = (step, offset * step + bell, (offset**2 + blur**2) * step + offset * bell)
@@ -190,7 +182,7 @@ def _parabolas(offset: Array, blur: float) -> Array:
 
 
 def _decays(offset: Array, blur: float) -> Array:
-    """Courses that fall with the distance from offset 0, on either side; shape (..., 6)."""
+    """Return courses that fall with the distance from offset 0 on either side, shape (..., 6)."""
     courses = []
     for away in (offset, -offset):
         courses.append(ndtr(away / blur))
@@ -200,12 +192,8 @@ def _decays(offset: Array, blur: float) -> Array:
     return np.stack(courses, axis=-1)
 
 
-def _left(windows: Array, basis: Array) -> Array:
-    """Sum of squares that a linear model leaves, of each window."""
-    return np.asarray((_remainder(windows, basis) ** 2).sum(axis=-1))
-
-
-def _remainder(windows: Array, basis: Array) -> Array:
+def _residuals(windows: Array, basis: Array) -> Array:
+    """Return the residuals of a linear model of each window."""
     frame, _ = np.linalg.qr(basis)
     if frame.ndim == 2:
         return np.asarray(windows - windows @ frame @ frame.T)
@@ -236,18 +224,18 @@ class _Strip:
         return cls(windows, middle.astype(np.float64), up, level)
 
     def place(self, line: Array) -> Array:
-        """Where a line is in each window, from its middle pixel."""
+        """Return the place of a line in each window, from its middle pixel."""
         return np.asarray(line[0] + line[1] * self.up - self.middle, dtype=np.float64)
 
     def residuals(self, line: Array) -> Array:
-        """What the model leaves of each row, as a fraction of its level, shape (rows, pixels)."""
+        """Return the residuals of each row as fractions of its level, shape (rows, pixels)."""
         steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
-        left = _remainder(self.windows, _decays(steps, float(line[2])))
-        return left / self.level[:, None]
+        residuals = _residuals(self.windows, _decays(steps, float(line[2])))
+        return residuals / self.level[:, None]
 
 
 def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:
-    """Rows in which a break on the line explains something."""
+    """Return the rows in which a break on the line explains something."""
     every = np.arange(image.shape[0], dtype=np.int64)
     place = line[0] + line[1] * _up(image, every)
     rows = every[(place > _REACH) & (place < image.shape[1] - 1 - _REACH)]
@@ -258,7 +246,7 @@ def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:
 
 
 def _best_start(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
-    """Of the lines around one, that which leaves least: the least squares have several minima."""
+    """Return the best of the lines around one: the least squares have several minima."""
     lines = [
         start + np.array([place, slope, 0.0])
         for place in np.linspace(-4.0, 4.0, 17)
@@ -269,7 +257,7 @@ def _best_start(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
 
 
 def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
-    """Column in the middle row, slope and width of the blur in pixels."""
+    """Fit column in the middle row, slope and width of the blur in pixels."""
     # Windows that moved with the line would make the sum of squares jump.
     strip = _Strip.along(start, image, rows)
     room = np.array([3.0, _ROOM])
@@ -286,14 +274,8 @@ def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     return np.asarray(found.x, dtype=np.float64)
 
 
-def _good_rows(residuals: Array) -> NDArray[np.bool_]:
-    """Rows that the model fits about as well as most."""
-    left = np.sqrt((residuals**2).mean(axis=-1))
-    return np.asarray(left <= _WORST_ROWS * np.median(left))
-
-
 def _jackknife(image: Array, rows: NDArray[np.int64], fit: Array) -> tuple[float, float]:
-    """Standard uncertainties of the angle in rad, and of the place in pixels, across the face."""
+    """Return standard uncertainties of the angle in rad, and of the place in pixels."""
     middle = float(_up(image, rows).mean())
     fits = np.array(
         [
@@ -309,7 +291,7 @@ def _jackknife(image: Array, rows: NDArray[np.int64], fit: Array) -> tuple[float
 
 
 def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float, bool]:
-    """Row in which the radiance on the face has fallen to half, and whether it is seen to."""
+    """Return the row at which the radiance on the face falls to half, and whether it does."""
     every = np.arange(image.shape[0])
     windows = _Strip.along(line, image, every).windows
     level = windows[:, _REACH - 1 : _REACH + 2].mean(axis=-1)
@@ -323,40 +305,10 @@ def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float,
 
 
 def _placed(tool: ToolGeometry, raster: Raster, line: Array, tip_row: float) -> PlacedTool:
-    """The tool with its lowest point at the tip's row and its face on the line."""
+    """Place the tool with its lowest point at the tip's row and its face on the line."""
     tip_y = raster.top - raster.spacing * (tip_row + 0.5)
     foot = tool.rake_foot + np.array([0.0, tip_y])
     row = (raster.top - foot[1]) / raster.spacing - 0.5
     column = line[0] + line[1] * ((raster.rows - 1) / 2 - row)
     on_line = raster.left + raster.spacing * (column + 0.5)
     return PlacedTool(tool, (float(on_line - foot[0]), float(tip_y)))
-
-
-def _up_the_face(tool: PlacedTool, raster: Raster, row: float) -> float:
-    """Distance in m up the straight face from its lower end to where it crosses a row."""
-    y = raster.top - raster.spacing * (row + 0.5)
-    return (y - float(tool.rake_foot[1])) / cos(tool.rake_angle)
-
-
-def _warnings(
-    angle: float,
-    angle_error: float,
-    place_error: float,
-    angles: Array,
-    prominence: float,
-    tip_seen: bool,
-) -> list[str]:
-    warnings = []
-    if prominence < _SURE:
-        warnings.append("The rake face hardly stands out from the noise of the image.")
-    if angle_error > _WORST_ANGLE:
-        warnings.append("The rows of the image do not agree on the rake angle.")
-    if place_error > 1.0:
-        warnings.append("The rows of the image do not agree on a line within a pixel.")
-    if not angles[0] < angle < angles[-1]:
-        warnings.append(
-            f"The rake angle of {degrees(angle):.1f} degrees is at the limit of the search range."
-        )
-    if not tip_seen:
-        warnings.append("The tip is not in the image: lengths count from its lower end.")
-    return warnings

@@ -1,12 +1,13 @@
-"""Readings of several frames: which frames, their scatter, and columns of their tables."""
+"""Readings of several frames: which frames, their mean and scatter, and columns of their tables."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Final
 from uuid import uuid4
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -16,10 +17,12 @@ FRAMES: Final = "frames"
 """Name of the component of uncertainty that the scatter of frames makes."""
 _LEAST: Final = 8
 """Frames at or above which the correlation of successive frames is estimated."""
+_MICRO: Final = ("_um", "_us")
+"""Ends of the names of columns in millionths."""
 
 
 def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]:
-    """Numbers of the chosen frames, shape (n,); of all for None."""
+    """Return the numbers of the chosen frames, shape (n,); of all for None."""
     numbers = np.arange(count) if frames is None else np.asarray(frames, dtype=np.int64)
     wrong = numbers[(numbers < 0) | (numbers >= count)]
     if wrong.size or numbers.size == 0:
@@ -28,48 +31,46 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
     return numbers
 
 
-@dataclass(frozen=True, eq=False)
-class FrameScatter:
-    """Errors of a mean over frames, as the frames themselves show them."""
+def frame_mean(estimate: Estimate) -> Estimate:
+    """Compute the mean over the first axis of what is known; NaN where nothing is."""
+    known = np.isfinite(estimate.values)
 
-    patterns: Array
-    """Independent errors of the mean, each of one standard deviation, shape (frames, ...): how
-    each frame is away from the mean. Places that change together do so in them.
-    """
-    freedom: float = inf
-    """Degrees of freedom; infinite without frames."""
-
-    @classmethod
-    def of(cls, frames: Array) -> "FrameScatter":
-        """What frames of shape (frames, ...), NaN where there is nothing, show.
-
-        Successive frames that are alike count as fewer: the variance of the mean grows by
-        1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that
-        is not positive (C. J. Geyer, Statistical Science 7 (1992) 473).
-        """
-        known = np.isfinite(frames)
+    def mean(values: Array) -> Array:
         count = known.sum(axis=0)
-        total = np.where(known, frames, 0.0).sum(axis=0)
-        mean = np.divide(total, count, out=np.zeros(total.shape), where=count > 0)
-        away = np.where(known, frames - mean, 0.0)
-        longer = _longer(away)
-        pairs = np.maximum(count * (count - 1), 1)
-        freedom = max((len(frames) - 1) / longer, 1.0)
-        return cls(away * np.sqrt(longer / pairs), freedom if len(frames) > 1 else inf)
+        total = np.where(known, values, 0.0).sum(axis=0)
+        return np.asarray(np.divide(total, count, np.full(total.shape, np.nan), where=count > 0))
 
-    @property
-    def standard_deviation(self) -> Array:
-        """Standard uncertainty of the mean, shape (...)."""
-        return np.asarray(np.sqrt(np.sum(self.patterns**2, axis=0)))
+    components = tuple(
+        Component(
+            one.cause,
+            np.stack([mean(part.reshape(known.shape)).ravel() for part in one.effects.T], axis=1),
+        )
+        for one in estimate.components
+    )
+    return Estimate(mean(estimate.values), components, estimate.unevaluated)
 
-    def component(self) -> Component:
-        """The errors as a component ``frames``, independent of that of other frames."""
-        cause = Cause(FRAMES, uuid4().hex, len(self.patterns), self.freedom)
-        return Component(cause, self.patterns.reshape(len(self.patterns), -1).T.copy())
+
+def frame_scatter(frames: Array) -> Component:
+    """Return the errors of a mean over frames of shape (frames, ...), as the frames show them.
+
+    Successive frames that are alike count as fewer: the variance of the mean grows by
+    1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that is
+    not positive (C. J. Geyer, Statistical Science 7 (1992) 473).
+    """
+    known = np.isfinite(frames)
+    count = known.sum(axis=0)
+    total = np.where(known, frames, 0.0).sum(axis=0)
+    mean = np.divide(total, count, out=np.zeros(total.shape), where=count > 0)
+    away = np.where(known, frames - mean, 0.0)
+    longer = _longer(away)
+    patterns = away * np.sqrt(longer / np.maximum(count * (count - 1), 1))
+    freedom = max((len(frames) - 1) / longer, 1.0) if len(frames) > 1 else inf
+    cause = Cause(FRAMES, uuid4().hex, len(frames), freedom)
+    return Component(cause, patterns.reshape(len(frames), -1).T.copy())
 
 
 def _longer(away: Array) -> float:
-    """By how much the variance of the mean is larger than of independent frames, 1 or more."""
+    """Return by how much the variance of the mean is larger than of independent frames."""
     frames = away.reshape(len(away), -1)
     count, square = len(frames), float(np.sum(frames**2))
     if count < _LEAST or square <= 0:
@@ -85,27 +86,35 @@ def _longer(away: Array) -> float:
     return float(np.clip((1 + 2 * total) / max(1 - 2 * weight, 1 / count), 1.0, count))
 
 
-def celsius(kelvins: Array) -> Array:
-    """Temperatures in K in degrees Celsius."""
-    return kelvins - ZERO_CELSIUS
+def unit_table(data: xr.Dataset, names: Mapping[str, str]) -> pd.DataFrame:
+    """Return variables in SI units as columns, in the units at the end of the columns' names.
+
+    A row for each element of the last variable, in the order of its dimensions.
+    """
+    order = list(data[[*names][-1]].dims)
+    table = data[[*names]].to_dataframe(dim_order=order).reset_index().rename(columns=names)
+    for name in names.values():
+        if name.endswith(_MICRO):
+            table[name] *= 1e6
+        elif name.endswith("_degC"):
+            table[name] -= ZERO_CELSIUS
+    return table[[*names.values()]]
 
 
 def budget_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, Array]:
-    """Standard uncertainty of temperatures in K and its part from each cause, by their names.
+    """Return columns with the standard uncertainty of temperatures in K and its part by cause.
 
-    Each of shape (values,). NaN of a cause that is not in the budget, or of which nothing is known;
-    of the whole if that is so for all.
+    NaN of a cause that is not in the budget, or of which nothing is known.
     """
     known = np.isfinite(estimate.values)
-    columns = {"standard_uncertainty_K": known_uncertainty(estimate).ravel()}
+    columns = {"standard_uncertainty_K": known_uncertainty(estimate)}
     for cause in causes:
         part = estimate.contribution(cause) if cause in estimate.names else np.nan
-        name = f"{cause.replace(' ', '_')}_uncertainty_K"
-        columns[name] = np.where(known, part, np.nan).ravel()
+        columns[f"{cause.replace(' ', '_')}_uncertainty_K"] = np.where(known, part, np.nan)
     return columns
 
 
 def known_uncertainty(estimate: Estimate) -> Array:
-    """Standard uncertainty of the values; NaN without any component."""
+    """Return the standard uncertainty of the values; NaN without any component."""
     whole = estimate.standard_uncertainty if estimate.components else np.nan
     return np.where(np.isfinite(estimate.values), whole, np.nan)

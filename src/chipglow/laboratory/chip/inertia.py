@@ -20,20 +20,15 @@ class Inertia:
     """Inertia of the scaled mass in a cut, after the first build-up of the chip."""
 
     kinetic_fraction: float
-    """Greatest change of the kinetic energy since the start over the work of the drive till then;
-    NaN where the scene has no energy balance.
-    """
+    """Greatest change of the kinetic energy over the work of the drive so far; NaN if unknown."""
     force_fraction: float
-    """Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
-    over the mean cutting force; NaN where the scene does not state it. By the balance of
-    momentum a chip that leaves at v makes a fraction abs(V − v)/V of it a force.
-    """
+    """Momentum flow of the scaled mass, ρV² times uncut chip thickness, over the cutting force."""
     mass_scaling: float
-    """Factor on the density: the true mass has this much less of both."""
+    """Factor on the density."""
 
     @property
     def warning(self) -> str:
-        """What is too much, and what to do; empty if nothing is."""
+        """Warning of too much inertia; empty if there is none."""
         fractions = (
             (self.kinetic_fraction, "kinetic energy reaches {} of the work"),
             (self.force_fraction, "momentum is worth {} of the cutting force"),
@@ -48,7 +43,7 @@ class Inertia:
 
 
 def inertia(scene: Scene) -> Inertia | None:
-    """Inertia of the cut that a scene is of; None without a force history."""
+    """Compute the inertia of a scene's cut; None without a force history."""
     if "cutting_force" not in scene.data:
         return None
     cutting = _values(scene, "cutting_force")
@@ -64,7 +59,7 @@ def inertia(scene: Scene) -> Inertia | None:
 
 
 def _ratio(part: Array, whole: Array) -> Array:
-    """NaN where there is no whole, as before the tool touches."""
+    """Return the quotient; NaN where the divisor is 0, as before the tool touches."""
     unknown = np.full(np.shape(whole), nan)
     return np.asarray(np.divide(part, whole, out=unknown, where=whole > 0.0))
 
@@ -74,7 +69,7 @@ def _values(scene: Scene, name: str) -> Array:
 
 
 def resolution_warnings(scene: Scene, band_width: float = nan) -> tuple[str, ...]:
-    """Sentences about lengths of a cut that its grid does not resolve."""
+    """Return sentences about lengths of a cut that its grid does not resolve."""
     known = str(scene.data.attrs.get("resolution_warnings", ""))
     cell = float(scene.data.attrs.get("cell", 0.0))
     return (*known.splitlines(), *unresolved({"shear band": band_width}, cell))

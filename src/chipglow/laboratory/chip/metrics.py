@@ -5,11 +5,11 @@ from math import nan
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.segment import contact_length
-from chipglow.laboratory.chip.segmentation import Segmentation, segmentation
+from chipglow.laboratory.chip.segmentation import segmentation
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
 from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
@@ -24,6 +24,11 @@ _WHOLE: Final = 0.9
 """Fraction of a period at or above which a period counts as whole."""
 
 _DEVELOPED: Final = 0.5
+_FORCES: Final = (
+    *("period", "period_uncertainty"),
+    *("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing"),
+)
+"""Metrics that a `Segmentation` states."""
 
 
 @dataclass(frozen=True)
@@ -31,84 +36,66 @@ class ChipScan:
     """The chip as it passes one rake-normal line."""
 
     height: float
-    """Where the line stands on the rake face, in m up from the end of the edge; NaN if at
-    no height the chip's free surface is in the view all the time.
+    """Height of the line in m up the rake face from the end of the edge; NaN if at no height the
+    chip's free surface is in the view all the time.
     """
     time: Array
     """Times of the frames that were looked at in s, shape (n,)."""
     thickness: Array
-    """Distance from the rake face to the free surface along the line in m, shape (n,); NaN
-    without a height.
-    """
+    """Thickness of the chip along the line in m, shape (n,); NaN without a height."""
 
 
 @dataclass(frozen=True)
 class ChipMetrics:
-    """What describes a segmented chip; lengths in m, times in s, forces in N/m of width.
+    """Description of a segmented chip; lengths in m, times in s, forces in N/m of width.
 
-    A ``…_standard_deviation`` is that of what the mean was taken over, NaN for one value.
+    A ``…_standard_deviation`` is that of the values averaged, NaN for one value.
     """
 
     period: float
     period_uncertainty: float
-    """Time from segment to segment and its standard uncertainty, from the force history; NaN
-    without one or without two force peaks (the uncertainty: three).
-    """
+    """Time from segment to segment and its standard uncertainty, by the force history."""
     frequency: float
-    """Segments a second in Hz: 1 over `period`."""
+    """Segments per second in Hz."""
     speed: float
-    """Cutting speed in m/s: the undeformed workpiece's under the cut; NaN if none is in the view.
-    """
+    """Cutting speed in m/s, by the undeformed workpiece under the cut; NaN if out of view."""
     spacing: float
     spacing_uncertainty: float
     """Length of uncut workpiece in a segment: `period` times `speed`."""
     chip_spacing: float
-    """Length of chip in a segment, from band to band along it: `period` times `chip_speed`."""
+    """Length of chip in a segment: `period` times `chip_speed`."""
     feed: float
-    """Uncut chip thickness, as given or from the scene; NaN if the workpiece's free surface is
-    not in the view at the left.
-    """
+    """Uncut chip thickness, as given or from the scene; NaN if out of view."""
     thickness: float
-    """Mean thickness of the chip, at right angles to the rake face; see `scan` for when it and
-    what follows from it are NaN.
-    """
+    """Mean thickness of the chip at right angles to the rake face."""
     peak: float
     peak_standard_deviation: float
     valley: float
     valley_standard_deviation: float
-    """Mean of the largest and the least thickness of each segment, and their standard
-    deviation over the segments.
-    """
+    """Largest and least thickness of a segment, over the segments."""
     degree: float
     """Degree of segmentation, (`peak` - `valley`) / `peak`."""
     ratio: float
     """Chip ratio, `feed` / `thickness`."""
     chip_speed: float
     chip_speed_standard_deviation: float
-    """Mean speed of the chip up the rake face in m/s where `scan` stands, and its standard
-    deviation over the frames: a segmented chip moves by fits and starts.
-    """
+    """Speed of the chip up the rake face at `scan` in m/s, over the frames."""
     contact: float
     contact_standard_deviation: float
-    """Length of contact on the rake face, mean and standard deviation over the frames; NaN if
-    it reaches the border of the view in one of them.
-    """
+    """Length of contact on the rake face, over the frames; NaN if it leaves the view."""
     shear_angle: float
     shear_angle_standard_deviation: float
-    """Angle in rad from the direction of cutting to the straight line through the middle half of
-    the shear band, over the frames in which the band is developed: where it reaches the free
-    surface and its rate is at least half the largest. NaN without such a frame, as the next.
+    """Angle in rad from the direction of cutting to the line through the middle half of the shear
+    band, over the frames in which it reaches the free surface at half the largest rate or more.
     """
     band_width: float
     band_width_standard_deviation: float
     """Full width at half maximum of the strain rate across the band, over the same frames."""
     band_rate: float
-    """Greatest plastic strain rate of the band in 1/s: median over its middle half, in the frame
-    where that is largest.
-    """
+    """Greatest median strain rate in 1/s on the band's middle half in a frame."""
     band_strain: float
-    """Greatest plastic strain that passes `scan`, as the median over the middle half of `valley`
-    and the mean over the segments: that of the bands once they are formed.
+    """Greatest plastic strain that passes `scan`: median over the middle half of `valley`, mean
+    over the segments.
     """
     cutting_mean: float
     cutting_swing: float
@@ -128,12 +115,9 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
 
     A camera's view seldom holds two whole segments at once. So the chip is measured as it passes
     one line at right angles to the rake face, the lowest on which its free surface is in the view
-    and over 1.2 times the feed all the time. There it is formed and still lies on the face: on a
-    higher line, which a taller view would have, it has lifted off and curls, so that the line
-    crosses the gap and the chip oblique. The means are over whole periods, each moment
-    weighted by the chip's speed, which makes them means over the chip's length; nine tenths of a
-    period count as a whole one. At most 64 frames, evenly spread, are looked at; of a scene with
-    gaps those of its longest part without.
+    and over 1.2 times the feed all the time: higher up it has lifted off and curls. The means are
+    over whole periods, each moment weighted by the chip's speed, which makes them means over the
+    chip's length. At most 64 frames are looked at, of the scene's longest part without a gap.
     """
     tool = scene.tool
     if tool is None:
@@ -144,51 +128,33 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     looks = [_Look.at(scene.frame(i), scene.raster, tool) for i in frames]
     if feed is None:
         feed = _median([look.feed for look in looks])
-    forces = _segmentation(scene)
-    period = forces.period if forces else nan
+    forces = _forces(scene)
+    period, speed = forces["period"], _median([look.speed for look in looks])
     time = np.array([look.time for look in looks])
     row = _scan_row(looks, feed)
-    heights = _heights(scene.raster, tool)
-    thickness = np.array([look.profile[row] if row is not None else nan for look in looks])
-    scan = ChipScan(nan if row is None else float(heights[row]), time, thickness)
-    passing = _Passing.of(scene, frames, scan, period)
-    bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
-    angles = np.array([_angle(band) for band in bands])
-    widths = np.array([band.width for band in bands])
-    speed = _median([look.speed for look in looks])
+    height = nan if row is None else float(_heights(scene.raster, tool)[row])
+    thickness = np.array([nan if row is None else look.profile[row] for look in looks])
+    scan = ChipScan(height, time, thickness)
     contacts = np.array([look.contact for look in looks])
-    uncertainty = forces.period_uncertainty if forces else nan
+    segments, passing = _passing(scene, tool, frames, scan, period)
+    bands = _developed_bands(scene, tool, frames[::_FRAMES_A_BAND])
     return ChipMetrics(
-        period=period,
-        period_uncertainty=uncertainty,
+        **forces,
+        **passing,
+        **_with_deviation("shear_angle", [_angle(band) for band in bands]),
+        **_with_deviation("band_width", [band.width for band in bands]),
         frequency=1 / period,
         speed=speed,
         spacing=period * speed,
-        spacing_uncertainty=uncertainty * speed,
-        chip_spacing=period * passing.speed,
+        spacing_uncertainty=forces["period_uncertainty"] * speed,
+        chip_spacing=period * passing["chip_speed"],
         feed=feed,
-        thickness=passing.thickness,
-        peak=_mean(passing.peaks),
-        peak_standard_deviation=_deviation(passing.peaks),
-        valley=_mean(passing.valleys),
-        valley_standard_deviation=_deviation(passing.valleys),
-        degree=1 - _mean(passing.valleys) / _mean(passing.peaks),
-        ratio=feed / passing.thickness,
-        chip_speed=passing.speed,
-        chip_speed_standard_deviation=passing.speed_standard_deviation,
         contact=float(contacts.mean()),
         contact_standard_deviation=_deviation(contacts),
-        shear_angle=_mean(angles),
-        shear_angle_standard_deviation=_deviation(angles),
-        band_width=_mean(widths),
-        band_width_standard_deviation=_deviation(widths),
+        ratio=feed / passing["thickness"],
+        degree=1 - passing["valley"] / passing["peak"],
         band_rate=max((band.middle_rate for band in bands), default=nan),
-        band_strain=passing.strain,
-        cutting_mean=forces.cutting_mean if forces else nan,
-        cutting_swing=forces.cutting_swing if forces else nan,
-        thrust_mean=forces.thrust_mean if forces else nan,
-        thrust_swing=forces.thrust_swing if forces else nan,
-        segments=passing.peaks.size,
+        segments=segments,
         scan=scan,
     )
 
@@ -221,49 +187,36 @@ class _Look:
         )
 
 
-@dataclass(frozen=True)
-class _Passing:
-    """The chip over whole segments as they pass the scanned line."""
-
-    thickness: float
-    peaks: Array
-    valleys: Array
-    speed: float
-    speed_standard_deviation: float
-    strain: float
-
-    @classmethod
-    def of(cls, scene: Scene, frames: list[int], scan: ChipScan, period: float) -> "_Passing":
-        windows = _windows(scan.time, period)
-        if not windows or np.isnan(scan.height):
-            nothing = np.zeros(0)
-            return cls(nan, nothing, nothing, nan, nan, nan)
-        valleys = np.array([scan.thickness[window].min() for window in windows])
-        assert scene.tool is not None
-        speed, strain = np.zeros(len(frames)), []
-        reach = float(valleys.mean())
-        depth = np.linspace(0.25, 0.75, 33) * reach
-        foot, normal = scene.tool.rake_point(scan.height), np.array(scene.tool.rake_normal)
-        points = foot + depth[:, None] * normal
-        up = scene.tool.rake_direction
-        for k, number in enumerate(frames):
-            along_x, along_y = (
-                sample(scene.field(name, number), scene.raster, points)
-                for name in ("velocity_x", "velocity_y")
-            )
-            speed[k] = (along_x * up[0] + along_y * up[1]).mean()
-            strain.append(sample(scene.field("plastic_strain", number), scene.raster, points))
-        whole = np.logical_or.reduce(windows)
-        moved = speed[whole].sum()
-        greatest = [np.median(np.array(strain)[window].max(axis=0)) for window in windows]
-        return cls(
-            thickness=(float((scan.thickness * speed)[whole].sum() / moved) if moved > 0 else nan),
-            peaks=np.array([scan.thickness[window].max() for window in windows]),
-            valleys=valleys,
-            speed=float(speed[whole].mean()),
-            speed_standard_deviation=_deviation(speed[whole]),
-            strain=float(np.mean(greatest)),
-        )
+def _passing(
+    scene: Scene, tool: Tool, frames: list[int], scan: ChipScan, period: float
+) -> tuple[int, dict[str, float]]:
+    """Number of whole segments that pass the scanned line, and the metrics of their chip."""
+    windows = [] if np.isnan(scan.height) else _windows(scan.time, period)
+    if not windows:
+        nothing = {"thickness": nan, "band_strain": nan}
+        for name in ("peak", "valley", "chip_speed"):
+            nothing |= _with_deviation(name, [])
+        return 0, nothing
+    peaks, valleys = (
+        [extreme(scan.thickness[window]) for window in windows] for extreme in (np.max, np.min)
+    )
+    depth = np.linspace(0.25, 0.75, 33) * float(np.mean(valleys))
+    points = tool.rake_point(scan.height) + depth[:, None] * np.array(tool.rake_normal)
+    right, up, strain = (
+        np.stack([sample(scene.field(name, k), scene.raster, points) for k in frames])
+        for name in ("velocity_x", "velocity_y", "plastic_strain")
+    )
+    speed = (right * tool.rake_direction[0] + up * tool.rake_direction[1]).mean(axis=1)
+    whole = np.logical_or.reduce(windows)
+    moved = speed[whole].sum()
+    greatest = [np.median(strain[window].max(axis=0)) for window in windows]
+    return len(windows), {
+        **_with_deviation("peak", peaks),
+        **_with_deviation("valley", valleys),
+        **_with_deviation("chip_speed", speed[whole]),
+        "thickness": float((scan.thickness * speed)[whole].sum() / moved) if moved > 0 else nan,
+        "band_strain": float(np.mean(greatest)),
+    }
 
 
 def _frame_numbers(scene: Scene) -> list[int]:
@@ -341,25 +294,26 @@ def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     return [(before_end > k + 1e-9) & (before_end <= k + 1 + 1e-9) for k in range(count)]
 
 
-def _segmentation(scene: Scene) -> Segmentation | None:
+def _forces(scene: Scene) -> dict[str, float]:
+    """Metrics of the force history; NaN without one."""
     if "cutting_force" not in scene.data:
-        return None
+        return dict.fromkeys(_FORCES, nan)
     names = ("force_time", "cutting_force", "thrust_force")
-    return segmentation(*(scene.data[name].values for name in names))
+    history = segmentation(*(scene.data[name].values for name in names))
+    return {name: getattr(history, name) for name in _FORCES}
 
 
-def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
+def _developed_bands(scene: Scene, tool: Tool, frames: list[int]) -> list[ShearBand]:
     """Bands that reach the free surface with half the largest rate or more."""
-    found = [band for number in frames if (band := _band(scene, number)) is not None]
+    found = [band for number in frames if (band := _band(scene, tool, number)) is not None]
     greatest = max((band.middle_rate for band in found), default=0.0)
     return [band for band in found if band.middle_rate >= _DEVELOPED * greatest]
 
 
-def _band(scene: Scene, number: int) -> ShearBand | None:
-    assert scene.tool is not None
+def _band(scene: Scene, tool: Tool, number: int) -> ShearBand | None:
     rate, material = (scene.field(name, number) for name in ("plastic_strain_rate", "material"))
     try:
-        band = find_shear_band(scene.raster, rate, material == Material.WORKPIECE, scene.tool)
+        band = find_shear_band(scene.raster, rate, material == Material.WORKPIECE, tool)
     except NoShearBandError:
         return None
     return band if band.reaches_surface else None
@@ -378,9 +332,12 @@ def _median(values: list[float]) -> float:
     return float(np.median(known)) if known.size else nan
 
 
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else nan
+def _with_deviation(name: str, values: ArrayLike) -> dict[str, float]:
+    """Mean of the known values and their standard deviation, by the names of the metrics."""
+    every = np.asarray(values, np.float64)
+    known = every[np.isfinite(every)]
+    mean = float(known.mean()) if known.size else nan
+    return {name: mean, f"{name}_standard_deviation": _deviation(every)}
 
 
 def _deviation(values: Array) -> float:

@@ -10,18 +10,18 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import sparse
 
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.laboratory.chip.frames import (
     FRAMES,
-    FrameScatter,
     budget_columns,
-    celsius,
+    frame_mean,
     frame_numbers,
+    frame_scatter,
     known_uncertainty,
+    unit_table,
 )
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
@@ -44,6 +44,7 @@ DEPTH: Final = 90e-6
 RAKE_BUDGET: Final = (CALIBRATION, *TOOL_BUDGET)
 """Lines of the budget of a square in one frame."""
 
+_DIMS: Final = ("time", "depth", "along")
 _ROUNDING: Final = 1e-6
 
 
@@ -52,21 +53,15 @@ class RakeGrid:
     """Radiance temperature in squares beside the rake face (the paper, Figure 7)."""
 
     along: Array
-    """Middles of the squares along the rake face in m, from the lower end of the straight face,
-    shape (n,).
-    """
+    """Middles of the squares along the straight rake face in m, from its lower end, shape (n,)."""
     depth: Array
     """Middles of the squares from the rake face into the chip in m, shape (m,)."""
     estimate: Estimate
     """Mean radiance temperature in K of each square's pixels, shape (frames, m, n); NaN where
-    the square is left out. Its components are ``calibration``, which is the same in all that
-    was measured by it, and ``tool``, the same in all that is read by this tool, of which
-    `TOOL_BUDGET` are parts.
+    left out. Components: ``calibration`` and, with the parts `TOOL_BUDGET`, ``tool``.
     """
     standard_deviation: Array
-    """Standard deviation over the square's pixels in K, of the same shape; NaN also for a single
-    pixel.
-    """
+    """Standard deviation over the square's pixels in K, of the same shape; NaN for one pixel."""
     count: NDArray[np.int64]
     """Usable pixels in each square, of the same shape."""
     size: float
@@ -93,21 +88,15 @@ class RakeGrid:
 
     @cached_property
     def frame_estimate(self) -> Estimate:
-        """Mean of `mean` over the frames in which a square is usable in K, shape (m, n).
+        """Mean over the frames in which a square is usable in K, shape (m, n).
 
-        The component ``frames`` is what they show of their mean (`FrameScatter`): what differs
-        from frame to frame, the pixels' noise included. One frame shows nothing of it.
+        The component ``frames`` is the scatter between them (`frame_scatter`), the pixels' noise
+        included; one frame shows nothing of it.
         """
-        there = Estimate(
-            np.nan_to_num(self.mean),
-            tuple(replace(c, effects=np.nan_to_num(c.effects)) for c in self.estimate.components),
-            self.estimate.unevaluated,
-        )
-        mean = there.linear(_averages(self.usable)).reshape(*self.mean.shape[1:])
+        mean = frame_mean(self.estimate)
         if self.times.size == 1:
             return mean.with_unevaluated(FRAMES)
-        scatter = FrameScatter.of(self.mean).component()
-        return replace(mean, components=(*mean.components, scatter))
+        return replace(mean, components=(*mean.components, frame_scatter(self.mean)))
 
     @property
     def frame_mean(self) -> Array:
@@ -120,61 +109,43 @@ class RakeGrid:
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
 
+    @property
+    def bars(self) -> Array:
+        """Standard deviation in K between the frames, or in the squares of a single frame."""
+        several = self.times.size > 1
+        return self.frame_standard_deviation if several else self.standard_deviation[0]
+
     def to_frame(self) -> pd.DataFrame:
-        """Every square of every frame; one row each."""
-        places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
-        time, depth, along = (1e6 * place.ravel() for place in places)
-        return pd.DataFrame(
-            {
-                "time_us": time,
-                "depth_um": depth,
-                "along_um": along,
-                "mean_degC": celsius(self.mean.ravel()),
-                "standard_deviation_K": self.standard_deviation.ravel(),
-                "usable_pixels": self.count.ravel(),
-                **budget_columns(self.estimate, RAKE_BUDGET),
-            }
-        )
+        """Return every square of every frame; one row each."""
+        budget = budget_columns(self.estimate, RAKE_BUDGET)
+        data = self.to_dataset().assign({name: (_DIMS, part) for name, part in budget.items()})
+        names = {
+            **{"time": "time_us", "depth": "depth_um", "along": "along_um", "mean": "mean_degC"},
+            **{"standard_deviation": "standard_deviation_K", "count": "usable_pixels"},
+            **{name: name for name in budget},
+        }
+        return unit_table(data, names)
 
     def to_dataset(self) -> xr.Dataset:
-        """Every square of every frame as arrays in SI units."""
-        dimensions = ("time", "depth", "along")
-        data = to_xarray(self.estimate, "mean", dimensions, "K")
+        """Return every square of every frame as arrays in SI units."""
+        data = to_xarray(self.estimate, "mean", _DIMS, "K")
         data["mean"].attrs["long_name"] = "radiance temperature"
-        return (
-            data.assign(
-                standard_uncertainty=(dimensions, known_uncertainty(self.estimate), {"units": "K"}),
-                standard_deviation=(dimensions, self.standard_deviation, {"units": "K"}),
-                count=(dimensions, self.count, {"units": "1"}),
-            )
-            .assign_coords(
-                time=("time", self.times, {"units": "s"}),
-                depth=("depth", self.depth, {"units": "m"}),
-                along=("along", self.along, {"units": "m"}),
-            )
-            .assign_attrs(size=self.size, **tool_attributes(self.tool))
-        )
-
-    def mean_frame(self) -> pd.DataFrame:
-        """Every square in the mean over the frames; one row each."""
-        depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
-        several = self.times.size > 1
-        standard_deviation = (
-            self.frame_standard_deviation if several else self.standard_deviation[0]
-        )
-        return pd.DataFrame(
-            {
-                "depth_um": depth.ravel(),
-                "along_um": along.ravel(),
-                "mean_degC": celsius(self.frame_mean.ravel()),
-                "standard_deviation_K": standard_deviation.ravel(),
-                "frames": self.frame_count.ravel(),
-            }
-        )
+        variables = {
+            "standard_uncertainty": (_DIMS, known_uncertainty(self.estimate), {"units": "K"}),
+            "standard_deviation": (_DIMS, self.standard_deviation, {"units": "K"}),
+            "count": (_DIMS, self.count, {"units": "1"}),
+        }
+        coordinates = {
+            "time": ("time", self.times, {"units": "s"}),
+            "depth": ("depth", self.depth, {"units": "m"}),
+            "along": ("along", self.along, {"units": "m"}),
+        }
+        data = data.assign(variables).assign_coords(coordinates)
+        return data.assign_attrs(size=self.size, **tool_attributes(self.tool))
 
     @property
     def notes(self) -> Notes:
-        """Squares without a value, causes that the deviations omit, and a warning of the means."""
+        """Squares without a value, causes that the deviations omit, and warnings."""
         notes, count, frames = Notes(), self.frame_count, self.times.size
         causes = " and ".join(one.cause.name for one in self.estimate.components)
         if causes:
@@ -194,7 +165,7 @@ class RakeGrid:
         return notes
 
     def up_to(self, columns: int) -> "RakeGrid":
-        """The same of the first squares along the face."""
+        """Return the first squares along the face."""
         return replace(
             self,
             along=self.along[:columns],
@@ -204,11 +175,8 @@ class RakeGrid:
         )
 
     def corners(self) -> Array:
-        """Corners of the squares in the measurement's coordinates."""
-        sides = (np.arange(self.depth.size + 1), np.arange(self.along.size + 1))
-        across, along = (self.size * steps for steps in sides)
-        normal = np.array(self.tool.rake_normal)
-        return np.asarray(self.tool.rake_point(along)[None] + across[:, None, None] * normal)
+        """Return the corners of the squares in m, shape (m + 1, n + 1, 2)."""
+        return _corners(self.tool, self.size, self.depth.size, self.along.size)
 
 
 def rake_grid(
@@ -245,24 +213,18 @@ def rake_grid(
 
     Notes
     -----
-    The squares stand on the rake face and turn with it. A pixel belongs to the square that holds
-    its middle, so that every pixel counts once and one that is flagged removes one square; nothing
-    is resampled, which would mix pixels of the tool, or such as are under the camera's range,
-    into the squares beside them. A square is left out in a frame if any of its pixels is `UNUSABLE`
-    there, as in the paper, or if it is not whole inside the image.
+    A pixel belongs to the square that holds its middle; nothing is resampled. A square is left out
+    in a frame if any of its pixels is `UNUSABLE` there, as in the paper, or if it is not whole
+    inside the image.
 
-    The middles of the pixels in a turned square are not spread evenly about the square's own
-    middle. The mean therefore weights them, as little unequally as possible, so that their
-    weighted middle is the square's: that is the value which the plane through the pixels, by least
-    squares, has in the middle of the square. Where the pixels lie evenly it is the plain mean. A
-    field that is linear in x and y comes out exactly, wherever the pixels lie; the noise of a mean
-    of 9 pixels rises by 6 % on average at a rake angle of -7 degrees, by 18 % at most.
-    `RakeGrid.standard_deviation` is the plain standard deviation.
+    In a turned square the pixels' middles are not spread evenly about the square's own. The mean
+    weights them, as little unequally as possible, so that their weighted middle is the square's: a
+    field that is linear in x and y comes out exactly. The noise of a mean of 9 pixels rises by 6 %
+    on average at a rake angle of -7 degrees, by 18 % at most.
 
-    What the calibration's errors change in a square is the weighted mean of what they change in its
-    pixels. Each uncertainty of the tool's place displaces the squares to either side by one
-    standard uncertainty; half the difference of the temperatures there is what it contributes
-    (JCGM 100, 5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
+    Each uncertainty of the tool's place displaces the squares to either side by one standard
+    uncertainty; half the difference of the temperatures there is its contribution
+    (JCGM 100, 5.1.3). Unusable pixels are filled for this as in `ThermalImage`.
     """
     tool, raster = tool_of(measurement, tool), measurement.raster
     size = _checked_size(pixels, depth, raster)
@@ -270,22 +232,24 @@ def rake_grid(
     rows = int(depth / size + _ROUNDING)
     columns = _columns(raster, tool, size, rows)
     squares = _Squares.of(raster, tool, size, rows, columns)
-    shape = (numbers.size, rows, columns)
-    mean, standard_deviation = np.empty(shape), np.empty(shape)
-    count = np.empty(shape, np.int64)
-    effects = []
-    temperatures = measurement.data["radiance_temperature"]
-    flags = measurement.data["flags"]
-    for index, number in enumerate(numbers):
-        usable = flags[number].values & UNUSABLE == 0
-        values = np.asarray(temperatures[number].values, dtype=np.float64)
-        mean[index], standard_deviation[index], count[index] = squares.statistics(values, usable)
-        effects.append([squares.mean(e) for e in measurement.calibration_effects(int(number))])
+    temperatures, flags = measurement.data["radiance_temperature"], measurement.data["flags"]
+    read = [
+        squares.statistics(
+            np.asarray(temperatures[number].values, np.float64),
+            flags[number].values & UNUSABLE == 0,
+        )
+        for number in numbers
+    ]
+    mean, standard_deviation, count = (np.stack(part) for part in zip(*read, strict=True))
     if not np.isfinite(mean[:, 0]).any():
         raise ValueError(
             f"rake grid: none of the {columns} squares beside the rake face is usable, expected a "
             "chip that touches the tool and is hotter than the camera's lower range limit"
         )
+    effects = [
+        [squares.mean(effect) for effect in measurement.calibration_effects(int(number))]
+        for number in numbers
+    ]
     grid = RakeGrid(
         along=size * (np.arange(columns, dtype=np.float64) + 0.5),
         depth=size * (np.arange(rows, dtype=np.float64) + 0.5),
@@ -309,7 +273,7 @@ def _from_tool(
     numbers: NDArray[np.int64],
     uncertainty: ToolUncertainty,
 ) -> Component:
-    """What the uncertainties of the tool's place change in the means."""
+    """Return the changes of the means by the uncertainties of the tool's place."""
     places = _places_in_squares(grid, measurement.raster.spacing)
     displacements = uncertainty.displacements(grid.tool, places)
     found = np.zeros((len(displacements), *grid.mean.shape))
@@ -320,21 +284,8 @@ def _from_tool(
     return uncertainty.component(grid.tool, np.where(grid.usable, found, np.nan))
 
 
-def _averages(usable: NDArray[np.bool_]) -> "sparse.csr_array":
-    """What makes means over the frames of flat values of shape (frames, ...).
-
-    Of what is not usable in any frame it makes NaN.
-    """
-    frames, squares = len(usable), usable[0].size
-    flat = usable.reshape(frames, squares)
-    count = flat.sum(axis=0)
-    weights = np.where(count > 0, flat / np.maximum(count, 1), np.nan)
-    places = (np.tile(np.arange(squares), frames), np.arange(usable.size))
-    return sparse.csr_array((weights.ravel(), places), shape=(squares, usable.size))
-
-
 def _places_in_squares(grid: RakeGrid, pitch: float) -> Array:
-    """Places spread evenly over each square, about one a pixel, in m, shape (m, n, k, 2)."""
+    """Return places spread evenly over each square, about one a pixel, shape (m, n, k, 2)."""
     count = round(grid.size / pitch)
     steps = grid.size * ((np.arange(count) + 0.5) / count - 0.5)
     normal, direction = np.array(grid.tool.rake_normal), np.array(grid.tool.rake_direction)
@@ -345,7 +296,7 @@ def _places_in_squares(grid: RakeGrid, pitch: float) -> Array:
 
 @dataclass(frozen=True)
 class _Squares:
-    """Which pixels belong to which square, and with what weight."""
+    """Pixels of each square, and their weights."""
 
     shape: tuple[int, int]
     whole: NDArray[np.bool_]
@@ -358,7 +309,8 @@ class _Squares:
 
     @classmethod
     def of(cls, raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> "_Squares":
-        along, across = tool.face_coordinates(_middles(raster))
+        middles = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
+        along, across = tool.face_coordinates(middles)
         column = np.floor(along / size + _ROUNDING).astype(np.int64)
         row = np.floor(across / size + _ROUNDING).astype(np.int64)
         inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
@@ -371,23 +323,22 @@ class _Squares:
     def statistics(
         self, values: Array, usable: NDArray[np.bool_]
     ) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Mean, standard deviation and number of usable pixels, each of `shape`."""
+        """Compute mean, standard deviation and number of usable pixels, each of `shape`."""
         good = usable.ravel()[self.pixel]
         value = np.where(good, values.ravel()[self.pixel], 0.0)
         number = self._sum(np.ones(good.size))
         kept = self._sum(good)
         left_out = (kept < number) | (number == 0) | ~self.whole
-        weighted = self._sum(self.weight * value)
-        mean = np.where(left_out, np.nan, weighted)
+        mean = np.where(left_out, np.nan, self._sum(self.weight * value))
         plain = _ratio(self._sum(value), number)
         away = value - plain[self.square]
-        standard_deviation = np.sqrt(_ratio(self._sum(away**2), number - 1))
-        standard_deviation = np.where(left_out, np.nan, standard_deviation)
-        number_kept = kept.astype(np.int64).reshape(self.shape)
-        return mean.reshape(self.shape), standard_deviation.reshape(self.shape), number_kept
+        deviation = np.sqrt(_ratio(self._sum(away**2), number - 1))
+        deviation = np.where(left_out, np.nan, deviation)
+        count = kept.astype(np.int64)
+        return mean.reshape(self.shape), deviation.reshape(self.shape), count.reshape(self.shape)
 
     def mean(self, values: Array) -> Array:
-        """Mean of values of all pixels, NaN counting as 0, of `shape`."""
+        """Compute the mean of values of all pixels, NaN counting as 0, of `shape`."""
         good = np.nan_to_num(values.ravel()[self.pixel])
         return self._sum(self.weight * good).reshape(self.shape)
 
@@ -407,13 +358,15 @@ def _checked_size(pixels: float, depth: float, raster: Raster) -> float:
     return size
 
 
-def _middles(raster: Raster) -> Array:
-    """Middles of the pixels, x and y in m, shape (y * x, 2)."""
-    return np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
+def _corners(tool: Tool, size: float, rows: int, columns: int) -> Array:
+    """Return the corners of squares in m, shape (rows + 1, columns + 1, 2)."""
+    across, along = size * np.arange(rows + 1), size * np.arange(columns + 1)
+    normal = np.array(tool.rake_normal)
+    return np.asarray(tool.rake_point(along)[None] + across[:, None, None] * normal)
 
 
 def _columns(raster: Raster, tool: Tool, size: float, rows: int) -> int:
-    """Number of squares along the face up to the last that is whole inside the image."""
+    """Return the number of squares along the face up to the last that is whole in the image."""
     left, right, bottom, top = raster.extent
     corners = np.array([[left, bottom], [left, top], [right, bottom], [right, top]])
     furthest = float(tool.face_coordinates(corners)[0].max())
@@ -431,19 +384,16 @@ def _columns(raster: Raster, tool: Tool, size: float, rows: int) -> int:
 
 
 def _whole(raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> NDArray[np.bool_]:
-    """Which squares are whole inside the image, shape (rows, columns)."""
-    across, along = size * np.arange(rows + 1), size * np.arange(columns + 1)
-    normal = np.array(tool.rake_normal)
-    corners = tool.rake_point(along)[None] + across[:, None, None] * normal
+    """Return which squares are whole inside the image, shape (rows, columns)."""
     left, right, bottom, top = raster.extent
     slack = _ROUNDING * size
-    x, y = corners[..., 0], corners[..., 1]
+    x, y = np.moveaxis(_corners(tool, size, rows, columns), -1, 0)
     inside = (x > left - slack) & (x < right + slack) & (y > bottom - slack) & (y < top + slack)
     return np.asarray(inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:])
 
 
 def _centred_weights(off: Array, square: NDArray[np.int64], squares: int) -> Array:
-    """Weights of sum 1 whose weighted middle is the square's, nearest to equal ones."""
+    """Return weights of sum 1 whose weighted middle is the square's, nearest to equal ones."""
     number = np.maximum(np.bincount(square, minlength=squares), 1)
     middle = np.stack([np.bincount(square, part, squares) / number for part in off.T], axis=-1)
     spread = off - middle[square]
@@ -457,7 +407,7 @@ def _centred_weights(off: Array, square: NDArray[np.int64], squares: int) -> Arr
 
 
 def _ratio(total: Array, count: NDArray[np.generic]) -> Array:
-    """Quotient; NaN where the divisor is not positive."""
+    """Return the quotient; NaN where the divisor is not positive."""
     divisor = np.asarray(count, dtype=np.float64)
     quotient = np.full(total.shape, np.nan)
     np.divide(total, divisor, out=quotient, where=divisor > 0)

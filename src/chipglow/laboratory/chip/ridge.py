@@ -41,18 +41,18 @@ class PolarGrid:
     on_raster: NDArray[np.bool_]
     """Whether a place lies between the outermost centres of the raster."""
     off_face: NDArray[np.bool_]
-    """Whether it lies beyond the layer along the rake face, which friction shears and heats too."""
+    """Whether it lies beyond the layer along the rake face, which friction shears and heats."""
     radii: Array
     """Distances from the edge in m."""
     radius_step: float
-    """Their distance in m: 2 µm, or a third of a sample that is over 6 µm wide."""
+    """Step of the radii in m: 2 µm, or a third of a sample that is over 6 µm wide."""
     angle_step: float
     """Angle between neighbours in rad."""
 
     @classmethod
     @lru_cache(maxsize=2)
     def about(cls, tool: Tool, raster: Raster) -> "PolarGrid":
-        """Places about a tool's edge that reach over a raster."""
+        """Return the grid about a tool's edge that covers a raster."""
         edge = tool.edge_point
         left, right, _, top = raster.extent
         reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
@@ -78,11 +78,7 @@ class PolarGrid:
         )
 
     def slopes_from_face(self, values: Array) -> NDArray[np.bool_]:
-        """Where values only fall, at one radius, from the layer along the rake face up to there.
-
-        That is the slope of the layer, however far it reaches, and no ridge: before a ridge the
-        values rise.
-        """
+        """Return where values only fall, at one radius, from the layer along the rake face on."""
         rises = np.zeros_like(self.off_face)
         rises[:, 1:] = self.off_face[:, :-1] & (np.diff(values, axis=1) > 0)
         return ~np.logical_or.accumulate(rises, axis=1)
@@ -95,11 +91,10 @@ class PolarGrid:
         toll: float,
         anywhere: bool = False,
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Path with one angle at every radius that gathers the most.
+        """Find the path, with one angle at every radius, of the largest sum (dynamic programming).
 
-        Dynamic programming over the radii, with a cost of turning. It is done twice: the second
-        time what is well under the strength of the first path costs, else the path would gain by
-        running on where the band has ended.
+        The second time what is well under the strength of the first path costs: else the path would
+        gain by running on where the band has ended.
         """
         first = self._best(score, allowed, ends, anywhere)
         after = score - toll * float(np.median(score[first]))
@@ -128,11 +123,7 @@ class PolarGrid:
 
 @njit(cache=True, nogil=True)
 def _add_up(total, slopes, anywhere):  # type: ignore[no-untyped-def]
-    """Add to each place the greatest sum within reach at the radius before; return its index.
-
-    A step costs a little for turning. Where a path may begin anywhere, one of no gain is not
-    continued.
-    """
+    """Add to each place the greatest sum within reach at the radius before; return its index."""
     radii, angles = total.shape
     came_from = np.full(total.shape, _NOWHERE)
     for i in range(1, radii):
@@ -152,14 +143,14 @@ def _add_up(total, slopes, anywhere):  # type: ignore[no-untyped-def]
 
 
 def off_face(points: Array, tool: Tool) -> NDArray[np.bool_]:
-    """Mask of points beyond the layer along the rake face, which friction shears and heats."""
+    """Return which points lie beyond the layer along the rake face, which friction heats."""
     radius = np.linalg.norm(points - tool.edge_point, axis=-1)
     depth = tool.signed_distance(points[..., 0], points[..., 1])
     return np.asarray(depth > np.minimum(_RAKE_LAYER, _RAKE_LAYER_SHARE * radius))
 
 
 def strongest_part(points: Array, strength: Array, longest: float) -> slice:
-    """The strongest part of a path between stretches without a ridge that are too long."""
+    """Return the strongest part of a path between stretches without a ridge that are too long."""
     weak = strength < _WEAK * np.median(strength)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]]).astype(np.int8)))
     along = arc_length(points)
@@ -172,7 +163,7 @@ def strongest_part(points: Array, strength: Array, longest: float) -> slice:
 
 
 def even_steps(points: Array, step: float) -> Array:
-    """Curve resampled at even steps of arc length in m and smoothed by local parabolas."""
+    """Resample a curve at even steps of arc length in m and smooth it by local parabolas."""
     along = arc_length(points)
     even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
     resampled = np.stack([np.interp(even, along, points[:, axis]) for axis in (0, 1)], axis=1)
@@ -183,10 +174,7 @@ def even_steps(points: Array, step: float) -> Array:
 
 
 def local_parabolas(values: Array, window: int) -> Array:
-    """Least-squares parabolas over windows of even steps, each at its middle (Savitzky-Golay).
-
-    As `scipy.signal.savgol_filter`, whose package takes half a second to be imported.
-    """
+    """Smooth as `scipy.signal.savgol_filter` does, whose package takes half a second to import."""
     half = window // 2
     powers = np.vander(np.arange(-half, half + 1.0), 3)
     fitted = powers @ np.linalg.pinv(powers)
@@ -196,24 +184,32 @@ def local_parabolas(values: Array, window: int) -> Array:
 
 
 def arc_length(points: Array) -> Array:
-    """Distance along a polyline from its first point in m, shape (n,)."""
+    """Return the distance along a polyline from its first point in m, shape (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
 def normals_of(points: Array) -> Array:
-    """Unit normals of a curve, shape (n, 2): those that point up if it runs to the left."""
+    """Return unit normals of a curve, shape (n, 2): those that point up if it runs to the left."""
     tangent = np.gradient(points, axis=0)
     tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
     return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
 
 
-def highest(values: Array, offsets: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Place of each row's largest value by a parabola through it and its neighbours."""
-    peak = values.argmax(axis=1)
+def across_curve(points: Array, offsets: Array) -> Array:
+    """Return places at offsets in m across every point of a curve, shape (n, offsets, 2)."""
+    return np.asarray(points[:, None] + offsets[:, None] * normals_of(points)[:, None])
+
+
+def climbed(points: Array, offsets: Array, profiles: Array) -> Array:
+    """Move each point of a curve to the maximum of its profile, by a parabola, if it has one."""
+    peak = profiles.argmax(axis=1)
     inside = (peak > 0) & (peak < offsets.size - 1)
     peak = np.clip(peak, 1, offsets.size - 2)
     index = np.arange(peak.size)
-    left, top, right = (values[index, peak + k] for k in (-1, 0, 1))
+    left, top, right = (profiles[index, peak + k] for k in (-1, 0, 1))
     bend = left - 2 * top + right
     shift = np.divide(0.5 * (left - right), bend, out=np.zeros_like(bend), where=bend < 0)
-    return offsets[peak] + (offsets[1] - offsets[0]) * shift, inside
+    place = offsets[peak] + (offsets[1] - offsets[0]) * shift
+    # A parabola of nearly equal values may leave its interval.
+    moved = np.where(inside, np.clip(place, offsets[0], offsets[-1]), 0.0)
+    return np.asarray(points + moved[:, None] * normals_of(points))

@@ -27,7 +27,7 @@ class NoContactError(ValueError):
 def contact_length(
     raster: Raster, workpiece: NDArray[np.bool_], tool: Tool, touching: float
 ) -> float:
-    """Length over which the chip touches the rake face."""
+    """Return the length in m over which the chip touches the rake face."""
     step = raster.spacing / 2
     along = np.arange(0.0, np.hypot(raster.rows, raster.columns) * raster.spacing, step)
     foot = tool.rake_point(along)
@@ -46,7 +46,7 @@ def contact_length(
 def contact_temperatures(
     frame: Frame, raster: Raster, tool: Tool, length: float
 ) -> tuple[float, float]:
-    """Mean temperatures within `BESIDE` of the rake face, along the contact."""
+    """Return the mean temperatures in K of chip and tool within `BESIDE` of the contact."""
     x, y = np.meshgrid(raster.x, raster.y)
     distance = tool.signed_distance(x, y)
     along, _ = tool.face_coordinates(np.stack([x, y], axis=-1))
@@ -67,13 +67,11 @@ class Instant:
     band: ShearBand | None
     """Ridge of the strain rate's mean over the exposure; None if undefined."""
     temperatures: Array
-    """Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
-    scene, empty without a band.
-    """
+    """Mean true temperature along the ridge in K, shape (n,); empty without a band."""
 
     @property
     def mean_temperature(self) -> float:
-        """Mean of the temperatures along the ridge in K; NaN without a band."""
+        """Mean of the temperatures in K; NaN without a band."""
         known = self.temperatures[np.isfinite(self.temperatures)]
         return float(known.mean()) if known.size else nan
 
@@ -82,11 +80,8 @@ class Instant:
         """Find the band during an exposure."""
         indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
         rate = _mean(scene, "plastic_strain_rate", indices, weights)
-        workpiece = scene.field("material", indices[len(indices) // 2]) == Material.WORKPIECE
-        assert scene.tool is not None
-        try:
-            band = find_shear_band(scene.raster, rate, workpiece, scene.tool)
-        except NoShearBandError:
+        band = _band(scene, rate, scene.field("material", indices[len(indices) // 2]))
+        if band is None:
             return cls(start, None, np.zeros(0))
         temperature = _mean(scene, "temperature", indices, weights)
         return cls(start, band, sample(temperature, scene.raster, band.ridge.points))
@@ -108,13 +103,11 @@ class Segment:
     momentary_band: ShearBand | None
     """The band in `frame` alone, which motion does not blur; None if undefined."""
     sweep: float
-    """How far the band's middle moves across itself during the exposure, in m; NaN where it is
-    not found in both the first and the last frame.
-    """
+    """Travel in m of the band's middle across itself during the exposure; NaN if undefined."""
 
     @property
     def moment(self) -> ShearBand:
-        """The band at one moment, where there is one, else that over the exposure."""
+        """The band at one moment if there is one, else that over the exposure."""
         return self.momentary_band or self.band
 
     @property
@@ -124,7 +117,7 @@ class Segment:
 
     @classmethod
     def of(cls, scene: Scene, instant: Instant, duration: float, touching: float) -> "Segment":
-        """The segment at an instant that has a band."""
+        """Find the contact and the momentary band at an instant that has a band."""
         assert scene.tool is not None and instant.band is not None
         indices, _ = frame_weights(scene.times, scene.frame_spacing, instant.start, duration)
         frame = scene.frame(indices[len(indices) // 2])
@@ -135,7 +128,7 @@ class Segment:
             tool=scene.tool,
             band=instant.band,
             contact_length=contact_length(scene.raster, workpiece, scene.tool, touching),
-            momentary_band=_momentary_band(scene.raster, frame, scene.tool),
+            momentary_band=_band(scene, frame.needed("plastic_strain_rate"), frame.material),
             sweep=_sweep(scene, indices, instant.band),
         )
 
@@ -147,16 +140,18 @@ def _mean(scene: Scene, field_name: str, indices: range, weights: Array) -> Arra
     return total
 
 
-def _momentary_band(raster: Raster, frame: Frame, tool: Tool) -> ShearBand | None:
-    workpiece = frame.material == Material.WORKPIECE
+def _band(
+    scene: Scene, rate: NDArray[np.floating], material: NDArray[np.integer]
+) -> ShearBand | None:
+    assert scene.tool is not None
     try:
-        return find_shear_band(raster, frame.needed("plastic_strain_rate"), workpiece, tool)
+        return find_shear_band(scene.raster, rate, material == Material.WORKPIECE, scene.tool)
     except NoShearBandError:
         return None
 
 
 def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
-    """Travel of the largest strain rate on the line across the band's middle."""
+    """Return the travel of the largest strain rate on the line across the band's middle."""
     line = band.across(40e-6, scene.raster.spacing / 2)
     places = []
     for index in (indices[0], indices[-1]):

@@ -13,19 +13,16 @@ from scipy.ndimage import gaussian_filter1d
 from chipglow.quantities import Array
 
 _LEAST_PROMINENCE: Final = 0.3
-"""Least rise of the autocorrelation from the valley before its first peak to that peak: in a few
-unequal segments the peak is low, but the valley deep; noise has neither."""
+"""Least rise of the autocorrelation from the valley before its first peak to that peak."""
 
 _STANDING_OUT: Final = 0.35
 """Least prominence of the peaks of unequal segments over the range of the force."""
 
 _LEAST_SMOOTH: Final = 0.7
-"""Least fraction of its range that a force with unequal segments keeps when it is smoothed over a
-quarter of the time in which it forgets itself: noise keeps less."""
+"""Least fraction of its range that a force with unequal segments keeps when it is smoothed."""
 
 _LEAST_SWING: Final = 0.1
-"""Least range of the force, from 5 % to 95 % of its values, over its mean: less is the ripple of a
-continuous chip."""
+"""Least range of the force over its mean: less is the ripple of a continuous chip."""
 
 
 @dataclass(frozen=True)
@@ -33,17 +30,13 @@ class Segmentation:
     """Segments in a force history."""
 
     start: float
-    """Time in s from which the history counts: what is before is the first build-up of the chip."""
+    """Time in s from which the history counts, after the first build-up of the chip."""
     period: float
     """Mean time from one force peak to the next in s; NaN with less than two peaks."""
     period_uncertainty: float
-    """Standard uncertainty of the period in s: the deviation of the intervals over the root of
-    their number; NaN for less than two intervals.
-    """
+    """Standard uncertainty of the period in s; NaN for less than two intervals."""
     correlation_period: float
-    """The period in s from the autocorrelation of the whole history, as a check; NaN where
-    segments are too unequal for it.
-    """
+    """Period in s from the autocorrelation, as a check; NaN if the segments are too unequal."""
     peaks: Array
     """Times of the force peaks in s."""
     cutting_mean: float
@@ -62,16 +55,12 @@ class Segmentation:
 def segmentation(
     time: ArrayLike, cutting_force: ArrayLike, thrust_force: ArrayLike
 ) -> Segmentation:
-    """Period and swing of the segments from the history of the forces.
+    """Compute period and swing of the segments from the history of the forces.
 
-    The history counts from where the cutting force first reaches the median of its second half,
-    and from a fifth of its duration on at the earliest. A force whose range is under a tenth of its
-    mean has no segments: a continuous chip ripples, by some per cent.
-    The autocorrelation of what remains gives a first period. Segments that are too unequal for
-    that (105 and 75 us, say) show as three or more peaks that stand out by a third of the range
-    when the force is smoothed over a quarter of the time in which it forgets itself. Then the
-    force is smoothed over a fifteenth of that period, and its peaks, at least six tenths of a
-    period apart and a fifth of the swing high, give the period and its uncertainty.
+    The autocorrelation of the history after the build-up gives a first period; where segments are
+    too unequal for that, three or more peaks of the force smoothed over a quarter of its
+    correlation time. Then the force is smoothed over a fifteenth of that period, and its peaks, at
+    least six tenths of a period apart and a fifth of the swing high, count.
     """
     times = np.asarray(time, dtype=np.float64)
     cutting = np.asarray(cutting_force, dtype=np.float64)
@@ -111,19 +100,22 @@ def segmentation(
 
 
 def end_of_build_up(cutting_force: Array) -> int:
-    """Index from which a history of the cutting force counts: see `segmentation`."""
+    """Return the index at which the cutting force reaches the median of its second half.
+
+    It is at least a fifth of the history.
+    """
     later = cutting_force[cutting_force.size // 2 :]
     return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
 
 
 def _range(force: Array) -> float:
-    """From 5 % to 95 % of the values."""
+    """Return the range from 5 % to 95 % of the values."""
     low, high = np.percentile(force, [5.0, 95.0])
     return float(high - low)
 
 
 def _correlation(swing: Array) -> Array:
-    """Autocorrelation up to half of the history, slightly smoothed; 0 for a constant force."""
+    """Compute the autocorrelation up to half of the history; 0 for a constant force."""
     spectrum = np.fft.rfft(swing, 2 * swing.size)
     raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
     if not raw[0] > 0:
@@ -133,7 +125,7 @@ def _correlation(swing: Array) -> Array:
 
 
 def _correlation_period(correlation: Array, step: float) -> float:
-    """Lag of the first clear peak of the unbiased autocorrelation; NaN if undefined."""
+    """Return the lag of the first clear peak of the autocorrelation; NaN if undefined."""
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
@@ -143,7 +135,7 @@ def _correlation_period(correlation: Array, step: float) -> float:
 
 
 def _unequal_period(swing: Array, correlation: Array, step: float) -> float:
-    """Mean interval between the peaks that stand out; NaN if there are less than three."""
+    """Return the mean interval between the peaks that stand out; NaN for less than three."""
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
@@ -162,7 +154,7 @@ def _peaks(force: Array, period: float) -> NDArray[np.int64]:
 
 
 def _swing(force: Array, peaks: NDArray[np.int64]) -> float:
-    """Mean height of the peaks over the valleys between them."""
+    """Return the mean height of the peaks over the valleys between them."""
     if peaks.size < 2:
         return nan
     heights = [max(force[a], force[b]) - force[a:b].min() for a, b in pairwise(peaks)]

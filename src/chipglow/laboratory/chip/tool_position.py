@@ -1,4 +1,4 @@
-"""How uncertain the place of a tool is, and what that makes uncertain."""
+"""Uncertainty of the place of a tool, and of what is read by the tool."""
 
 import hashlib
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ TOOL_BUDGET: Final = ("tool along", "tool across", "tool angle")
 
 
 def tool_of(measurement: Measurement, given: Tool | None = None) -> Tool:
-    """The given tool, or else the measurement's own."""
+    """Return the given tool, or else the measurement's own."""
     tool = measurement.tool if given is None else given
     if tool is None:
         raise ValueError(
@@ -45,9 +45,7 @@ class ToolUncertainty:
     angle: float = 0.0
     """Of the rake angle in rad."""
     pivot: float = 0.0
-    """Where on the rake face its place and its angle are independent: the distance in m up the
-    straight face from its lower end.
-    """
+    """Distance in m up the straight face at which its place and its angle are independent."""
 
     def __post_init__(self) -> None:
         for name in ("along", "across", "angle"):
@@ -58,29 +56,26 @@ class ToolUncertainty:
             raise ValueError(f"tool uncertainty: pivot is {self.pivot!r} m, expected a finite one")
 
     def displacements(self, tool: Tool, points: Array) -> Array:
-        """How far points that are fixed to the tool move, one standard uncertainty at a time."""
+        """Return the moves of points fixed to the tool by each standard uncertainty, in m."""
         direction, normal = np.array(tool.rake_direction), np.array(tool.rake_normal)
         offset = points - tool.rake_point(self.pivot)
         up, out = offset @ direction, offset @ normal
         turned = out[..., None] * direction - up[..., None] * normal
-        moved = np.broadcast_to(self.along * direction, points.shape)
-        return np.stack(
-            [moved, np.broadcast_to(self.across * normal, points.shape), self.angle * turned]
-        )
+        moves = (self.along * direction, self.across * normal, self.angle * turned)
+        return np.stack([np.broadcast_to(move, points.shape) for move in moves])
 
     def component(self, tool: Tool, effects: Iterable[Array]) -> Component:
-        """The component that the place of a tool makes."""
+        """Return the component ``tool`` with the effects of each standard uncertainty."""
         columns = np.stack([one.ravel() for one in effects], axis=1)
         identity = hashlib.sha256(repr((tool, self)).encode()).hexdigest()[:16]
         return Component(Cause(TOOL, identity, len(TOOL_BUDGET), parts=TOOL_BUDGET), columns)
 
 
 def contribution(image: ThermalImage, points: Array, displacement: Array) -> Array:
-    """What a displacement by one standard uncertainty changes in what is read.
+    """Return the change of the temperature by a displacement of one standard uncertainty.
 
-    Half the difference between the temperatures on either side: the uncertainty of the position
-    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one side is
-    outside the image, the difference from the other.
+    It is half the difference between the temperatures on either side (JCGM 100, 5.1.3, note 2);
+    where one side is outside the image, the difference to the other.
     """
     (behind, no_behind), (here, _), (ahead, no_ahead) = (
         _read(image, points + side * displacement) for side in (-1, 0, 1)
@@ -90,7 +85,7 @@ def contribution(image: ThermalImage, points: Array, displacement: Array) -> Arr
 
 
 def _read(image: ThermalImage, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Temperatures in K, of the nearest pixel outside the image, and which are outside."""
+    """Return temperatures in K, of the nearest pixel outside the image, and which are outside."""
     row, column = image.index(points)
     rows, columns = image.temperature.shape
     outside = (row < 0) | (row > rows - 1) | (column < 0) | (column > columns - 1)

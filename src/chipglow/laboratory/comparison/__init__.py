@@ -1,24 +1,15 @@
 """Comparison of measurement and simulation within their uncertainties."""
 
 from chipglow.laboratory.comparison.comparison import (
-    Comparison,
-    Fit,
-    PlaceResult,
-    Readings,
-    StatedUncertainties,
-    compare,
-    normalised_error,
+    Comparison as Comparison,
+    Fit as Fit,
+    PlaceResult as PlaceResult,
+    Readings as Readings,
+    StatedUncertainties as StatedUncertainties,
+    compare as compare,
+    normalised_error as normalised_error,
 )
-from chipglow.laboratory.comparison.file import labelled_simulations, write_comparison
-
-__all__ = [
-    "Comparison",
-    "Fit",
-    "PlaceResult",
-    "Readings",
-    "StatedUncertainties",
-    "compare",
-    "labelled_simulations",
-    "normalised_error",
-    "write_comparison",
-]
+from chipglow.laboratory.comparison.file import (
+    labelled_simulations as labelled_simulations,
+    write_comparison as write_comparison,
+)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, radians, sqrt
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import FrameScatter
+from chipglow.laboratory.chip.frames import frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -44,10 +44,9 @@ _SAME_ANGLE: Final = radians(0.1)
 
 
 def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
-    """E_n number: magnitude of the difference over the expanded uncertainty of the difference.
+    """Return E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043), k = `COVERAGE`.
 
-    E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043), k = `COVERAGE`. Up to 1 the
-    two agree. What both have in common is not in the uncertainty of their difference.
+    The two agree up to 1. Errors that both have in common cancel in their difference.
     """
     away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -56,15 +55,15 @@ def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
 
 @dataclass(frozen=True)
 class Fit:
-    """How one simulation fits the measurement at one place."""
+    """Fit of one simulation to the measurement at one place."""
 
     label: str
     bias: float
-    """Mean of simulated less measured in K."""
+    """Mean of simulated minus measured in K."""
     bias_uncertainty: float
-    """Its standard uncertainty in K."""
+    """Standard uncertainty of the bias in K."""
     rms: float
-    """Root of the mean square of the differences in K."""
+    """Root mean square of the differences in K."""
     agreeing: int
     """Number of values with E_n up to 1."""
     count: int
@@ -73,16 +72,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class PlaceResult:
-    """Which simulation fits best at one place."""
+    """Fits of all simulations at one place."""
 
     place: str
-    """Where, in words."""
     fits: tuple[Fit, ...]
-    """One for each simulation, in the given order."""
     best: int
-    """Number of the one with the least root mean square."""
+    """Index of the fit with the least root mean square."""
     confidence: float
-    """Fraction of the draws of all uncertainties in which it has the least one."""
+    """Fraction of the draws of all uncertainties in which it is the least."""
 
     @property
     def is_sure(self) -> bool:
@@ -91,36 +88,29 @@ class PlaceResult:
 
     @property
     def sentence(self) -> str:
-        """Which simulation fits here, in one sentence from the numbers."""
-        best = self.fits[self.best]
-        others = [fit for i, fit in enumerate(self.fits) if i != self.best]
-        what = f"{_warmth(best)}, RMS {best.rms:.0f} K, {_agreement(best)}"
+        """Which simulation fits best here, in one sentence."""
+        best, place = self.fits[self.best], self.place[0].upper() + self.place[1:]
+        others = [fit for fit in self.fits if fit is not best]
+        result = f"{_fit_text(best)} values agree (E_n up to 1)"
         if not others:
-            return f"{_upper(self.place)} {best.label} is {what}."
-        rest = "; ".join(
-            f"{fit.label} is {_warmth(fit)}, RMS {fit.rms:.0f} K, {fit.agreeing} of {fit.count}"
-            for fit in others
-        )
+            return f"{place} {best.label} is {result}."
+        result = "; ".join([result, *(f"{fit.label} is {_fit_text(fit)}" for fit in others)])
         how = f"{100 * self.confidence:.3g} % of the draws of the uncertainties"
         if self.is_sure:
-            return f"{_upper(self.place)} {best.label} fits best (in {how}): it is {what}; {rest}."
+            return f"{place} {best.label} fits best (in {how}): it is {result}."
         return (
-            f"{_upper(self.place)} the sets cannot be distinguished ({best.label} is nearest, in "
-            f"{how}): {best.label} is {what}; {rest}."
+            f"{place} the sets cannot be distinguished ({best.label} is nearest, in {how}): "
+            f"{best.label} is {result}."
         )
 
 
-def _upper(text: str) -> str:
-    return text[0].upper() + text[1:]
-
-
-def _warmth(fit: Fit) -> str:
+def _fit_text(fit: Fit) -> str:
     word = "too hot" if fit.bias > 0 else "too cold"
-    return f"{abs(fit.bias):.0f} K {word} (± {COVERAGE * fit.bias_uncertainty:.0f} K)"
-
-
-def _agreement(fit: Fit) -> str:
-    return f"{fit.agreeing} of {fit.count} values agree (E_n up to 1)"
+    expanded = COVERAGE * fit.bias_uncertainty
+    return (
+        f"{abs(fit.bias):.0f} K {word} (± {expanded:.0f} K), RMS {fit.rms:.0f} K, "
+        f"{fit.agreeing} of {fit.count}"
+    )
 
 
 @dataclass(frozen=True)
@@ -129,15 +119,15 @@ class Readings:
 
     place: str
     distance: Array
-    """Up the rake face, or from the cutting edge along the band, in m, shape (n,)."""
+    """Distance up the rake face, or from the cutting edge along the band, in m, shape (n,)."""
     measured: Estimate
     simulated: tuple[Estimate, ...]
-    """Of the shape of the measured ones: (n,), or (m, n) with a depth."""
+    """Of the shape of `measured`: (n,), or (m, n) with a depth."""
     depth: Array | None = None
     """Depth in the chip in m, shape (m,); None along the band."""
 
     def to_frame(self, labels: Sequence[str]) -> pd.DataFrame:
-        """Every value of each simulation; one row each."""
+        """Return every value of each simulation; one row each."""
         measured, unknown = self.measured, np.full(self.measured.shape, np.nan)
         place = {"along_um": unknown, "depth_um": unknown, "distance_um": unknown + self.distance}
         if self.depth is not None:
@@ -166,19 +156,18 @@ class Comparison:
 
     labels: tuple[str, ...]
     grid: Readings | None
-    """At the rake face; None if there is nothing to compare."""
     band: Readings | None
-    """Along the shear band; None if there is nothing to compare."""
+    """Readings at the rake face and along the shear band, where both sides have some."""
     places: tuple[PlaceResult, ...]
     notes: Notes
 
     def to_frame(self) -> pd.DataFrame:
-        """Every value of each simulation; one row each."""
+        """Return every value of each simulation; one row each."""
         readings = [one for one in (self.grid, self.band) if one is not None]
         return pd.concat([one.to_frame(self.labels) for one in readings], ignore_index=True)
 
     def fit_frame(self) -> pd.DataFrame:
-        """How each simulation fits at each place; one row each."""
+        """Return the fit of each simulation at each place; one row each."""
         return pd.DataFrame(
             {
                 "place": result.place.rstrip(","),
@@ -195,7 +184,7 @@ class Comparison:
 
     @property
     def statement(self) -> str:
-        """Which simulation fits where, as the paper's conclusion says it."""
+        """Which simulation fits best where, in the form of the paper's conclusion."""
         if len(self.labels) == 1:
             agreeing = sum(result.fits[0].agreeing for result in self.places)
             count = sum(result.fits[0].count for result in self.places)
@@ -216,19 +205,15 @@ class StatedUncertainties:
     """Uncertainties that the files do not state."""
 
     temperature: float = 0.0
-    """Standard uncertainty of the measured radiance temperature in K, common to all values, for a
-    measurement without its own.
-    """
+    """Standard uncertainty of the measured radiance temperature in K, common to all values."""
     emissivity: float = 0.0
     """Relative standard uncertainty of the emissivities that the simulations assume."""
     position: float | None = None
-    """Standard uncertainty of positions in the measured image in m, of each value by itself. By
-    default that of a pixel; for squares at the rake face only where `tool` is not stated.
+    """Standard uncertainty of the position of each measured value in m. By default that of a pixel;
+    for squares at the rake face only where `tool` is not stated.
     """
     tool: ToolUncertainty | None = None
-    """Uncertainty of the tool's place in the measured image, common to all values, such as that
-    of a `FoundTool`.
-    """
+    """Uncertainty of the tool's place in the measured image, common to all values."""
 
     def __post_init__(self) -> None:
         for name in ("temperature", "emissivity", "position"):
@@ -255,8 +240,7 @@ def compare(
         Frames of the simulated camera by name, such as one for each set of emissivities. Pitch and
         grid of pixels may differ from the measured ones.
     tool : Tool
-        The tool, in the measurement's coordinates. A simulation that states its own is placed by
-        that.
+        The tool, in the measurement's coordinates. A simulation is placed by its own tool, if any.
     curve : ndarray, optional
         Polyline along which to read the shear band in all files, from the cutting edge outward, in
         the measurement's coordinates in m, shape (k, 2). By default the ridge of each frame.
@@ -273,18 +257,14 @@ def compare(
 
     Notes
     -----
-    Squares of 3 measured pixels stand on the rake face in all images alike. Along the shear band
-    values at the same distance from the cutting edge are compared, as means over the frames in
-    which the band is developing or fully developed, as in the paper.
+    Squares of 3 measured pixels on the rake face are compared, and along the shear band values at
+    the same distance from the cutting edge, as means over the frames in which the band is
+    developing or fully developed, as in the paper.
 
     The measured values have the uncertainty of the calibration (or a stated one), of the position,
-    of the tool's place and of the mean over the frames, the simulated ones that of the emissivity
-    and of the mean over the frames. A tool that is elsewhere moves the squares, the cutting edge
-    from which the distance along a found ridge counts, and a given curve's place in the
-    simulations. Which set fits best is the one with the least root mean square of the differences;
-    its confidence is found by drawing all values from their uncertainties: what is
-    systematic, and each part of the tool's place, with one deviate a file, what is random with one
-    a value.
+    of the tool's place and of the mean over the frames; the simulated ones that of the emissivity
+    and of the mean over the frames. The best set has the least root mean square of the differences;
+    its confidence is found by drawing all values from their uncertainties.
     """
     if not simulated:
         raise ValueError("comparison: no simulation, expected 1 or more")
@@ -300,13 +280,10 @@ def compare(
             "The measurement does not state the uncertainty of its calibration and none is given, "
             "so the E_n are too large."
         )
-    allowed = max(_SAME_ANGLE, COVERAGE * stated.tool.angle if stated.tool else 0.0)
-    tools = {
-        label: _tool_of(label, item, tool, allowed, notes) for label, item in simulated.items()
-    }
-    grid = _compare_grid(measured, simulated, tool, tools, stated, notes)
-    files = [("measured", measured, tool, reference)]
-    files += [(label, item, tools[label], None) for label, item in simulated.items()]
+    files = [_File("measured", measured, tool, stated.tool, reference)]
+    for label, item in simulated.items():
+        files.append(_File(label, item, _tool_of(label, item, files[0], notes)))
+    grid = _compare_grid(files, stated, notes)
     band = _compare_band(files, curve, stated, notes)
     places = _places(tuple(simulated), grid, band)
     if not places:
@@ -315,44 +292,56 @@ def compare(
     return Comparison(tuple(simulated), grid, band, places, notes)
 
 
-def _tool_of(label: str, simulated: Measurement, tool: Tool, allowed: float, notes: Notes) -> Tool:
+class _File(NamedTuple):
+    """The measurement or a simulation, with its tool."""
+
+    name: str
+    item: Measurement
+    tool: Tool
+    uncertainty: ToolUncertainty | None = None
+    reference: int | None = None
+
+
+def _tool_of(label: str, simulated: Measurement, measured: _File, notes: Notes) -> Tool:
     own = simulated.tool
     if own is None:
         notes.assumed.append(f"{label}: The file states no tool; that of the measurement is used.")
-        return tool
-    turn = abs(own.rake_angle - tool.rake_angle)
-    if turn > allowed:
+        return measured.tool
+    turn = abs(own.rake_angle - measured.tool.rake_angle)
+    spread = measured.uncertainty.angle if measured.uncertainty else 0.0
+    if turn > max(_SAME_ANGLE, COVERAGE * spread):
         notes.warnings.append(f"The rake angle of {label} differs by {degrees(turn):.2g} degrees.")
     return own
 
 
 def _compare_grid(
-    measured: Measurement,
-    simulated: Mapping[str, Measurement],
-    tool: Tool,
-    tools: Mapping[str, Tool],
-    stated: StatedUncertainties,
-    notes: Notes,
+    files: Sequence[_File], stated: StatedUncertainties, notes: Notes
 ) -> Readings | None:
-    size = PIXELS * measured.raster.spacing
+    """Read the squares of the measurement, which comes first, and of the simulations."""
+    size = PIXELS * files[0].item.raster.spacing
     try:
-        base = rake_grid(measured, tool, PIXELS, max(DEPTH, size), uncertainty=stated.tool)
-        grids = {
-            label: rake_grid(item, tools[label], size / item.raster.spacing, max(DEPTH, size))
-            for label, item in simulated.items()
-        }
+        grids = [
+            rake_grid(
+                one.item,
+                one.tool,
+                size / one.item.raster.spacing,
+                max(DEPTH, size),
+                uncertainty=one.uncertainty,
+            )
+            for one in files
+        ]
     except ValueError as error:
         notes.warnings.append(f"The rake face is left out: {error}.")
         return None
-    if base.times.size < _FEW:
-        notes.warnings.append(_few_frames("measured", base.times.size))
-    columns = min(grid.along.size for grid in (base, *grids.values()))
-    base = base.up_to(columns)
+    if grids[0].times.size < _FEW:
+        notes.warnings.append(_few_frames("measured", grids[0].times.size))
+    columns = min(grid.along.size for grid in grids)
+    base, *others = (grid.up_to(columns) for grid in grids)
     readings = [
-        _assumed(item, grids[label].up_to(columns).frame_estimate, stated)
-        for label, item in simulated.items()
+        _assumed(one.item, grid.frame_estimate, stated)
+        for one, grid in zip(files[1:], others, strict=True)
     ]
-    own = _measured_squares(measured, base, stated)
+    own = _measured_squares(files[0].item, base, stated)
     return Readings("rake face", base.along, own, tuple(readings), base.depth)
 
 
@@ -374,12 +363,12 @@ def _measured_squares(
 
 
 def _stated(found: Estimate, stated: StatedUncertainties) -> Estimate:
-    """What was measured, with the stated uncertainty that all values have in common."""
+    """Add the stated uncertainty that all measured values have in common."""
     return found.with_component("stated", stated.temperature, independent="common")
 
 
 def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertainties) -> Estimate:
-    """What was simulated, with what the uncertainty of the assumed emissivity makes."""
+    """Add the uncertainty of the assumed emissivity to simulated values."""
     spread = np.zeros(found.shape)
     if stated.emissivity > 0.0:
         # Kelvins of radiance temperature for a radiance that is off by its own amount.
@@ -408,44 +397,39 @@ def _few_frames(name: str, count: int) -> str:
 
 
 def _compare_band(
-    files: Sequence[tuple[str, Measurement, Tool, int | None]],
-    curve: Array | None,
-    stated: StatedUncertainties,
-    notes: Notes,
+    files: Sequence[_File], curve: Array | None, stated: StatedUncertainties, notes: Notes
 ) -> Readings | None:
-    """The band of the measurement, which comes first, and of the simulations."""
-    _, measured, tool, _ = files[0]
-    position = _position(measured, stated)
-    profiles: list[BandProfile] = []
-    for name, item, placed, reference in files:
-        moved = None if curve is None else curve + (placed.edge_point - tool.edge_point)
+    """Read the band of the measurement, which comes first, and of the simulations."""
+    _, measured, tool, uncertainty, _ = files[0]
+    profiles = []
+    for one in files:
+        moved = None if curve is None else curve + (one.tool.edge_point - tool.edge_point)
         try:
             profiles.append(
                 band_profile(
-                    item,
-                    placed,
+                    one.item,
+                    one.tool,
                     curve=moved,
-                    reference=reference,
-                    position=position,
-                    # The measurement comes first; a simulation knows its tool.
-                    uncertainty=None if profiles else stated.tool,
+                    reference=one.reference,
+                    position=_position(measured, stated),
+                    uncertainty=one.uncertainty,
                 )
             )
         except NoShearBandError as error:
-            notes.warnings.append(f"The shear band is left out: {name}: {error}.")
+            notes.warnings.append(f"The shear band is left out: {one.name}: {error}.")
             return None
-    if curve is not None and stated.tool is not None:
-        profiles[0] = _laid_by_the_edge(measured, profiles[0], tool, stated.tool)
+    if curve is not None and uncertainty is not None:
+        profiles[0] = _laid_by_the_edge(measured, profiles[0], tool, uncertainty)
     step = measured.raster.spacing
     last = max(float(profile.distance[-1]) for profile in profiles)
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
-    names = [name for name, *_ in files]
     own, *others = [
-        _along(name, p, distance, notes) for name, p in zip(names, profiles, strict=True)
+        _along(one.name, profile, distance, notes)
+        for one, profile in zip(files, profiles, strict=True)
     ]
     readings = [
-        _assumed(item, found.without(POSITION), stated)
-        for (_, item, *_), found in zip(files[1:], others, strict=True)
+        _assumed(one.item, found.without(POSITION), stated)
+        for one, found in zip(files[1:], others, strict=True)
     ]
     return Readings("shear band", distance, _stated(own, stated), tuple(readings))
 
@@ -453,10 +437,9 @@ def _compare_band(
 def _laid_by_the_edge(
     measured: Measurement, profile: BandProfile, tool: Tool, uncertainty: ToolUncertainty
 ) -> BandProfile:
-    """The profile with what it makes that the edge places a given curve on the simulations.
+    """Replace the effect of the tool's place by that of a given curve that is placed by the edge.
 
-    There the curve is off by as much as the edge is here, across itself too, and the distances
-    that are compared are the same: what it would read here stands for all simulations.
+    On the simulations the curve is off by as much as the edge is here, across itself too.
     """
     moves = uncertainty.displacements(tool, tool.edge_point)
     found = np.full((len(moves), *profile.temperature.shape), np.nan)
@@ -471,10 +454,7 @@ def _laid_by_the_edge(
 
 
 def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Estimate:
-    """Means over the frames at distances from the edge.
-
-    Where a single frame reaches, the variance between frames is the mean of it where several do.
-    """
+    """Return means over the frames at distances from the edge."""
     used = profile.in_place
     warnings = [text for text in profile.notes.warnings if text != CALIBRATION_UNKNOWN]
     own = Notes(profile.notes.assumed, warnings).about(name)
@@ -488,49 +468,38 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
 
     def read(field: Array) -> Array:
         rows = field.reshape(profile.temperature.shape)[used]
-        return np.stack([_at(distance, profile.distance, row) for row in rows])
+        # NaN next to a NaN and beyond the ends.
+        ends = {"left": np.nan, "right": np.nan}
+        return np.stack([np.interp(distance, profile.distance, row, **ends) for row in rows])
 
     frames = read(profile.temperature)
-    known = np.isfinite(frames)
+    systematic = profile.estimate.without(POSITION)
+    components = tuple(
+        Component(one.cause, np.stack([read(part).ravel() for part in one.effects.T], axis=1))
+        for one in systematic.components
+    )
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
-    position = _mean(read(profile.estimate.contribution(POSITION)), known)
-    systematic = [
-        Component(one.cause, np.stack([_mean(read(e), known) for e in one.effects.T], axis=1))
-        for one in profile.estimate.without(POSITION).components
-    ]
-    found = Estimate(_mean(frames, known), tuple(systematic), profile.estimate.unevaluated)
-    found = found.with_component(POSITION, position, independent="per element")
-    return replace(found, components=(*found.components, _scatter(frames, known).component()))
+    position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
+    mean = frame_mean(Estimate(frames, components, systematic.unevaluated))
+    mean = mean.with_component(POSITION, position.values, independent="per element")
+    return replace(mean, components=(*mean.components, _scatter(frames)))
 
 
-def _scatter(frames: Array, known: NDArray[np.bool_]) -> FrameScatter:
-    """How the frames differ, where they are known."""
-    count, scatter = known.sum(axis=0), FrameScatter.of(frames)
+def _scatter(frames: Array) -> Component:
+    """Return the scatter of the frames; where only one reaches, it is the mean of the others'."""
+    scatter, count = frame_scatter(frames), np.isfinite(frames).sum(axis=0)
     several = count > 1
     if several.any() and (count == 1).any():
-        patterns = scatter.patterns.copy()
-        squares = count * scatter.standard_deviation**2
-        patterns[0, count == 1] = sqrt(float(squares[several].mean()))
-        scatter = replace(scatter, patterns=patterns)
+        effects = scatter.effects.copy()
+        effects[count == 1, 0] = sqrt(float((count * scatter.variance)[several].mean()))
+        scatter = replace(scatter, effects=effects)
     return scatter
-
-
-def _at(distance: Array, own: Array, values: Array) -> Array:
-    """Values at other distances; NaN next to a NaN and beyond the ends."""
-    return np.interp(distance, own, values, left=np.nan, right=np.nan)
-
-
-def _mean(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Mean over the first axis of what is known; NaN where nothing is."""
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.asarray(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
 
 
 def _places(
     labels: Sequence[str], grid: Readings | None, band: Readings | None
 ) -> tuple[PlaceResult, ...]:
-    """Which simulation fits where both have values."""
+    """Return the fits at each place where measurement and simulations have values."""
     results: list[PlaceResult | None] = []
     if grid is not None and grid.depth is not None:
         face = np.zeros(grid.measured.values.shape, dtype=np.bool_)
@@ -557,7 +526,7 @@ def _judged(
     pair: Readings,
     where: NDArray[np.bool_],
 ) -> PlaceResult | None:
-    """The fits at one place; None where not all files have a value together."""
+    """Return the fits at one place; None where not all files have a value together."""
     common = where & np.isfinite(pair.measured.values)
     for item in pair.simulated:
         common &= np.isfinite(item.values)
@@ -584,7 +553,7 @@ def _fit(label: str, measured: Estimate, simulated: Estimate) -> Fit:
 
 
 def _confidence(measured: Estimate, simulated: Sequence[Estimate], best: int) -> float:
-    """Fraction of the draws of all uncertainties in which the best set stays the best."""
+    """Return the fraction of the draws of all uncertainties in which the best set stays so."""
     base, *others = draw([measured, *simulated], _DRAWS, np.random.default_rng(_SEED))
     rms = [((other - base) ** 2).mean(axis=1) for other in others]
     return float((np.argmin(rms, axis=0) == best).mean())

@@ -1,4 +1,4 @@
-"""Measured and simulated temperatures and their difference (the paper's Figures 7 and 9)."""
+"""Figure of measured and simulated temperatures and their difference (the paper's 7 and 9)."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -70,7 +70,7 @@ def _draw_values(
 
 
 def _draw_deeper(axes: Axes, grid: Readings) -> None:
-    """Differences of the rows behind the first, without bars."""
+    """Draw the differences of the rows behind the first, without bars."""
     assert grid.depth is not None
     rows = grid.depth.size
     for row in range(1, rows):

@@ -1,66 +1,40 @@
 """Emissivity from images of heated objects, and true temperatures by it."""
 
 from chipglow.laboratory.emissivity.emissivity import (
-    EmissivityLine,
-    EmissivityMap,
-    Heating,
-    RegionEmissivity,
-    determine_emissivity,
-    emissivity_covariance,
-    emissivity_line,
+    EmissivityLine as EmissivityLine,
+    EmissivityMap as EmissivityMap,
+    Heating as Heating,
+    RegionEmissivity as RegionEmissivity,
+    determine_emissivity as determine_emissivity,
+    emissivity_covariance as emissivity_covariance,
+    emissivity_line as emissivity_line,
 )
 from chipglow.laboratory.emissivity.file import (
-    EmissivityMapFile,
-    MeasuredEmissivity,
-    SurfaceFile,
-    emissivity_trend,
-    read_emissivity_lines,
-    read_emissivity_map,
-    write_emissivity,
+    EmissivityMapFile as EmissivityMapFile,
+    MeasuredEmissivity as MeasuredEmissivity,
+    SurfaceFile as SurfaceFile,
+    emissivity_trend as emissivity_trend,
+    read_emissivity_lines as read_emissivity_lines,
+    read_emissivity_map as read_emissivity_map,
+    write_emissivity as write_emissivity,
 )
 from chipglow.laboratory.emissivity.region_emissivities import (
-    RegionEmissivities,
-    determine_emissivities,
+    RegionEmissivities as RegionEmissivities,
+    determine_emissivities as determine_emissivities,
 )
-from chipglow.laboratory.emissivity.regions import RegionSection, load_regions
+from chipglow.laboratory.emissivity.regions import (
+    RegionSection as RegionSection,
+    load_regions as load_regions,
+)
 from chipglow.laboratory.emissivity.study_sections import (
-    measured_features,
-    measured_text,
-    surface_text,
+    measured_features as measured_features,
+    measured_text as measured_text,
+    surface_text as surface_text,
 )
 from chipglow.laboratory.emissivity.temperature import (
-    ReflectedTemperature,
-    RegionTemperatures,
-    TrueTemperature,
-    true_temperature,
-    true_temperatures,
+    RegionTemperatures as RegionTemperatures,
+    TrueTemperature as TrueTemperature,
+    reflected_temperature as reflected_temperature,
+    true_temperature as true_temperature,
+    true_temperatures as true_temperatures,
 )
-
-__all__ = [
-    "EmissivityLine",
-    "EmissivityMap",
-    "EmissivityMapFile",
-    "Heating",
-    "MeasuredEmissivity",
-    "ReflectedTemperature",
-    "RegionEmissivities",
-    "RegionEmissivity",
-    "RegionSection",
-    "RegionTemperatures",
-    "SurfaceFile",
-    "TrueTemperature",
-    "determine_emissivities",
-    "determine_emissivity",
-    "emissivity_covariance",
-    "emissivity_line",
-    "emissivity_trend",
-    "load_regions",
-    "measured_features",
-    "measured_text",
-    "read_emissivity_lines",
-    "read_emissivity_map",
-    "surface_text",
-    "true_temperature",
-    "true_temperatures",
-    "write_emissivity",
-]

@@ -29,7 +29,7 @@ from chipglow.scene import Area, Raster
 from chipglow.uncertainty import Estimate, propagate
 
 COMMON: Final = ("reference", "reflected", "calibration")
-"""Causes of error that are the same for all pixels, frames and images."""
+"""Causes of error common to all pixels, frames and images."""
 
 BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
 """Lines of the budget of an emissivity."""
@@ -41,27 +41,27 @@ CONSTANT: Final = np.array([[1.0], [0.0]])
 """Design of a line from its constant."""
 
 _CLEARLY: Final = 5.0
+"""Standard uncertainties by which a heated object is hotter than its surroundings, at least."""
 
 
 @dataclass(frozen=True)
 class Heating:
-    """How an object was heated, and how well that is known; all in K.
+    """Temperatures of a heated object and its surroundings, with uncertainties, in K.
 
     Parameters
     ----------
     reference : float
-        True temperature of the object, as of a thermocouple.
+        True temperature of the object, such as that of a thermocouple.
     reflected : float
         Temperature of the surroundings that it reflects; the paper's 293 K by default.
     reference_uncertainty, reflected_uncertainty : float
         Standard uncertainties.
     camera_uncertainty : float, optional
-        Standard uncertainty of the radiance temperature from the camera's calibration, common to
-        all pixels; by default that which the measurement states.
+        Standard uncertainty of the radiance temperature by the camera's calibration, common to
+        all pixels; by default as the measurement states.
     drift : float, optional
-        Relative standard uncertainty of the radiance from one recording to the next, such as 0.01
-        of a camera that warms up. By default it is what several recordings show; of one it is not
-        known, and not in the uncertainty.
+        Relative standard uncertainty of the radiance from one recording to the next, by default
+        as several recordings show; of one it is unknown and not in the uncertainty.
 
     Raises
     ------
@@ -106,23 +106,20 @@ class EmissivityMap:
     """Emissivity of every pixel; made by `determine_emissivity`."""
 
     heating: Heating
-    """How the object was heated."""
     band: Band
-    """The camera's band."""
     raster: Raster
     radiance: Array
-    """Radiance in W/(m² sr) of every observation, shape (observation, y, x): the frames of one
-    image, or the means of several images. NaN where a frame is flagged.
+    """Radiance in W/(m² sr) of the frames of one image, or the means of several images, shape
+    (observation, y, x); NaN where flagged.
     """
     flags: NDArray[np.uint8]
     """All `Flag` that a pixel has in any frame, uint8, shape (y, x)."""
     calibration: Array | None
     """Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x)."""
     lower_limit: float = 0.0
-    """Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
-    """
+    """Lower range limit of the camera in K; 0 without one."""
     recordings: int = 1
-    """From how many recordings the observations are."""
+    """Number of recordings that the observations are from."""
 
     @property
     def hidden(self) -> float:
@@ -139,12 +136,12 @@ class EmissivityMap:
 
     @cached_property
     def identity(self) -> str:
-        """Tells these observations from others, and is the same in another run."""
+        """Hash that tells these observations from others."""
         return hashlib.sha256(self.radiance.tobytes()).hexdigest()[:16]
 
     @cached_property
     def emissivity(self) -> Array:
-        """Emissivity, shape (y, x); NaN where flagged. Noise can take it out of 0 to 1."""
+        """Emissivity, shape (y, x), not limited to 0 to 1; NaN where flagged."""
         return emissivity_of_radiance(self.mean_radiance, self.heating, self.band)
 
     @cached_property
@@ -152,17 +149,14 @@ class EmissivityMap:
         """Mean radiance over the observations in W/(m² sr), shape (y, x); NaN where flagged."""
         return np.asarray(self.radiance.mean(axis=0))
 
-    @cached_property
+    @property
     def radiance_temperature(self) -> Array:
         """Radiance temperature of the mean radiance in K, shape (y, x); NaN where flagged."""
         return np.asarray(self.band.temperature(self.mean_radiance), np.float64)
 
     @cached_property
     def estimate(self) -> Estimate:
-        """Emissivity with its uncertainty, shape (y, x); NaN where flagged.
-
-        Of one observation it is without the pixel's noise, of which then nothing is known.
-        """
+        """Emissivity, shape (y, x); its uncertainty omits the noise of a single observation."""
         relative = self.heating.drift
         effect = self.mean_radiance / self._contrast / sqrt(self.recordings)
         drift = None if relative is None else relative * effect
@@ -181,7 +175,7 @@ class EmissivityMap:
         )
 
     def of(self, area: Area) -> "RegionEmissivity":
-        """Mean emissivity of an area, and what makes it uncertain."""
+        """Compute the mean emissivity of an area."""
         used = used_pixels(area, self.mean_radiance, self.flags)
         values = emissivity_of_radiance(self.radiance[:, used.mask], self.heating, self.band)
         mean_radiance = float(self.mean_radiance[used.mask].mean())
@@ -194,22 +188,40 @@ class EmissivityMap:
             self.heating.drift, mean_radiance / self._contrast, self.recordings, repeatability
         )
         estimate = self._systematic(np.array(mean), mean_radiance, calibration)
-        result = RegionEmissivity(
+        estimate = with_drift(estimate, drift, self.identity) + (random - mean)
+        outside = (int((pixels < 0).sum()), int((pixels > 1).sum()))
+        return RegionEmissivity(
             name=area.name,
             feature=area.feature,
             whole=area.whole,
             heating=self.heating,
             used=used,
-            hidden=self.hidden,
             standard_deviation=float(pixels.std(ddof=1)),
-            outside=(int((pixels < 0).sum()), int((pixels > 1).sum())),
+            outside=outside,
             observed=values.mean(axis=1),
-            estimate=with_drift(estimate, drift, self.identity) + (random - mean),
+            estimate=estimate.with_warnings(*self._warnings(used, outside, mean)),
         )
-        return replace(result, estimate=result.estimate.with_warnings(*result._warnings()))
+
+    def _warnings(self, used: UsedPixels, outside: tuple[int, int], mean: float) -> Iterator[str]:
+        for text in used.warnings():
+            if used.flagged[Flag.UNDER_RANGE]:
+                text += (
+                    " The remaining pixels are brighter than the region, as the camera's range "
+                    f"hides emissivities below {self.hidden:.3g}."
+                )
+            elif used.flagged[Flag.SATURATED]:
+                text += " The remaining pixels are darker than the region."
+            yield text
+        darker = "under 0: they are darker than the stated surroundings."
+        brighter = "over 1: they are brighter than a blackbody of the true temperature."
+        for count, text in zip(outside, (darker, brighter), strict=True):
+            if count:
+                yield f"{used.name}: {count} of {used.count} pixels have an emissivity {text}"
+        if not 0 <= mean <= 1:
+            yield f"{used.name}: the mean emissivity is not within 0 to 1."
 
     def _systematic(self, values: Array, radiance: Any, calibration: Any) -> Estimate:
-        """Emissivities with what is common to all pixels, frames and images."""
+        """Return emissivities with the components of `COMMON`."""
 
         def found(reference: Any, reflected: Any) -> Any:
             ends = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
@@ -230,7 +242,7 @@ class EmissivityMap:
 
     @property
     def _contrast(self) -> float:
-        """Radiance of a blackbody at the true temperature over that of the surroundings."""
+        """Difference of blackbody radiance between object and surroundings."""
         radiance = self.band.radiance(np.array([self.heating.reference, self.heating.reflected]))
         return float(radiance[0] - radiance[1])
 
@@ -241,26 +253,19 @@ class RegionEmissivity:
 
     name: str
     feature: str
-    """The area's name, and the feature that it belongs to."""
     whole: bool
     """Whether the area is all that there is of the feature."""
     heating: Heating
-    """How the object was heated."""
     used: UsedPixels
-    hidden: float
-    """Lowest emissivity that the camera's range measures; 0 without a lower limit."""
     standard_deviation: float
-    """Standard deviation over the pixels: how much the surface varies from place to place, with
-    the pixels' noise. It is no uncertainty of the mean.
-    """
+    """Standard deviation over the pixels, with their noise; no uncertainty of the mean."""
     outside: tuple[int, int]
-    """How many pixels have an emissivity under 0, and over 1."""
+    """Numbers of pixels with an emissivity under 0, and over 1."""
     observed: Array
     """Mean emissivity of each observation, shape (observation,)."""
     estimate: Estimate
-    """Mean emissivity, with the components of `COMMON`, the same in all areas and images;
-    ``drift`` from recording to recording over the repeatability, the same in all areas of a
-    map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """Mean emissivity, with the components of `COMMON`; ``drift`` over the repeatability, the same
+    in all areas of a map; and ``random`` with the parts ``repeatability`` and ``noise``.
     """
 
     @property
@@ -270,7 +275,7 @@ class RegionEmissivity:
 
     @property
     def line(self) -> "EmissivityLine":
-        """The emissivity as a line over the temperature that is constant."""
+        """The emissivity as a constant line over the temperature."""
         return EmissivityLine(
             self.name,
             self.feature,
@@ -281,30 +286,6 @@ class RegionEmissivity:
             standard_deviation=self.standard_deviation,
         )
 
-    def _warnings(self) -> Iterator[str]:
-        for text in self.used.warnings():
-            if self.used.flagged[Flag.UNDER_RANGE]:
-                text += (
-                    " The remaining pixels are brighter than the region, as the camera's range "
-                    f"hides emissivities below {self.hidden:.3g}."
-                )
-            elif self.used.flagged[Flag.SATURATED]:
-                text += " The remaining pixels are darker than the region."
-            yield text
-        (under, over), count = self.outside, self.used.count
-        if under:
-            yield (
-                f"{self.name}: {under} of {count} pixels have an emissivity under 0: they "
-                "are darker than the stated surroundings."
-            )
-        if over:
-            yield (
-                f"{self.name}: {over} of {count} pixels have an emissivity over 1: they "
-                "are brighter than a blackbody of the true temperature."
-            )
-        if not 0 <= self.mean <= 1:
-            yield f"{self.name}: the mean emissivity is not within 0 to 1."
-
 
 @dataclass(frozen=True)
 class EmissivityLine:
@@ -312,11 +293,10 @@ class EmissivityLine:
 
     name: str
     feature: str
-    """Name of the area and of the feature that it belongs to."""
     estimate: Estimate
     """Emissivity at `middle`, and its change with temperature in 1/K; shape (2,)."""
     heatings: tuple[Heating, ...] = ()
-    """Heating of the object for each true temperature; empty if known from elsewhere."""
+    """Heating for each true temperature; empty if the emissivity is known from elsewhere."""
     means: tuple[float, ...] = ()
     uncertainties: tuple[float, ...] = ()
     """Mean emissivity at each temperature, and its standard uncertainty."""
@@ -327,7 +307,7 @@ class EmissivityLine:
 
     @classmethod
     def constant(cls, mean: float, standard_uncertainty: float = 0.0) -> "EmissivityLine":
-        """An emissivity from elsewhere, whose error is independent of the measurement's."""
+        """Return an emissivity from elsewhere, whose error is independent of the measurement's."""
         if not 0 < mean <= 1:
             raise ValueError(f"emissivity: is {mean!r}, expected over 0 to 1")
         if not 0 <= standard_uncertainty < inf:
@@ -353,26 +333,26 @@ class EmissivityLine:
         return float(self.estimate.values[1])
 
     def at(self, temperature: Any) -> Estimate:
-        """Emissivity of the line at temperatures in K, of any shape."""
+        """Return the emissivity at temperatures in K of any shape."""
         away = np.asarray(temperature, np.float64) - self.middle
         design = np.stack([np.ones(away.size), away.ravel()], axis=1)
         return self.estimate.linear(design).reshape(*away.shape)
 
     def weights(self, temperature: float) -> Array:
-        """Weight of every mean in the emissivity at a temperature in K; their sum is 1."""
+        """Return the weight of every mean in the emissivity at a temperature in K."""
         away = np.array([1.0, temperature - self.middle])
         weights: Array = away @ np.linalg.pinv(_design(self.temperatures))
         return weights
 
 
 def _design(temperatures: Sequence[float]) -> Array:
-    """Design matrix of a line about the middle of the temperatures, shape (n, 2)."""
+    """Return the design matrix of a line about the middle of the temperatures, shape (n, 2)."""
     kelvins = np.array(temperatures)
     return np.stack([np.ones_like(kelvins), kelvins - kelvins.mean()], axis=1)
 
 
 def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
-    """Emissivity from in-band radiance in W/(m² sr), of any shape.
+    """Compute the emissivity from in-band radiance in W/(m² sr).
 
     ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
     """
@@ -388,7 +368,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
     measurements : sequence of Measurement
         Images of the object at one true temperature; several of them are repetitions.
     heating : Heating
-        Its temperature and that of its surroundings.
+        Temperatures of the object and its surroundings.
 
     Raises
     ------
@@ -418,7 +398,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
 
 
 def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
-    """Covariance of the mean emissivities of several areas of one map."""
+    """Compute the covariance of the mean emissivities of several areas of one map."""
     observed = np.stack([row.observed for row in rows])
     chance = np.zeros((len(rows), len(rows)))
     if observed.shape[1] > 1:
@@ -429,12 +409,11 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
 
 
 def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
-    """Straight line through an area's emissivity at several temperatures, by least squares.
+    """Fit a line to an area's emissivity at several temperatures by ordinary least squares.
 
-    The line is that of ordinary least squares, a linear function of the means, through which
-    their covariance is propagated (JCGM 100:2008, Equation 13). The errors of `COMMON` are the
-    same at all temperatures. The random error is that of the means, or the scatter about the line
-    if that is larger. At one temperature the line is a constant.
+    The covariance of the means is propagated (JCGM 100:2008, Equation 13); the errors of `COMMON`
+    are the same at all temperatures. The random error is that of the means, or the scatter about
+    the line if that is larger. At one temperature the line is a constant.
     """
     if len(areas) == 1:
         return areas[0]
@@ -447,7 +426,8 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     design = _design(temperatures)
     solve = np.linalg.pinv(design)
     line = solve @ means
-    residual = _residual(means - design @ line)
+    freedom = means.size - 2
+    residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
     random = np.array([_of_one_image(one) for one in estimates])
     if isfinite(residual):
         random = np.maximum(random, residual)
@@ -479,7 +459,7 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
 
 
 def _of_one_image(estimate: Estimate) -> float:
-    """Standard uncertainty by what is not the same at another temperature."""
+    """Return the standard uncertainty without the causes of `COMMON`."""
     for cause in COMMON:
         estimate = estimate.without(cause)
     return float(estimate.standard_uncertainty)
@@ -496,18 +476,13 @@ def _floor(measurement: Measurement) -> float:
 def _calibration(
     measurements: Sequence[Measurement], radiance: Array, heating: Heating
 ) -> Array | None:
-    """Standard uncertainty of the mean radiance from the calibration, shape (y, x)."""
+    """Return the standard uncertainty of the mean radiance by the calibration, shape (y, x)."""
     if heating.camera_uncertainty is not None:
         band, spread = measurements[0].band, heating.camera_uncertainty
         temperature = np.asarray(band.temperature(radiance), np.float64)
         ends = [band.radiance(temperature + sign * spread) for sign in (-1.0, 1.0)]
         return np.asarray((ends[1] - ends[0]) / 2, np.float64)
     return stated_calibration(measurements)
-
-
-def _residual(about_line: Array) -> float:
-    freedom = about_line.size - 2
-    return sqrt(float((about_line**2).sum()) / freedom) if freedom else nan
 
 
 def _celsius(temperature: float) -> str:

@@ -1,4 +1,4 @@
-"""The picture of an emissivity determination: what was seen, where, and what came out."""
+"""Figure of an emissivity determination: image, regions, map and lines."""
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -68,7 +68,7 @@ def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: 
 
 
 def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
-    """A region's name in its middle, upright where the region is slender."""
+    """Write a region's name in its middle, upright where the region is slender."""
     width, height = np.ptp(outline, axis=0)
     x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2
     axes.text(
@@ -85,7 +85,7 @@ def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
 
 
 def _colours(regions: Sequence[Region]) -> dict[str, str]:
-    """A colour for each feature."""
+    """Return a colour for each feature."""
     features = dict.fromkeys(region.feature for region in regions)
     return dict(zip(features, cycle(_COLOURS), strict=False))
 

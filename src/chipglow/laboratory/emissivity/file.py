@@ -2,7 +2,7 @@
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
@@ -23,7 +23,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.observations import RANDOM, with_drift
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
-from chipglow.quantities import Array, FileBeside, Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import (
@@ -100,11 +100,11 @@ _FORMS: Final = {
     "repeatability": ("random", "random"),
     "noise": ("random", "random"),
 }
-"""How errors of the regions correlate along reference and region, as obsarray names it."""
+"""Correlation of the regions' errors along reference and region, as obsarray names it."""
 
 
 def _say_correlations(data: xr.Dataset) -> None:
-    """Give the regions' means the attributes of obsarray."""
+    """Add the attributes of obsarray to the regions' means."""
     known = []
     for cause, forms in _FORMS.items():
         part = data[f"region_{cause}_uncertainty"]
@@ -119,7 +119,7 @@ def _say_correlations(data: xr.Dataset) -> None:
 
 
 def read_emissivity_lines(path: str | os.PathLike[str]) -> dict[str, EmissivityLine]:
-    """Read the emissivity of areas over the temperature, by their names."""
+    """Read the emissivity of areas as lines over the temperature, by their names."""
     return _read(Path(path), _lines)
 
 
@@ -135,7 +135,7 @@ def _lines(data: xr.Dataset) -> dict[str, EmissivityLine]:
 
 
 def _constant(row: xr.Dataset) -> EmissivityLine:
-    """Emissivity of an area at one true temperature."""
+    """Return the emissivity of an area at one true temperature."""
     reflected, *spreads = (float(row[name]) for name in _HEATING)
     parts = {cause: float(row[f"region_{cause}_uncertainty"]) for cause in BUDGET}
     name, observations = str(row["region"].values), str(row["observations"].values)
@@ -173,21 +173,20 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     path : path-like
         A file of `write_emissivity`.
     reference : float, optional
-        True temperature in K of the map to take, the nearest. By default every pixel of several
-        maps has its straight line over the temperature.
+        Take the map of the nearest true temperature in K. By default every pixel of several maps
+        has a straight line over the temperature.
 
     Returns
     -------
     MapSurface
-        Where noise took a pixel out of 0 to 1, it has the nearer of these. With the standard
-        uncertainty of the pixels, the mean of that at several temperatures.
+        Emissivities limited to 0 to 1, with the mean standard uncertainty of the pixels.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file is cut short or no emissivity map; the message names the file.
+        If the file is truncated or no emissivity map.
     """
 
     def surface(data: xr.Dataset) -> MapSurface:
@@ -208,24 +207,18 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
 
 
 def emissivity_trend(line: EmissivityLine) -> EmissivityTrend:
-    """A line as surfaces take it: the errors that its areas share, and its own."""
+    """Return a line as surfaces take it: the errors that its areas share, and its own."""
     shared = (*COMMON, "drift")
-    effects = {one.cause.name: one.effects for one in line.estimate.components}
-    common = [effects[name][:, 0] if name in effects else np.zeros(2) for name in shared]
-    own = [column for name, of in effects.items() if name not in shared for column in of.T]
+    effects = {one.cause.name: one.effects.T.tolist() for one in line.estimate.components}
     emissivity, slope = line.estimate.values.tolist()
     return EmissivityTrend(
         middle=line.middle,
         emissivity=emissivity,
         slope=slope,
-        common=_pairs(common),
-        own=_pairs(own),
+        common=tuple(tuple(effects.get(name, [[0.0, 0.0]])[0]) for name in shared),
+        own=tuple(tuple(own) for name in effects if name not in shared for own in effects[name]),
         measured=(min(line.temperatures), max(line.temperatures)),
     )
-
-
-def _pairs(effects: Sequence[Array]) -> tuple[tuple[float, float], ...]:
-    return tuple((float(one), float(other)) for one, other in effects)
 
 
 def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:

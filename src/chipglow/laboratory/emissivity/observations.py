@@ -1,4 +1,4 @@
-"""Images of one place as observations: what they have in common, and what chance does to them."""
+"""Images of one place as observations, and their random errors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,14 +14,21 @@ from chipglow.scene import Area
 from chipglow.uncertainty import Cause, Component, Estimate
 
 RANDOM: Final = "random"
-"""Name of the component of what observations show of chance."""
+"""Name of the component of the random errors that observations show."""
+
+_FLAGS: Final = {
+    Flag.UNDER_RANGE: "under the lower range limit",
+    Flag.SATURATED: "saturated",
+    Flag.DEAD: "dead",
+}
+"""Flags that make pixels unusable, in words."""
 
 _MANY_LEFT_OUT: Final = 0.05
 """Fraction of an area's pixels above which their omission is a warning."""
 
 
 def area_estimate(mean: float, values: Array, identity: str) -> Estimate:
-    """The mean of an area with its random component: an analysis of variance."""
+    """Return the mean of an area with its random component, by an analysis of variance."""
     observations, pixels = values.shape
     if observations == 1:
         noise = float(values[0].std(ddof=1)) / sqrt(pixels)
@@ -43,7 +50,7 @@ def _random(mean: float, parts: dict[str, float], freedom: float, identity: str)
 
 
 def uncertainty_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, float]:
-    """Columns for the uncertainty of one value: the total and its parts."""
+    """Return columns for the uncertainty of one value: the total and its parts."""
     whole = {
         "standard_uncertainty": estimate.standard_uncertainty,
         "degrees_of_freedom": estimate.degrees_of_freedom,
@@ -71,14 +78,15 @@ class UsedPixels:
         total = self.count + self.left_out
         if self.left_out <= _MANY_LEFT_OUT * total:
             return []
-        text = flag_text(self.flagged)
-        return [f"{self.name}: {self.left_out} of {total} pixels are left out ({text})."]
+        flags = flag_text(self.flagged)
+        return [f"{self.name}: {self.left_out} of {total} pixels are left out ({flags})."]
 
 
 def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPixels:
     """Return the pixels of an area that can be used; raise ValueError if they are fewer than 2."""
     usable, total = area.mask & np.isfinite(radiance), int(area.mask.sum())
-    count, flagged = int(usable.sum()), count_flags(flags[area.mask])
+    count = int(usable.sum())
+    flagged = {flag: int((flags[area.mask] & flag != 0).sum()) for flag in _FLAGS}
     if count < 2:
         raise ValueError(
             f"region {area.name}: {count} of its {total} pixels can be used "
@@ -90,7 +98,7 @@ def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPi
 def drift_effect(
     drift: float | None, effect: float, recordings: int, repeatability: float
 ) -> float | None:
-    """Standard uncertainty by drift between recordings beyond the repeatability; None if unknown.
+    """Return the uncertainty by drift between recordings beyond the repeatability, if known.
 
     `effect` is the change of the result for a relative change of 1 of the radiance.
     """
@@ -124,48 +132,28 @@ def check_same_pixels(
 
 
 def observed_radiance(measurements: Sequence[Measurement]) -> Array:
-    """Radiance of every observation in W/(m² sr), shape (observation, y, x).
+    """Return the radiance of every observation in W/(m² sr), shape (observation, y, x).
 
-    The frames of one image, or the means of several; NaN where a frame is flagged.
+    These are the frames of one image, or the means of several; NaN where a frame is flagged.
     """
-    frames = [_usable_radiance(measurement) for measurement in measurements]
+    frames = [np.where(one.usable.all(axis=0), one.radiance, np.nan) for one in measurements]
     return np.stack([image.mean(axis=0) for image in frames]) if len(frames) > 1 else frames[0]
 
 
 def observed_flags(measurements: Sequence[Measurement]) -> NDArray[np.uint8]:
-    """All `Flag` that a pixel has in any frame, shape (y, x)."""
+    """Return all `Flag` that a pixel has in any frame, shape (y, x)."""
     flags = [np.bitwise_or.reduce(measurement.flags, axis=0) for measurement in measurements]
     return np.asarray(np.bitwise_or.reduce(flags, axis=0), np.uint8)
 
 
 def stated_calibration(measurements: Sequence[Measurement]) -> Array | None:
-    """Standard uncertainty of the mean radiance from the calibration, shape (y, x).
-
-    In W/(m² sr); None unless all measurements state it.
-    """
+    """Return the uncertainty of the mean radiance by the calibration, if all state it, (y, x)."""
     known = [measurement.calibration_uncertainty for measurement in measurements]
     stated = [image.mean(axis=0) for image in known if image is not None]
     return np.asarray(np.mean(stated, axis=0), np.float64) if len(stated) == len(known) else None
 
 
-def count_flags(flags: NDArray[np.uint8]) -> dict[Flag, int]:
-    """How many pixels have each `Flag` that makes them unusable."""
-    return {
-        flag: int((flags & flag != 0).sum())
-        for flag in (Flag.UNDER_RANGE, Flag.SATURATED, Flag.DEAD)
-    }
-
-
 def flag_text(flagged: dict[Flag, int]) -> str:
-    """The same for people."""
-    words = {
-        Flag.UNDER_RANGE: "under the lower range limit",
-        Flag.SATURATED: "saturated",
-        Flag.DEAD: "dead",
-    }
-    texts = [f"{count} {words[flag]}" for flag, count in flagged.items() if count]
+    """Describe how many pixels have each flag."""
+    texts = [f"{count} {_FLAGS[flag]}" for flag, count in flagged.items() if count]
     return ", ".join(texts) or "none flagged"
-
-
-def _usable_radiance(measurement: Measurement) -> Array:
-    return np.where(measurement.usable.all(axis=0), measurement.radiance, np.nan)

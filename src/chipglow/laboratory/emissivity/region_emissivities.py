@@ -33,11 +33,11 @@ class RegionEmissivities:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region at every temperature; one row each."""
+        """Return every region at every temperature; one row each."""
         return pd.DataFrame(_row(row) for of in self.rows for row in of)
 
     def line_frame(self) -> pd.DataFrame:
-        """Emissivity over the temperature, a row a region."""
+        """Return the emissivity over the temperature; a row for each region."""
         return pd.DataFrame(map(_line_row, self.lines))
 
 
@@ -136,7 +136,7 @@ def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivi
 
 
 def _of_reflected(one: EmissivityMap) -> float:
-    """Change of the mean emissivity if what is reflected is 100 K hotter."""
+    """Return the change of the mean emissivity by surroundings that are 100 K hotter."""
     heating = one.heating
     hotter = min(heating.reflected + 100.0, (heating.reflected + heating.reference) / 2)
     exact = replace(heating, reflected=hotter, reflected_uncertainty=0.0, reference_uncertainty=0.0)

@@ -26,7 +26,7 @@ class Coordinate:
 
 
 def _coordinate(value: object) -> Coordinate:
-    """A number of pixels, or a text with a unit of length."""
+    """Read a number of pixels, or a text with a unit of length."""
     if isinstance(value, Coordinate):
         return value
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -80,7 +80,7 @@ class RegionSection(Part):
         self.region("region")
 
     def region(self, name: str) -> Region:
-        """The region that this section describes."""
+        """Return the region that this section describes."""
         if self.circle is not None:
             places, radius = (self.circle.centre,), self.circle.radius
             unit = _unit([*places[0], radius])
@@ -108,7 +108,7 @@ class RegionsDescription(Part):
         self.build()
 
     def build(self) -> tuple[Region, ...]:
-        """The regions."""
+        """Return the regions."""
         return tuple(section.region(name) for name, section in self.regions.items())
 
 
@@ -129,7 +129,7 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
     Parameters
     ----------
     path : str or Path
-        The file.
+        YAML file of polygons, rectangles and circles.
 
     Raises
     ------

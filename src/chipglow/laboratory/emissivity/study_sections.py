@@ -24,14 +24,15 @@ _GREATEST_DEVIATION: Final = 0.5
 
 
 def surface_text(rows: Iterable[RegionEmissivity]) -> str:
-    """Sections of a study with the emissivities of its features, as YAML."""
+    """Return sections of a study with the emissivities of its features, as YAML."""
     found = {
         _FIELDS[row.feature.lower()]: {
             "mean": round(row.mean, _DIGITS),
             "standard_deviation": round(row.standard_deviation, _DIGITS),
         }
         for row in rows
-        if row.whole and row.feature.lower() in _FIELDS and _possible(row)
+        if row.whole and row.feature.lower() in _FIELDS
+        if 0 <= row.mean <= 1 and row.standard_deviation <= _GREATEST_DEVIATION
     }
     surface: dict[str, Any] = {}
     sections: dict[str, Any] = {"surface": surface}
@@ -45,7 +46,7 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
 
 
 def measured_text(file: str | os.PathLike[str]) -> str:
-    """Sections of a study with the chip of a file of `write_emissivity`, as YAML."""
+    """Return sections of a study with the chip of a file of `write_emissivity`, as YAML."""
     sections = {
         "surface": {"measured": {_CHIP: os.fspath(file)}},
         "analysis": {"rake_chip": _CHIP, "band_chip": _CHIP},
@@ -54,9 +55,9 @@ def measured_text(file: str | os.PathLike[str]) -> str:
 
 
 def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
-    """Measured areas by the features of a study: body, shear_band, workpiece, tool.
+    """Return measured areas by the features of a study: body, shear_band, workpiece, tool.
 
-    Of several areas of a feature the one that is called like it counts.
+    Of several areas of a feature the one of the same name counts.
     """
     number = Counter(area.feature for area in areas.values())
     found = {
@@ -70,7 +71,3 @@ def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, Emissivi
             f"is of the features {', '.join(number)}, expected chip body and shear band among them"
         )
     return found
-
-
-def _possible(row: RegionEmissivity) -> bool:
-    return 0 <= row.mean <= 1 and row.standard_deviation <= _GREATEST_DEVIATION

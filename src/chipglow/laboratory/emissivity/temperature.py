@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 from math import inf, isnan, sqrt
 from typing import Any, Final
@@ -13,7 +12,7 @@ import pandas as pd
 import scipy
 
 from chipglow.camera import FittedCalibration, Measurement
-from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine, Heating
+from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
 from chipglow.laboratory.emissivity.observations import (
     RANDOM,
     UsedPixels,
@@ -49,30 +48,19 @@ _STEP: Final = 0.5
 _STEPS: Final = 200
 
 
-@dataclass(frozen=True)
-class ReflectedTemperature:
-    """What an object reflects."""
-
-    temperature: float = LABORATORY
-    """In K; the paper's 293 K by default."""
-    standard_uncertainty: float = 0.0
-    """In K."""
-
-    def __post_init__(self) -> None:
-        if not 0 < self.temperature < inf:
-            raise ValueError(f"reflected: is {self.temperature!r} K, expected over 0 K")
-        if not 0 <= self.standard_uncertainty < inf:
-            raise ValueError(
-                f"reflected: standard uncertainty is {self.standard_uncertainty!r} K, "
-                "expected 0 K or more"
-            )
-
-    @cached_property
-    def estimate(self) -> Estimate:
-        """The temperature, with the component ``reflected``: the same wherever these are."""
-        return Estimate(np.array(self.temperature)).with_component(
-            "reflected", self.standard_uncertainty, independent="common"
+def reflected_temperature(
+    temperature: float = LABORATORY, standard_uncertainty: float = 0.0
+) -> Estimate:
+    """Return the temperature in K of what an object reflects, the paper's by default."""
+    if not 0 < temperature < inf:
+        raise ValueError(f"reflected: is {temperature!r} K, expected over 0 K")
+    if not 0 <= standard_uncertainty < inf:
+        raise ValueError(
+            f"reflected: standard uncertainty is {standard_uncertainty!r} K, expected 0 K or more"
         )
+    return Estimate(np.array(temperature)).with_component(
+        "reflected", standard_uncertainty, independent="common"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,38 +68,32 @@ class TrueTemperature:
     """True temperature of an area; made by `true_temperature`."""
 
     name: str
-    """The area's name."""
     used: UsedPixels
     radiance_temperature: float
-    """That of the area's mean radiance in K."""
+    """Radiance temperature of the area's mean radiance in K."""
     standard_deviation: float
-    """Standard deviation over the pixels of the temperatures in K that each would have by
-    itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
-    """
+    """Standard deviation over the temperatures of single pixels in K."""
     mean_of_pixels: float
     """Mean of these temperatures in K: under the estimate where the area is uneven."""
     emissivity: float
     estimate: Estimate
-    """True temperature in K, with the components ``reference`` (of the heating with which the
-    emissivity was determined), ``reflected``, ``calibration``, ``emissivity`` (by chance, or
-    as it is known), ``drift`` between recordings, that of the emissivity included, and
-    ``random``, of which ``repeatability`` and ``noise`` are parts.
+    """True temperature in K, with the components ``reference`` (of the heating in which the
+    emissivity was determined), ``reflected``, ``calibration``, ``emissivity``, ``drift`` between
+    recordings, and ``random`` with the parts ``repeatability`` and ``noise``.
     """
     correlation: float | None
-    """Correlation of the calibration's errors at the radiances of area and emissivity; None if it
-    plays no part or is not known.
-    """
+    """Correlation of the calibration's errors at the radiances of area and emissivity, if known."""
 
 
 def true_temperature(
     measurements: Sequence[Measurement],
     area: Area,
     emissivity: EmissivityLine,
-    surroundings: ReflectedTemperature | None = None,
+    surroundings: Estimate | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
 ) -> TrueTemperature:
-    """True temperature of an even area, of its mean radiance and emissivity.
+    """Compute the true temperature of an even area from its mean radiance and emissivity.
 
     Parameters
     ----------
@@ -123,15 +105,15 @@ def true_temperature(
         The area's emissivity, determined with the same camera, or known from elsewhere
         (`EmissivityLine.constant`). A line of several temperatures is taken at the resulting
         temperature.
-    surroundings : ReflectedTemperature, optional
-        What the area reflects. By default those in which the emissivity was determined, with the
-        same error; if it is known from elsewhere the paper's 293 K.
+    surroundings : Estimate, optional
+        Temperature in K of what the area reflects (`reflected_temperature`). By default as in the
+        determination of the emissivity, with the same error, or the paper's 293 K.
     calibration : FittedCalibration, optional
-        The camera's calibration with which both emissivity and area were measured: it says how
-        far its errors at the two radiances are the same.
+        The camera's calibration with which both emissivity and area were measured: it states the
+        correlation of its errors at the two radiances.
     drift : float, optional
-        Relative standard uncertainty of the radiance from one recording to the next; by default
-        what several recordings show. Of one it is not known, and not in the uncertainty.
+        Relative standard uncertainty of the radiance from one recording to the next, by default
+        as several recordings show; of one it is unknown and not in the uncertainty.
 
     Raises
     ------
@@ -145,9 +127,7 @@ def true_temperature(
     L(T) = (L_app − (1 − ε) L_env) / ε: Equation 2 of Heigel and Whitenton (2010), solved. The
     uncertainty is propagated to first order (JCGM 100:2008, Equation 13). Emissivity and area have
     errors in common, which partly cancel: a camera that shows too little radiance makes the
-    emissivity too small. What is reflected is the same for both, unless another is given. The
-    calibration's have the correlation that its covariance says; without `calibration`
-    none is taken, which is too much rather than too little as long as they are of one sign.
+    emissivity too small. Without `calibration` its errors are taken as uncorrelated.
     With a line ε(T) the equation is solved for T, and all sensitivities are those of a constant
     emissivity over 1 + (dε/dT) (L − L_env) / (ε dL/dT).
     """
@@ -156,7 +136,7 @@ def true_temperature(
     used = used_pixels(area, radiance.mean(axis=0), observed_flags(measurements))
     values = radiance[:, used.mask]
     mean = float(values.mean())
-    reflecting = _surroundings(emissivity, surroundings)
+    reflecting = _surroundings(emissivity) if surroundings is None else surroundings
     room = float(reflecting.values)
     value = _emissivity_of_area(emissivity, area.name, mean, room, band)
     slope = emissivity.slope if len(emissivity.heatings) > 1 else 0.0
@@ -218,12 +198,12 @@ def true_temperatures(
     measurements: Sequence[Measurement],
     regions: Sequence[Region],
     emissivities: Mapping[str, EmissivityLine] | EmissivityLine,
-    surroundings: ReflectedTemperature | None = None,
+    surroundings: Estimate | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
     names: Sequence[str] = (),
 ) -> RegionTemperatures:
-    """True temperatures of the regions of an image."""
+    """Compute the true temperatures of the regions of an image."""
     check_same_pixels(measurements, "temperature", names)
     places = areas(regions, measurements[0].raster)
     if isinstance(emissivities, EmissivityLine):
@@ -305,13 +285,11 @@ def _mean_radiance(
     drift: float | None,
     recordings: int,
 ) -> Estimate:
-    """Mean radiance of observations of shape (observation, pixel) in W/(m² sr).
+    """Return the mean radiance in W/(m² sr) of observations of shape (observation, pixel).
 
-    Its calibration's errors have a correlation with those of the emissivity: they are the sum of
-    the same error and of another.
+    `shared` is the correlation of its calibration's error with that of the emissivity.
     """
     mean = float(values.mean())
-    # That which an image shows of chance has nothing to do with any other image.
     random = area_estimate(mean, values, uuid4().hex)
     repeatability = float(random.contribution("repeatability"))
     found = Estimate(np.array(mean)).with_component("calibration", shared * calibration)
@@ -337,15 +315,13 @@ def _warnings(name: str, found: Estimate, mean_of_pixels: float) -> list[str]:
 
 @dataclass(frozen=True)
 class _Equation:
-    """Equation 2 for an emissivity and the temperature in K of what is reflected.
-
-    The emissivity is that at the object's temperature; `slope` is its change with that in 1/K.
-    """
+    """Equation 2 for an emissivity and the temperature in K of what is reflected."""
 
     emissivity: float
     reflected: float
     band: Band
     slope: float = 0.0
+    """Change of the emissivity with the object's temperature in 1/K."""
 
     @property
     def reflected_radiance(self) -> float:
@@ -353,15 +329,15 @@ class _Equation:
         return float(self.band.radiance(np.array(self.reflected)))
 
     def own(self, radiance: Any) -> Any:
-        """Radiance in W/(m² sr) of a blackbody at the object's temperature."""
+        """Return the radiance in W/(m² sr) of a blackbody at the object's temperature."""
         return (radiance - (1 - self.emissivity) * self.reflected_radiance) / self.emissivity
 
     def temperature(self, radiance: Array) -> Array:
-        """True temperature in K of apparent radiance in W/(m² sr), of the same shape."""
+        """Return the true temperature in K by apparent radiance in W/(m² sr)."""
         return np.asarray(self.band.temperature(self.own(radiance)), np.float64)
 
     def derivatives(self, name: str, radiance: float) -> tuple[float, float, float]:
-        """Of the temperature by emissivity, radiance and temperature of the surroundings."""
+        """Derive the temperature by emissivity, radiance and temperature of the surroundings."""
         own = float(self.own(radiance))
         if not own > self.reflected_radiance:
             raise _too_dark(name, self.reflected)
@@ -379,7 +355,7 @@ class _Equation:
         return -(own - self.reflected_radiance) * by_radiance, by_radiance, by_environment
 
     def _slope(self, temperature: float) -> float:
-        """dL/dT in W/(m² sr K), at any temperature: `Band.slope` ends with its table."""
+        """Return dL/dT in W/(m² sr K) at any temperature: `Band.slope` ends with its table."""
         ends = self.band.radiance(np.array([temperature - _STEP, temperature + _STEP]))
         return float(ends[1] - ends[0]) / (2 * _STEP)
 
@@ -394,7 +370,7 @@ def _too_dark(name: str, reflected: float) -> ValueError:
 def _emissivity_of_area(
     line: EmissivityLine, name: str, radiance: float, reflected: float, band: Band
 ) -> Estimate:
-    """The emissivity at the temperature at which it makes an area's radiance."""
+    """Return the emissivity at the temperature at which it makes an area's radiance."""
     if len(line.heatings) < 2:
         return line.at(line.middle)
     room = float(band.radiance(np.array(reflected)))
@@ -415,12 +391,10 @@ def _emissivity_of_area(
     )
 
 
-def _surroundings(emissivity: EmissivityLine, given: ReflectedTemperature | None) -> Estimate:
-    """Temperature in K of what is reflected; by default with the error that the emissivity has."""
-    if given is not None:
-        return given.estimate
+def _surroundings(emissivity: EmissivityLine) -> Estimate:
+    """Return the temperature in K of what is reflected, with the error that the emissivity has."""
     if not emissivity.heatings:
-        return ReflectedTemperature().estimate
+        return reflected_temperature()
     heating = emissivity.heatings[0]
     return Estimate(np.array(heating.reflected)).with_component(
         "reflected", heating.reflected_uncertainty
@@ -434,27 +408,16 @@ def _correlation(
     calibration: FittedCalibration | None,
     band: Band,
 ) -> float | None:
-    """Correlation of the calibration's errors at the emissivity's radiances and at this one.
+    """Return the correlation of the calibration's errors at the emissivity's radiances and here.
 
     It is the mean over the points of the line, with their weights in the emissivity.
     """
     if calibration is None or not line.heatings:
         return None
-    correlations = [
-        _correlation_of(mean, heating, radiance, calibration, band)
-        for mean, heating in zip(line.means, line.heatings, strict=True)
-    ]
-    return float(np.clip(line.weights(temperature) @ np.array(correlations), -1.0, 1.0))
-
-
-def _correlation_of(
-    emissivity: float,
-    heating: Heating,
-    radiance: float,
-    calibration: FittedCalibration,
-    band: Band,
-) -> float:
-    hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
-    then = cold + emissivity * (hot - cold)
-    found = calibration.errors.estimate([then, radiance]).correlation()[0, 1]
-    return float(np.nan_to_num(found))
+    correlations = []
+    for emissivity, heating in zip(line.means, line.heatings, strict=True):
+        hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
+        then = cold + emissivity * (hot - cold)
+        correlations.append(calibration.errors.estimate([then, radiance]).correlation()[0, 1])
+    weighted = line.weights(temperature) @ np.nan_to_num(correlations)
+    return float(np.clip(weighted, -1.0, 1.0))

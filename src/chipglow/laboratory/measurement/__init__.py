@@ -1,54 +1,34 @@
 """From a file of a camera to a measurement in radiance temperature."""
 
 from chipglow.laboratory.measurement.blackbody_calibration import (
-    BlackbodyCalibration,
-    calibrate_blackbodies,
+    BlackbodyCalibration as BlackbodyCalibration,
+    calibrate_blackbodies as calibrate_blackbodies,
 )
 from chipglow.laboratory.measurement.calibration_file import (
-    CalibrationDescription,
-    calibration_text,
-    load_calibration,
-    write_calibration,
+    CalibrationDescription as CalibrationDescription,
+    calibration_text as calibration_text,
+    load_calibration as load_calibration,
+    write_calibration as write_calibration,
 )
 from chipglow.laboratory.measurement.camera_file import (
-    load_measurement,
-    load_recording,
-    measurement_of,
-    pixel_correction,
-    uniform_counts,
+    load_measurement as load_measurement,
+    load_recording as load_recording,
+    measurement_of as measurement_of,
+    pixel_correction as pixel_correction,
+    uniform_counts as uniform_counts,
 )
 from chipglow.laboratory.measurement.description import (
-    MeasurementDescription,
-    load_description,
-    measurement_text,
+    MeasurementDescription as MeasurementDescription,
+    load_description as load_description,
+    measurement_text as measurement_text,
 )
 from chipglow.laboratory.measurement.radiometric_calibration import (
-    ImagePosition,
-    calibrate_recording,
-    flag_fractions,
-    repaired_signal,
+    ImagePosition as ImagePosition,
+    calibrate_recording as calibrate_recording,
+    flag_fractions as flag_fractions,
+    repaired_signal as repaired_signal,
 )
-from chipglow.laboratory.measurement.summary import MeasurementSummary, measurement_summary
-
-__all__ = [
-    "BlackbodyCalibration",
-    "CalibrationDescription",
-    "ImagePosition",
-    "MeasurementDescription",
-    "MeasurementSummary",
-    "calibrate_blackbodies",
-    "calibrate_recording",
-    "calibration_text",
-    "flag_fractions",
-    "load_calibration",
-    "load_description",
-    "load_measurement",
-    "load_recording",
-    "measurement_of",
-    "measurement_summary",
-    "measurement_text",
-    "pixel_correction",
-    "repaired_signal",
-    "uniform_counts",
-    "write_calibration",
-]
+from chipglow.laboratory.measurement.summary import (
+    MeasurementSummary as MeasurementSummary,
+    measurement_summary as measurement_summary,
+)
