@@ -1,90 +1,68 @@
 """Surfaces: emissivity maps that follow the material."""
 
-from chipglow.surface.cross_section import SideElements
-from chipglow.surface.directional import DIRECTIONS, Direction, Fresnel
-from chipglow.surface.emissivity import Emissivity
-from chipglow.surface.exchange import Exchange
-from chipglow.surface.feature import (
-    CHIP_1,
-    CHIP_2,
-    EmissivityStack,
-    Features,
-    FeatureSurface,
-    FeatureTrends,
-    chip_fraction,
-    feature_fractions,
-    shear_band_fraction,
+from chipglow.surface.cross_section import (
+    SideElements as SideElements,
 )
-from chipglow.surface.map import MapSurface
-from chipglow.surface.oxide import OXIDES, Oxide, OxideHistory, ParabolicOxide
-from chipglow.surface.side_flow import REFLECTIONS, SideShape, Wedge
+from chipglow.surface.directional import (
+    DIRECTIONS as DIRECTIONS,
+    Direction as Direction,
+    Fresnel as Fresnel,
+)
+from chipglow.surface.emissivity import (
+    Emissivity as Emissivity,
+)
+from chipglow.surface.exchange import (
+    Exchange as Exchange,
+)
+from chipglow.surface.feature import (
+    CHIP_1 as CHIP_1,
+    CHIP_2 as CHIP_2,
+    EmissivityStack as EmissivityStack,
+    Features as Features,
+    FeatureSurface as FeatureSurface,
+    FeatureTrends as FeatureTrends,
+    chip_fraction as chip_fraction,
+    feature_fractions as feature_fractions,
+    shear_band_fraction as shear_band_fraction,
+)
+from chipglow.surface.map import (
+    MapSurface as MapSurface,
+)
+from chipglow.surface.oxide import (
+    OXIDES as OXIDES,
+    Oxide as Oxide,
+    OxideHistory as OxideHistory,
+    ParabolicOxide as ParabolicOxide,
+)
+from chipglow.surface.side_flow import (
+    REFLECTIONS as REFLECTIONS,
+    SideShape as SideShape,
+    Wedge as Wedge,
+)
 from chipglow.surface.spectral import (
-    SPECTRA,
-    Dispersion,
-    HagenRubens,
-    SpectralSurface,
-    SpectralTable,
+    SPECTRA as SPECTRA,
+    Dispersion as Dispersion,
+    HagenRubens as HagenRubens,
+    SpectralSurface as SpectralSurface,
+    SpectralTable as SpectralTable,
 )
 from chipglow.surface.surface import (
-    MODIFIERS,
-    SURFACES,
-    Change,
-    EmissivityField,
-    ModifiedSurface,
-    Modifier,
-    Surface,
+    MODIFIERS as MODIFIERS,
+    SURFACES as SURFACES,
+    Change as Change,
+    EmissivityField as EmissivityField,
+    ModifiedSurface as ModifiedSurface,
+    Modifier as Modifier,
+    Surface as Surface,
 )
 from chipglow.surface.temperature import (
-    EmissivityTrend,
-    HomogeneousSurface,
-    PhaseSurface,
-    TemperatureSurface,
-    TrendSurface,
-    UniformSurface,
+    EmissivityTrend as EmissivityTrend,
+    HomogeneousSurface as HomogeneousSurface,
+    PhaseSurface as PhaseSurface,
+    TemperatureSurface as TemperatureSurface,
+    TrendSurface as TrendSurface,
+    UniformSurface as UniformSurface,
 )
-from chipglow.surface.texture import Texture
-
-__all__ = [
-    "CHIP_1",
-    "CHIP_2",
-    "DIRECTIONS",
-    "MODIFIERS",
-    "OXIDES",
-    "REFLECTIONS",
-    "SPECTRA",
-    "SURFACES",
-    "Change",
-    "Direction",
-    "Dispersion",
-    "Emissivity",
-    "EmissivityField",
-    "EmissivityStack",
-    "EmissivityTrend",
-    "Exchange",
-    "FeatureSurface",
-    "FeatureTrends",
-    "Features",
-    "Fresnel",
-    "HagenRubens",
-    "HomogeneousSurface",
-    "MapSurface",
-    "ModifiedSurface",
-    "Modifier",
-    "Oxide",
-    "OxideHistory",
-    "ParabolicOxide",
-    "PhaseSurface",
-    "SideElements",
-    "SideShape",
-    "SpectralSurface",
-    "SpectralTable",
-    "Surface",
-    "TemperatureSurface",
-    "Texture",
-    "TrendSurface",
-    "UniformSurface",
-    "Wedge",
-    "chip_fraction",
-    "feature_fractions",
-    "shear_band_fraction",
-]
+from chipglow.surface.texture import (
+    Texture as Texture,
+)
