@@ -18,7 +18,7 @@ from movie_codecs import COLDEST, HOTTEST, Codec, drawn, encode, known_field
 from PIL import Image
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap
+from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
 from chipglow.scene import Raster
 
 MAPS = ("jet", "rainbow", "viridis", "hot", "gray")
@@ -104,7 +104,7 @@ def outcome(folder: Path, case: Case, count: int) -> Outcome:
     """Draw, encode and import a case, and compare."""
     path = folder / f"movie{case.codec.suffix}"
     write(path, (picture_of(case, number) for number in range(count)), case.codec)
-    movies = {"temperature": FieldMovie(path, (COLDEST, HOTTEST), Legend())}
+    movies = {"temperature": FieldMovie(path, (COLDEST, HOTTEST))}
     crop = (0, 0, SHAPE[1], SHAPE[0])
     source = MovieSource(movies, 1e-6, (0.0, SHAPE[0]), crop=crop, frame_interval=1e-6)
     raster = Raster(0.0, SHAPE[0] * 1e-6, 1e-6, *SHAPE)

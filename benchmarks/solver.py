@@ -11,7 +11,6 @@ from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.library import AISI_1045
 from chipglow.cutting.material import ROOM_TEMPERATURE
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
-from chipglow.cutting.plastic_heat import heat_fractions
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
@@ -66,7 +65,7 @@ class Block:
         self.damage = Damage.of(material.damage, material.failing_layer(cell))
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.heat_fractions = heat_fractions(material.taylor_quinney)
+        self.heat_fractions = material.heat_fractions()
         self.conductivity = material.conductivity.sampled()
         self.tool = tool or ToolGeometry().surface._replace(x=FAR, y=FAR)
         shape = (self.grid.columns, self.grid.rows)

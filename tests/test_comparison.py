@@ -253,13 +253,6 @@ def test_a_single_simulation_has_a_statement_too():
     assert "chip is 0 K too" in result.places[0].sentence
 
 
-def test_a_simulation_may_be_called_measured():
-    base = frames(field(X, Y))
-    result = compare(base, {"measured": base, "other": base}, TOOL, CURVE, STATED)
-    assert result.band is not None
-    assert len(result.band.simulated) == 2
-
-
 def test_found_bands_are_compared_at_the_same_distance():
     """The band of the simulation is turned: its ridge is elsewhere, its temperature the same."""
     images = [BandImage(angle=angle, bend=1e-3, deviation=20e-6) for angle in (0.7, 0.8)]
@@ -313,12 +306,30 @@ def test_without_a_band_the_rake_face_is_left():
     assert all("rake face" in place.place or "chip" in place.place for place in result.places)
 
 
-def test_nothing_in_common_is_one_error():
-    cold = frames(np.full(RASTER.shape, 500.0))
-    with pytest.raises(ValueError, match=r"^comparison: there is nothing[^\n]+$"):
-        compare(cold, {"same": cold}, TOOL, stated=STATED)
-    with pytest.raises(ValueError, match="no simulation, expected 1 or more"):
-        compare(cold, {}, TOOL)
+COLD = frames(np.full(RASTER.shape, 500.0))
+OWN = frames(field(X, Y), relative_uncertainty=0.01)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: compare(COLD, {"same": COLD}, TOOL, stated=STATED),
+            r"^comparison: there is nothing[^\n]+$",
+        ),
+        (lambda: compare(COLD, {}, TOOL), "no simulation, expected 1 or more"),
+        (
+            lambda: compare(OWN, {"same": OWN}, TOOL, CURVE, STATED),
+            "uncertainty: 5 K beside the uncertainty that the measurement states",
+        ),
+        (lambda: StatedUncertainties(-1.0), "temperature: -1 K, expected 0 K or more"),
+        (lambda: StatedUncertainties(emissivity=np.nan), "emissivity: nan, expected 0 or more"),
+        (lambda: StatedUncertainties(position=-1e-6), "position: -1e-06 m, expected 0 m"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_error(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
 
 
 def test_another_rake_angle_and_no_tool_are_said():
@@ -329,14 +340,6 @@ def test_another_rake_angle_and_no_tool_are_said():
     result = compare(base, {"other": other, "none": Measurement(data)}, TOOL, CURVE, STATED)
     assert "The rake angle of other differs by 7 degrees." in result.notes.warnings
     assert any("none: The file states no tool" in text for text in result.notes.assumed)
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"temperature": -1.0}, {"emissivity": np.nan}, {"position": -1e-6}]
-)
-def test_impossible_uncertainties_are_refused(wrong):
-    with pytest.raises(ValueError, match=f"uncertainty: {next(iter(wrong))} is"):
-        StatedUncertainties(**wrong)
 
 
 # The command
@@ -406,13 +409,6 @@ def test_what_the_command_cannot_do_is_one_line(folder, options, message):
     last = result.output.strip().splitlines()[-1]
     assert message in last
     assert last.startswith("chipglow: ")
-
-
-def test_two_uncertainties_of_one_measurement_are_refused(folder):
-    write_measurement(frames(field(X, Y), relative_uncertainty=0.01), folder / "own.nc")
-    result = run("own.nc", "one.nc", *USUAL)
-    assert result.exit_code == 2
-    assert "uncertainty: 5 K beside the uncertainty that the measurement states" in result.output
 
 
 # Noise that is alike from place to place and from frame to frame

@@ -25,8 +25,8 @@ from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.laws import HyperbolicTangent
 from chipglow.cutting.library import AISI_1045, workpiece
 from chipglow.cutting.material import ROOM_TEMPERATURE
-from chipglow.cutting.plastic_heat import heat_fraction, heat_fractions
 from chipglow.cutting.simulation import _State
+from chipglow.cutting.stress import heat_fraction
 from chipglow.scene import Raster, ToolGeometry
 
 TITANIUM = HyperbolicTangent(
@@ -148,13 +148,15 @@ def pressed_on_a_face(**friction):
     [(1e-3, 0.4), (1.0, 0.4), (10.0, 0.5), (100.0, 0.6), (1e4, 0.75), (1e6, 0.9), (1e9, 0.9)],
 )
 def test_heat_fraction_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(rate, fraction):
-    table = heat_fractions(RateTable((1.0, 100.0, 1e6), (0.4, 0.6, 0.9)))
-    assert heat_fraction(rate, table) == pytest.approx(fraction, rel=1e-14)
+    table = RateTable((1.0, 100.0, 1e6), (0.4, 0.6, 0.9))
+    material = replace(AISI_1045, taylor_quinney=table)
+    assert heat_fraction(rate, material.heat_fractions()) == pytest.approx(fraction, rel=1e-14)
 
 
 @given(fraction=st.floats(0.0, 1.0), rate=st.floats(0.0, 1e12))
 def test_a_constant_heat_fraction_is_itself(fraction, rate):
-    assert heat_fraction(rate, heat_fractions(fraction)) == fraction
+    material = replace(AISI_1045, taylor_quinney=fraction)
+    assert heat_fraction(rate, material.heat_fractions()) == fraction
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3])

@@ -14,7 +14,7 @@ from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import find_tool, rake_grid
 from chipglow.laboratory.comparison import normalised_error
 from chipglow.quantities import uncertain_text
-from chipglow.scene import PlacedTool, Raster, ToolGeometry
+from chipglow.scene import Raster, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.uncertainty import Estimate
 
@@ -229,12 +229,3 @@ def test_what_is_wrong_is_one_line(folder, arguments, message):
     assert code == 2 and "\n" not in error
     assert message in error
     assert sorted(folder.iterdir()) == before
-
-
-def test_a_placed_tool_reads_the_same_grid(seen):
-    measurement = seen[-7.0, "chip 2"]
-    placed = PlacedTool(measurement.tool, (0.0, 0.0))
-    np.testing.assert_array_equal(
-        rake_grid(measurement, placed).mean, rake_grid(measurement, measurement.tool).mean
-    )
-    assert degrees(placed.rake_angle) == pytest.approx(-7.0)

@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import exp, sqrt
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -193,14 +193,6 @@ def test_limits_of_tanh(rate, temperature, sharpness):
     assert firm == pytest.approx(hardened.at(0.5, rate, temperature), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("field", "value"), [("sharpness", 0.0), ("recovery_strain", -1.0), ("hardening", -1.0)]
-)
-def test_tanh_refuses(field, value):
-    with pytest.raises(ValueError, match=rf"Tangent\.{field}: {value:g}.*, expected .*0"):
-        replace(TITANIUM, **{field: value})
-
-
 @given(
     strain=st.floats(1e-3, 5.0),
     rate=st.floats(1.1, 1e8),
@@ -244,10 +236,6 @@ def test_zerilli_armstrong_by_hand():
     assert law.at(0.25, 1e4, 500.0) == pytest.approx(656.188e6, rel=1e-6)
     # Hot and slow what is left is 100 + 350 MPa, and exp(-15) of 1000 MPa.
     assert law.at(0.25, 1.0, 3000.0) == pytest.approx(450.000306e6, rel=1e-8)
-    with pytest.raises(
-        ValueError, match=r"Armstrong\.rate_hardening: -1 1/K, expected 0 1/K or more"
-    ):
-        replace(law, rate_hardening=-1)
 
 
 def test_the_rate_does_not_matter_below_the_reference():
@@ -300,7 +288,3 @@ def test_nothing_softens_before_the_strain_to_failure():
     assert half == pytest.approx(0.5, rel=1e-12)
     assert weakening(half, law) == weakening(1.0, law) == 1.0
     assert weakening(1.5, law) == pytest.approx(1 - harm.loss / 2, rel=1e-12)
-
-
-def test_kernels_get_the_numbers_of_a_law_by_name():
-    assert asdict(STEEL) == STEEL.numbers()._asdict()

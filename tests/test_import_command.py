@@ -17,7 +17,7 @@ from chipglow.io import (
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import Legend, MovieSource, NamedMap
+from chipglow.io.sources.movie import MovieSource, NamedMap
 from chipglow.scene import Material, ToolGeometry
 from chipglow.text import DescriptionError
 
@@ -164,7 +164,7 @@ def test_movies_are_described_field_by_field(tmp_path):
     assert source.metre_per_pixel == pytest.approx(2e-6)
     assert source.movies["temperature"].values == pytest.approx((293.15, 1400.15))
     assert source.movies["temperature"].colours == NamedMap("jet")
-    assert source.movies["plastic_strain"].colours == Legend((600, 40, 620, 400))
+    assert source.movies["plastic_strain"].colours == (600, 40, 620, 400)
     assert source.movies["plastic_strain"].path.name == "e.avi"
 
 

@@ -17,10 +17,9 @@ from chipglow.io.sources import SourceError
 from chipglow.io.sources.colour_scale import ColourScale, colour_uncertainty, lab
 from chipglow.io.sources.conventions import Placement
 from chipglow.io.sources.legend import find_legend, is_cut, legend_pixels
-from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
+from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.sources.moving_pictures import index_movie, pictures
 from chipglow.io.sources.overlays import dark_lines, find_background
-from chipglow.io.sources.picture_sampling import PictureSampling
 from chipglow.scene import FILLED, Material, Raster
 from chipglow.scene.nearest import extended, nearest
 
@@ -195,7 +194,7 @@ def test_values_by_the_legend(tmp_path, codec, box):
         tmp_path / f"a{codec.suffix}", codec=codec, shape=shape, count=1,
         change=lambda picture: with_legend(picture, box=(200, 20, 216, 160)),
     )  # fmt: skip
-    source = a_source(path, Legend(box))
+    source = a_source(path, box)
     frame = first_frame(source)
     truth = known_field(0, shape)
     shown = np.isfinite(truth) & (frame.material == Material.WORKPIECE)
@@ -211,9 +210,9 @@ def test_values_by_the_legend(tmp_path, codec, box):
 def test_no_legend_and_a_wrong_box_are_told(tmp_path):
     path = a_movie(tmp_path / "a.avi")
     with pytest.raises(SourceError, match=r"a\.avi: no legend was found"):
-        a_source(path, Legend()).survey()
+        a_source(path, None).survey()
     with pytest.raises(SourceError, match=r"a\.avi: legend: box .* does not lie in the picture"):
-        a_source(path, Legend((100, 10, 208, 80))).survey()
+        a_source(path, (100, 10, 208, 80)).survey()
 
 
 # Round trips
@@ -314,31 +313,6 @@ def test_crop_and_turn(tmp_path):
     # What was up lies to the left, what was to the right is up.
     expected = one.fields["temperature"].T[::-1]
     np.testing.assert_array_equal(other.fields["temperature"], expected)
-
-
-def test_means_are_of_values_not_of_colours():
-    pixels = Raster(0.0, 4.0, 1.0, 4, 4)
-    values = np.arange(16, dtype=np.float32).reshape(4, 4)
-    valid = np.ones((4, 4), bool)
-    coarse = PictureSampling(pixels, Raster(0.0, 4.0, 2.0, 2, 2)).mean(values, valid)
-    np.testing.assert_allclose(coarse, [[2.5, 4.5], [10.5, 12.5]])
-    valid[0, 0] = False
-    coarse = PictureSampling(pixels, Raster(0.0, 4.0, 2.0, 2, 2)).mean(values, valid)
-    assert coarse[0, 0] == pytest.approx((1 + 4 + 5) / 3)
-
-
-@settings(max_examples=40)
-@given(
-    st.floats(0.15, 0.99), st.floats(-0.4, 3.0), st.floats(-2.0, 0.4), st.floats(-5, 5),
-    st.floats(-5, 5),
-)  # fmt: skip
-def test_finer_samples_of_a_plane_lie_on_it(spacing, left, down, slope_x, slope_y):
-    pixels = Raster(0.0, 0.0, 1.0, 12, 12)
-    values = slope_x * pixels.x[None] + slope_y * pixels.y[:, None] + np.zeros((12, 12))
-    raster = Raster(2 + left, -4 + down, spacing, 6, 6)
-    found = PictureSampling(pixels, raster).mean(values.astype(np.float32), np.ones((12, 12), bool))
-    expected = slope_x * raster.x[None] + slope_y * raster.y[:, None]
-    np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
 def test_beyond_the_picture_there_is_void(tmp_path):
@@ -679,9 +653,9 @@ def test_a_legend_that_is_not_of_the_picture_is_refused(tmp_path):
 
     path = a_movie(tmp_path / "a.avi", colours=NamedMap("jet"), change=with_other_legend)
     with pytest.raises(SourceError, match=r"a\.avi: legend: .*100, 10, 108, 80.* of what it shows"):
-        a_source(path, Legend(), crop=(0, 0, 88, SHAPE[0])).survey()
+        a_source(path, None, crop=(0, 0, 88, SHAPE[0])).survey()
     with pytest.raises(SourceError, match="give the box of the legend, or a named map"):
-        a_source(path, Legend((100, 10, 108, 80)), crop=(0, 0, 88, SHAPE[0])).survey()
+        a_source(path, (100, 10, 108, 80), crop=(0, 0, 88, SHAPE[0])).survey()
 
 
 def test_a_legend_whose_ends_are_not_seen_is_refused(tmp_path, monkeypatch):
@@ -693,7 +667,7 @@ def test_a_legend_whose_ends_are_not_seen_is_refused(tmp_path, monkeypatch):
     with pytest.raises(
         SourceError, match=r"legend: an end of the one found at \(100, 30, 108, 80\)"
     ):
-        a_source(path, Legend(), crop=(0, 0, 88, SHAPE[0])).survey()
+        a_source(path, None, crop=(0, 0, 88, SHAPE[0])).survey()
 
 
 def test_a_plain_coloured_background_is_no_material(tmp_path):

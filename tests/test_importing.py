@@ -262,14 +262,6 @@ def test_the_patience_follows_the_size_of_the_files(tmp_path):
     assert Isolated(MeshSource(large), "large").inputs == (str(large),)
 
 
-def test_a_reader_that_hangs_on_a_small_file_is_left_after_that_time(
-    worker_finds_tests, monkeypatch
-):
-    monkeypatch.setattr("chipglow.io.sandbox.PATIENCE", 2.0)
-    with pytest.raises(SourceError, match="no answer in 2 s"):
-        list(Isolated(Broken(WHOLE, how="hang"), "block").frames(RASTER))
-
-
 def test_what_a_library_prints_does_not_mix_with_the_frames(worker_finds_tests):
     source = Broken(WHOLE, how="chatter")
     frames = list(Isolated(source, "block").frames(RASTER))
@@ -292,6 +284,8 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
     assert str(ended.value) == f"{kept} frames are kept"
     left = kept_import(wanted, prospect(wanted), tmp_path / "scene.nc")
     assert left.progress == kept / 8
+    other = replace(wanted, description={"source": "block", "units": "mm"})
+    assert kept_import(other, prospect(other), tmp_path / "scene.nc") is None
     fractions = []
     import_scene(wanted, tmp_path / "scene.nc", fractions.append, resume=left)
     assert len(fractions) == 8 - kept
@@ -301,26 +295,6 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
     for a, b in zip(one.frames(), other.frames(), strict=True):
         for name in WHOLE:
             assert np.array_equal(getattr(a, name), getattr(b, name))
-
-
-def test_another_import_does_not_go_on_with_what_is_left(tmp_path, monkeypatch):
-    monkeypatch.setattr("chipglow.io.importing._CHECKPOINT_INTERVAL", 0.0)
-
-    def stop(fraction):
-        if fraction > 0.6:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        import_scene(Import(MovingBlock()), tmp_path / "scene.nc", stop)
-    other = Import(MovingBlock(), description={"units": "mm"})
-    assert kept_import(other, prospect(other), tmp_path / "scene.nc") is None
-
-
-def test_an_answer_of_another_kind_is_one_error(monkeypatch):
-    said = "import os; os.write(1, bytes(8)); os.close(0)"
-    monkeypatch.setattr("chipglow.io.sandbox._CHILD", ("-P", "-c", said))
-    with pytest.raises(SourceError, match="block: its reader ended with code 0"):
-        Isolated(MovingBlock(WHOLE), "block").survey()
 
 
 def test_a_reader_that_ends_before_it_is_asked_is_one_error(monkeypatch):

@@ -66,16 +66,15 @@ def clean():
     return knife_edge([an_image()])
 
 
-@pytest.mark.parametrize("normal", [0.0, 5.0, 44.0, 45.0, 88.0, 90.0, 137.0, -130.0, -3.0, 180.0])
+@pytest.mark.parametrize("normal", [0.0, 5.0, 45.0, 88.0, -130.0, 180.0])
 def test_an_edge_is_found_at_any_orientation_and_points_to_the_bright_side(normal):
     image = an_image(normal)
-    line, straightness = find_edge(
-        image.radiance, image.x - image.x.mean(), image.y - image.y.mean()
-    )
+    x, y = image.x - image.x.mean(), image.y - image.y.mean()
+    line, (sagitta, uncertainty) = find_edge(image.radiance, x, y)
     # Noise of 1 % of the step: the line through 40 centroids is known to about 0.03 deg.
     assert abs((degrees(line.normal) - normal + 180) % 360 - 180) < 0.2
     assert line.position == pytest.approx(1e-6, abs=0.2e-6)
-    assert straightness.sagitta < 5 * straightness.uncertainty
+    assert sagitta < 5 * uncertainty
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -117,11 +116,8 @@ def test_the_signal_in_an_aperture_is_the_encircled_light():
     "made",
     [
         {"normal": 2.0},
-        {"normal": 187.0},
-        {"normal": 95.0},
         {"normal": -130.0, "noise": 0.5},
         {"noise": 0.005},
-        {"background": 500.0},
         {"background": 0.0, "step": 500.0},
         {"saturation": 6.0},
         {"fwhm": 5e-6},
@@ -365,19 +361,6 @@ def test_the_cameras_own_blur_is_returned():
     assert found.fwhm == pytest.approx(9e-6, abs=0.03e-6 + 3 * found.fwhm_uncertainty)
 
 
-def test_temperature_in_place_of_radiance_gives_another_width():
-    low, high = 573.15, 1073.15
-    from synthetic_edge import BAND
-
-    dark, bright = BAND.radiance(np.array([low, high]))
-    radiance = edge_radiance(GAUSSIAN, 5.0, background=dark, step=bright - dark)
-    right = knife_edge([image_of(radiance, 1e-3 * (bright - dark))])
-    wrong = knife_edge([image_of(BAND.temperature(radiance), 0.5)])
-    assert right.fwhm == pytest.approx(FWHM, rel=0.01)
-    assert abs(wrong.fit("gaussian").fwhm / FWHM - 1) > 0.05
-    assert any("No model fits" in warning for warning in wrong.notes.warnings)
-
-
 def bar():
     return edge_radiance(GAUSSIAN, 5.0, position=-60e-6) - edge_radiance(
         GAUSSIAN, 5.0, position=50e-6, background=0.0
@@ -410,11 +393,6 @@ def test_without_one_edge_there_is_one_error(radiance, noise, text):
     assert "\n" not in str(caught.value)
 
 
-def test_no_image_is_an_error():
-    with pytest.raises(ValueError, match="none is given"):
-        knife_edge([])
-
-
 @pytest.mark.parametrize(
     ("normal", "aliased"), [(0.0, True), (45.0, True), (90.0, True), (5.0, False)]
 )
@@ -423,14 +401,10 @@ def test_tilts_that_sample_the_edge_too_coarsely_are_doubtful(normal, aliased):
     assert any("aliased" in warning for warning in found.notes.warnings) is aliased
 
 
-def test_a_clean_edge_is_not_doubtful(clean):
-    assert clean.notes.warnings == []
-
-
-def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful():
+def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful(clean):
     found = knife_edge([an_image(noise=0.0)])
     assert found.fwhm == pytest.approx(FWHM, rel=1e-4)
-    assert found.notes.warnings == []
+    assert found.notes.warnings == clean.notes.warnings == []
 
 
 def test_noise_that_grows_with_the_light_is_weighed():
@@ -458,21 +432,14 @@ def test_bent_and_short_and_unresolved_edges_are_doubtful():
     assert any("hardly seen" in warning for warning in knife_edge([sharp]).notes.warnings)
 
 
-def test_clipping_that_no_flag_tells_is_seen():
-    image = an_image(saturation=6.0)
-    hidden = replace(image, saturated=np.zeros_like(image.saturated))
-    found = knife_edge([hidden])
-    assert any("saturated" in warning for warning in found.notes.warnings)
-    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
-
-
-def test_a_dark_side_below_the_floor_is_left_out():
-    image = an_image()
-    found = knife_edge([replace(image, below=image.radiance < 2.5)])
-    assert any(
-        "below the camera's lower range limit" in warning for warning in found.notes.warnings
-    )
-    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+def test_clipped_sides_are_left_out_and_seen_without_a_flag():
+    bright, dark = an_image(saturation=6.0), an_image()
+    hidden = replace(bright, saturated=np.zeros_like(bright.saturated))
+    below = replace(dark, below=dark.radiance < 2.5)
+    for image, text in ((hidden, "saturated"), (below, "below the camera's lower range limit")):
+        found = knife_edge([image])
+        assert any(text in warning for warning in found.notes.warnings)
+        assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
 
 
 def test_dead_pixels_change_nothing_flagged_or_not(clean):
@@ -524,7 +491,9 @@ def test_a_measurement_becomes_an_image():
         edge_image(measurement, "m", (slice(50, 60), slice(None)))
 
 
-def test_apertures_that_are_not_there_are_errors():
+def test_images_and_apertures_that_are_not_there_are_errors():
+    with pytest.raises(ValueError, match="none is given"):
+        knife_edge([])
     edge, hole = an_image(), gaussian_aperture(FWHM, 100e-6)
     with pytest.raises(ValueError, match="expected 3 diameters or more"):
         knife_edge([edge], [hole, hole, gaussian_aperture(FWHM, 60e-6)])

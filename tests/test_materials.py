@@ -144,8 +144,8 @@ def test_the_rooms_data_are_files_of_the_package() -> None:
         ("cheese", "'cheese' is unknown, expected one of aisi-1045, aisi-4140"),
         ("aisi-1045/cheese", "aisi-1045: 'cheese' is no set, expected one of jaspers-dautzenberg"),
         ("aisi-1045/", "aisi-1045: '' is no set"),
-        ("carbide", "'carbide' is unknown, expected one of aisi-1045"),
-        ("../materials/aisi-1045", "'../materials/aisi-1045' is unknown"),
+        ("carbide", "carbide: kind: 'tool', expected workpiece"),
+        ("../materials/aisi-1045", "'..' is unknown"),
     ],
 )
 def test_unknown_names(name: str, message: str) -> None:
@@ -166,8 +166,6 @@ def _write(path: Path, old: str, new: str) -> Path:
     [
         ("212 GPa", "212", "young_modulus: 212 has no unit, expected a stress such as 553.1 MPa"),
         ("212 GPa", "212 kg", "young_modulus: '212 kg' is not a stress"),
-        ("212 GPa", "true GPa", "young_modulus: 'true GPa' is not a stress"),
-        ("212 GPa", ".nan GPa", "young_modulus: '.nan GPa' is not a stress"),
         ("value: 0.3\n", "value: 0.6\n", "poisson_ratio: 0.6, expected 0 to 0.49"),
         (
             "value: 0.3\n",
@@ -181,21 +179,9 @@ def _write(path: Path, old: str, new: str) -> Path:
         ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a number without a unit"),
         ("d2: 3.44", "d2: -3.44", "damage: d1 + d2 exp(d3 triaxiality) falls to"),
         ("kind: workpiece", "kind: chip", "kind: 'chip', expected workpiece or tool"),
-        (
-            "[200 degC, 42",
-            "[50 degC, 42",
-            "conductivity: temperature table: temperatures must ascend",
-        ),
-        ("[200 degC, 42.3 W/(m K)]", "42.3 W/(m K)", "expected [temperature, value]"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
         ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "duplicate key 'loss'"),
-        ("value: 0.9\n", "value: 1.9\n", "taylor_quinney: 1.9, expected 0 to 1"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K' is not a strain rate"),
-        (
-            "value: 0.9\n",
-            f"value: {RATES}\n".replace("0.6", "6"),
-            "taylor_quinney: 6, expected 0 to 1",
-        ),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1000", "0.1"), "rates must ascend"),
         ("value: 0.9\n", "value: [0.9]\n", "taylor_quinney: 0.9, expected [strain rate, value]"),
         (
@@ -203,18 +189,8 @@ def _write(path: Path, old: str, new: str) -> Path:
             "  pantale:\n    law: cheese\n",
             "law: 'cheese', expected one of johnson-cook",
         ),
-        (
-            "  pantale:\n",
-            "  pantale:\n    law: [tanh]\n",
-            "flow_stress.pantale.law: ['tanh'], expected",
-        ),
         ("  pantale:\n", "  pantale:\n    law: tanh\n", "pantale.hardening_limit: is missing"),
         ("  pantale:\n", "  pantale:\n    damage: mine\n", "pantale.damage: 'mine', expected none"),
-        (
-            "15 kJ/m2",
-            "15 kJ",
-            "fracture_energy: '15 kJ' is not a fracture energy, expected one such as 15 kJ/m2",
-        ),
         ("kind: workpiece", "kind: [", "expected YAML"),
         ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
     ],
@@ -240,20 +216,16 @@ def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
     sets = read_material(tmp_path / "steel.yaml").workpieces
     published, mine = sets["pantale"].flow_stress, sets["mine"].flow_stress
     assert isinstance(published, JohnsonCook) and sets["pantale"].damage is not None
+    data["damage"] = "none"
+    (tmp_path / "firm.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
+    file = read_material(tmp_path / "firm.yaml")
+    assert file.workpieces["pantale"].damage is None
+    assert not [number for number in file.properties if number.field.startswith("damage")]
     assert sets["mine"].damage is None
     assert mine == HyperbolicTangent(
         **asdict(published), hardening_limit=1.1, recovery_temperature=0.4, recovery_strain=12.0,
         softening_temperature=1.0, sharpness=0.05,
     )  # fmt: skip
-
-
-def test_a_material_that_does_not_fail(tmp_path: Path) -> None:
-    data = yaml.safe_load((FOLDER / "workpieces" / "aisi-4140.yaml").read_text(encoding="utf-8"))
-    data["damage"] = "none"
-    (tmp_path / "steel.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
-    file = read_material(tmp_path / "steel.yaml")
-    assert file.workpieces["pantale"].damage is None
-    assert not [number for number in file.properties if number.field.startswith("damage")]
 
 
 def test_material_of_the_documentation(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import camera_files
 import numpy as np
@@ -27,7 +26,7 @@ from chipglow.camera import (
 )
 from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
-from chipglow.io.cameras import read_recording, write_hcc
+from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
 from chipglow.laboratory.measurement import (
     CalibrationDescription,
@@ -143,40 +142,34 @@ def test_a_calibration_comes_back_from_its_file(tmp_path):
         np.testing.assert_allclose(again.band.response.wavelengths, response.wavelengths)
 
 
+FALLING = {
+    "model": "sakuma-hattori",
+    "parameters": {"offset": 0.0, "A": -4e-6, "B": 1e-2, "C": 1e5},
+    "covariance": np.eye(4).tolist(),
+}
+
+
 @pytest.mark.parametrize(
-    ("field", "value", "message"),
+    ("fields", "message"),
     [
-        ("model", "cubic", "model: 'cubic', expected"),
-        ("parameters", {"offset": 1.0}, "parameters: offset, expected offset, gain"),
-        ("parameters", {"offset": 1.0, "gain": -2.0}, "gain is -2"),
-        ("parameters", {"offset": 1.0, "gain": 0.0}, "gain is 0"),
-        ("covariance", [[1.0, 0.0], [0.0]], "covariance: rows are of different lengths"),
-        ("lowest", "2000 degC", "lowest is 2273.15 K and highest"),
-        ("response", [[3.8, 1.0, 2.0]], "response: expected pairs"),
-        ("band", "5.1-3.8 um", "reversed"),
-        ("colour", 1, "unknown key 'colour'"),
+        ({"model": "cubic"}, "model: 'cubic', expected"),
+        ({"parameters": {"offset": 1.0}}, "parameters: offset, expected offset, gain"),
+        ({"parameters": {"offset": 1.0, "gain": -2.0}}, "gain is -2"),
+        ({"covariance": [[1.0, 0.0], [0.0]]}, "covariance: rows are of different lengths"),
+        ({"lowest": "2000 degC"}, "lowest is 2273.15 K and highest"),
+        ({"response": [[3.8, 1.0, 2.0]]}, "response: expected pairs"),
+        ({"band": "5.1-3.8 um"}, "reversed"),
+        ({"colour": 1}, "unknown key 'colour'"),
+        (FALLING, "counts fall with the temperature"),
     ],
 )
-def test_an_impossible_calibration_file_is_one_clear_error(
-    laboratory, tmp_path, field, value, message
-):
+def test_an_impossible_calibration_file_is_one_clear_error(laboratory, tmp_path, fields, message):
     described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
-    (tmp_path / "bad.yaml").write_text(yaml.safe_dump({**described, field: value}))
+    (tmp_path / "bad.yaml").write_text(yaml.safe_dump({**described, **fields}))
     with pytest.raises(DescriptionError, match=message) as caught:
         load_calibration(tmp_path / "bad.yaml")
     assert str(caught.value).startswith("bad.yaml: ")
     assert "\n" not in str(caught.value)
-
-
-def test_counts_that_fall_are_no_calibration(tmp_path):
-    described = {
-        "model": "sakuma-hattori", "band": "3.8-5.1 um", "lowest": "300 degC",
-        "highest": "900 degC", "parameters": {"offset": 0.0, "A": -4e-6, "B": 1e-2, "C": 1e5},
-        "covariance": np.eye(4).tolist(),
-    }  # fmt: skip
-    (tmp_path / "falls.yaml").write_text(yaml.safe_dump(described))
-    with pytest.raises(DescriptionError, match="counts fall with the temperature"):
-        load_calibration(tmp_path / "falls.yaml")
 
 
 def test_tables_are_read_with_their_units(tmp_path):
@@ -192,6 +185,8 @@ def test_tables_are_read_with_their_units(tmp_path):
     assert read_response(table).wavelengths == pytest.approx((4e-6, 5e-6))
     table.write_text("column,row\n3,0\n")
     assert np.argwhere(read_bad_pixels(table, (2, 4))).tolist() == [[0, 3]]
+    with pytest.raises(ValueError, match=r"pixel 3,0 is not in the image, expected .* 3 x 2"):
+        read_bad_pixels(table, (2, 3))
 
 
 @pytest.mark.parametrize(
@@ -216,12 +211,6 @@ def test_a_table_that_is_none_is_one_clear_error(tmp_path, text, message):
     with pytest.raises(ValueError, match=message) as caught:
         read_columns(table, POINT_COLUMNS)
     assert str(caught.value).startswith(str(table))
-
-
-def test_bad_pixels_must_be_in_the_image(tmp_path):
-    (tmp_path / "bad.csv").write_text("column,row\n3,0\n40,2\n")
-    with pytest.raises(ValueError, match=r"pixel 40,2 is not in the image, expected .* 4 x 2"):
-        read_bad_pixels(tmp_path / "bad.csv", (2, 4))
 
 
 # Descriptions
@@ -298,6 +287,7 @@ def test_a_camera_file_alone_with_settings(laboratory):
     direct, described = load_measurement("chip.npy", settings), load_measurement("chip.yaml")
     np.testing.assert_array_equal(direct.radiance, described.radiance)
     assert direct.raster.left == 0.0
+    assert load_measurement("chip.npy", [*settings, "tip=20,30"]).raster == described.raster
     assert "lower left corner" in direct.data.attrs["assumed"]
 
 
@@ -347,6 +337,9 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
     np.testing.assert_array_equal(again.radiance, measured.radiance)
     with pytest.raises(ValueError, match="--set: 'pitch=6 um' describes nothing"):
         load_measurement(tmp_path / "measured.nc", ["pitch=6 um"])
+    write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
+    with pytest.raises(DescriptionError, match=r"scene\.nc: is a scene, .* measure makes one"):
+        load_measurement(tmp_path / "scene.nc")
 
 
 @pytest.mark.parametrize(
@@ -366,6 +359,7 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
         (["mirror=left"], "mirror: 'left', expected"),
         (["quarter_turns=5"], "quarter_turns: 5, expected 0 to 3"),
         (["tip=[1, 2, 3]"], "tip"),
+        (["tip=10.5,a"], "tip"),
         (["object_parameters.emissivity=2"], "emissivity: 2, expected over 0"),
         (["colour=red"], "unknown key 'colour'"),
         (["file=none"], "file: is missing"),
@@ -502,14 +496,6 @@ def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_pat
     assert said.count(warning) == 1
 
 
-def test_a_scene_is_no_measurement(tmp_path):
-    write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
-    with pytest.raises(
-        DescriptionError, match=r"scene\.nc: is a scene, .* chipglow measure makes one"
-    ):
-        load_measurement(tmp_path / "scene.nc")
-
-
 def test_convert_only_looks_without_out(laboratory):
     before = sorted(path.name for path in laboratory.iterdir())
     settings = ["--set", "unit=counts", "--set", "interval=1 ms"]
@@ -598,23 +584,6 @@ def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
 
 
-def test_frames_that_correct_all_black_bodies_are_read_once(laboratory, monkeypatch):
-    seen_bodies(laboratory)
-    read = []
-
-    def read_and_told(path, *arguments, **told):
-        read.append(Path(path).name)
-        return read_recording(path, *arguments, **told)
-
-    monkeypatch.setattr(measured, "read_recording", read_and_told)
-    settings = [part for setting in CORRECTED for part in ("--set", setting)]
-    code, output = run("calibrate", "bodies.csv", "--band", "3.8-5.1 um", *settings)
-    assert code == 0, output
-    assert sorted(read) == sorted(
-        ["cold.npy", "hot.npy", *(f"body {celsius:g}.npy" for celsius in CELSIUS[:4])]
-    )
-
-
 def test_frames_of_one_description_do_not_correct_recordings_of_another(laboratory):
     by_cold, by_hot = ([*CAMERA, f"flat_field.low={name}.npy"] for name in ("cold", "hot"))
     read = lru_cache(maxsize=1)(measured.read_flat_fields)
@@ -671,20 +640,3 @@ def test_all_that_is_missing_is_said_at_once(laboratory):
     assert code == 2
     assert "calibration: is missing" in said
     assert "pitch: is missing" in said
-
-
-def test_the_tip_may_be_two_numbers_with_a_comma(laboratory):
-    told = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=calibration.yaml"]
-    plain = load_measurement("chip.npy", [*told, "tip=10.5,21"])
-    assert plain.raster == load_measurement("chip.npy", [*told, "tip=[10.5, 21]"]).raster
-    with pytest.raises(ValueError, match="tip"):
-        load_measurement("chip.npy", [*told, "tip=10.5,a"])
-
-
-def test_an_error_names_a_file_with_its_folder(laboratory):
-    (laboratory / "there").mkdir(exist_ok=True)
-    np.save(laboratory / "there" / "chip.npy", np.ones((2, 8, 8)))
-    code, said = run("convert", "there/chip.npy", "--out", "x.nc", "--set", "unit=counts",
-                     "--set", "interval=1 ms")  # fmt: skip
-    assert code == 2
-    assert "chipglow: there/chip.npy: calibration: is missing" in said

@@ -117,11 +117,6 @@ def test_what_no_model_explains_is_in_the_kernel():
     assert light.values < 2.5 * light.standard_uncertainty
 
 
-def test_a_kernel_without_uncertainty_has_none(tmp_path):
-    np.save(tmp_path / "k.npy", np.ones((3, 3)))
-    assert MeasuredPSF.from_file(tmp_path / "k.npy", 1e-6).estimate.components == ()
-
-
 def test_components_are_scaled_with_the_weights():
     effects = np.zeros((9, 1))
     effects[4] = 2.0

@@ -150,32 +150,34 @@ def test_noise_averages_as_the_number_of_pixels_says():
     assert 0.97 < scaled.mean() < 1.10
 
 
-def test_a_tool_outside_the_image_is_one_error():
-    away = PlacedTool(ToolGeometry(), (5e-3, 0.0))
-    with pytest.raises(ValueError, match="no square on the rake face is inside the image"):
-        rake_grid(measured(linear_image()), away)
+TOUCH = ToolGeometry().signed_distance(*np.meshgrid(RASTER.x, RASTER.y))
+APART = np.where((TOUCH > 0) & (TOUCH < 30e-6), Flag.UNDER_RANGE, 0).astype(np.uint8)[None]
 
 
-def test_a_chip_that_does_not_touch_is_one_error():
-    tool = ToolGeometry()
-    distance = tool.signed_distance(*np.meshgrid(RASTER.x, RASTER.y))
-    flags = np.where((distance > 0) & (distance < 30e-6), Flag.UNDER_RANGE, 0).astype(np.uint8)
-    with pytest.raises(ValueError, match=r"none of the \d+ squares .* touches the tool"):
-        rake_grid(measured(linear_image(), flags=flags[None]), tool)
+def grid_of(tool=None, flags=None, **options):
+    rake_grid(measured(linear_image(), flags=flags), tool or ToolGeometry(), **options)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "message"),
+    ("call", "message"),
     [
-        ({"pixels": 0.5}, "pixels is 0.5, expected 1 or more"),
-        ({"depth": 10e-6}, "depth is 1e-05 m, expected a square's 1.8e-05 m"),
-        ({"frames": [3]}, "frame 3, expected 0 to 0"),
-        ({"frames": []}, "frame none, expected 0 to 0"),
+        (
+            lambda: grid_of(PlacedTool(ToolGeometry(), (5e-3, 0.0))),
+            "no square on the rake face is inside the image",
+        ),
+        (lambda: grid_of(flags=APART), r"none of the \d+ squares .* touches the tool"),
+        (lambda: grid_of(pixels=0.5), "pixels is 0.5, expected 1 or more"),
+        (lambda: grid_of(depth=10e-6), "depth is 1e-05 m, expected a square's 1.8e-05 m"),
+        (lambda: grid_of(frames=[3]), "frame 3, expected 0 to 0"),
+        (lambda: grid_of(frames=[]), "frame none, expected 0 to 0"),
+        (lambda: tool_of(measured(linear_image())), "tool: the measurement contains no tool"),
+        (lambda: PlacedTool(ToolGeometry(), (0.0, np.nan)), "tip: .* finite"),
+        (lambda: PlacedTool(PlacedTool(ToolGeometry(), (0.0, 0.0)), (0.0, 0.0)), "already"),
     ],
 )
-def test_what_is_asked_must_be_possible(wrong, message):
+def test_impossible_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
-        rake_grid(measured(linear_image()), ToolGeometry(), **wrong)
+        call()
 
 
 def test_a_simulated_measurement_tells_its_tool(tmp_path):
@@ -244,12 +246,3 @@ def test_a_file_that_is_no_tool_is_one_error(tmp_path, text, message):
     (tmp_path / "tool.yaml").write_text(text)
     with pytest.raises(DescriptionError, match=message):
         load_tool(tmp_path / "tool.yaml")
-
-
-def test_a_measurement_without_a_tool_needs_a_file():
-    with pytest.raises(ValueError, match="tool: the measurement contains no tool"):
-        tool_of(measured(linear_image()), None)
-    with pytest.raises(ValueError, match=r"tip: .* finite"):
-        PlacedTool(ToolGeometry(), (0.0, np.nan))
-    with pytest.raises(ValueError, match="already"):
-        PlacedTool(PlacedTool(ToolGeometry(), (0.0, 0.0)), (0.0, 0.0))

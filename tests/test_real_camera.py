@@ -100,11 +100,6 @@ def test_good_sensors_are_not_called_bad():
         assert not find_bad_pixels(cold, hot).mask.any()
 
 
-def test_few_frames_tell_nothing_of_the_noise():
-    frames = np.round(uniform(1000.0, frames=2, noise=0.3))
-    assert not find_bad_pixels(frames, frames + 4000.0).mask.any()
-
-
 def test_neighbours_stand_in_for_single_bad_sensors():
     y, x = np.mgrid[:12, :16]
     signal = np.stack([100.0 * x + 10.0 * y, 50.0 * x])
@@ -133,28 +128,6 @@ def test_larger_clusters_stay_dead():
     assert not done[0, 15]
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: NonUniformity.two_point(uniform(2000.0), uniform(1000.0)), "second brighter"),
-        (
-            lambda: NonUniformity.two_point(uniform(1000.0), uniform(2000.0, shape=(3, 4))),
-            "16 x 12 and 4 x 3 pixels",
-        ),
-        (lambda: NonUniformity.one_point(np.ones((3, 4))), "expected \\(time, y, x\\)"),
-        (lambda: NonUniformity.one_point(np.ones((1, 3, 4))).apply(uniform(1.0)), "of 4 x 3"),
-        (lambda: find_bad_pixels(uniform(2000.0), uniform(1000.0)), "second brighter"),
-        (lambda: replace_bad_pixels(np.ones((1, 3, 4)), np.zeros((2, 2), bool)), "of 2 x 2"),
-        (lambda: ImagePosition(quarter_turns=4), "quarter_turns"),
-        (lambda: ImagePosition(mirror="left"), "mirror"),
-        (lambda: ImagePosition(tip=(np.nan, 0.0)), "tip"),
-    ],
-)
-def test_what_does_not_fit_is_refused(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
-
-
 # Measurements
 
 
@@ -170,18 +143,6 @@ def test_counts_become_radiance_with_its_uncertainty():
     assert measured.data.attrs["integration_time"] == 1e-5
     assert measured.data.attrs["camera"] == "test camera"
     assert (measured.band.lower, measured.band.upper) == (3.8e-6, 5.1e-6)
-
-
-def test_many_frames_are_as_single_ones(monkeypatch):
-    counts = RNG.integers(400, 9000, (7, 6, 8))
-    bad = np.zeros((6, 8), bool)
-    bad[2, 3] = True
-    whole = calibrate_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
-    monkeypatch.setattr(
-        "chipglow.laboratory.measurement.radiometric_calibration._PIXELS_AT_ONCE", 100
-    )
-    parts = calibrate_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
-    assert whole.data.identical(parts.data)
 
 
 def test_the_range_of_calibration_and_detector_is_flagged():
@@ -306,20 +267,6 @@ def test_full_counts_are_doubted_unless_the_saturation_is_known():
     assert (known.flags[0, :2, 0] == Flag.SATURATED).all()
 
 
-@pytest.mark.parametrize(
-    ("known", "calibrated", "message"),
-    [
-        ({"integration_time": 2e-5}, {"integration_time": 1e-5}, "of 10 us, the recording has 20"),
-        ({"range_name": "B"}, {"range_name": "A"}, "for the range 'A', the recording has 'B'"),
-        ({"band": Band(3e-6, 5e-6)}, {}, "band 3.8-5.1 um, the recording has 3-5 um"),
-        ({"pitch": None}, {}, "pitch: is missing"),
-    ],
-)
-def test_a_calibration_of_something_else_is_refused(known, calibrated, message):
-    with pytest.raises(ValueError, match=message):
-        calibrate_recording(recording(np.ones((1, 2, 2)), **known), replace(LINE, **calibrated))
-
-
 def test_what_the_file_does_not_say_is_the_calibrations():
     calibration = replace(LINE, integration_time=1e-5, range_name="A")
     measured = calibrate_recording(recording(np.ones((1, 2, 2)), band=None), calibration)
@@ -328,28 +275,55 @@ def test_what_the_file_does_not_say_is_the_calibrations():
     assert measured.data.attrs["integration_time"] == 1e-5
 
 
+def calibrated(quantity="counts", calibration=LINE, arguments=(), **known):
+    one = recording(np.full((1, 2, 2), 900.0), quantity, **known)
+    calibrate_recording(one, calibration, **dict(arguments))
+
+
+EVEN = NonUniformity.one_point(uniform(900.0, shape=(2, 2)))
+BAD = np.zeros((3, 3), bool)
+
+
 @pytest.mark.parametrize(
-    ("quantity", "arguments", "message"),
+    ("call", "message"),
     [
-        ("counts", {}, "calibration: is missing"),
-        ("radiance", {"calibration": LINE}, "holds radiance, expected counts"),
+        (lambda: NonUniformity.two_point(uniform(2000.0), uniform(1000.0)), "second brighter"),
         (
-            "temperature",
-            {"non_uniformity": NonUniformity.one_point(uniform(900.0, shape=(2, 2)))},
+            lambda: NonUniformity.two_point(uniform(1000.0), uniform(2000.0, shape=(3, 4))),
+            "16 x 12 and 4 x 3 pixels",
+        ),
+        (lambda: NonUniformity.one_point(np.ones((3, 4))), "expected \\(time, y, x\\)"),
+        (lambda: NonUniformity.one_point(np.ones((1, 3, 4))).apply(uniform(1.0)), "of 4 x 3"),
+        (lambda: find_bad_pixels(uniform(2000.0), uniform(1000.0)), "second brighter"),
+        (lambda: replace_bad_pixels(np.ones((1, 3, 4)), np.zeros((2, 2), bool)), "of 2 x 2"),
+        (lambda: ImagePosition(quarter_turns=4), "quarter_turns"),
+        (lambda: ImagePosition(mirror="left"), "mirror"),
+        (lambda: ImagePosition(tip=(np.nan, 0.0)), "tip"),
+        (
+            lambda: calibrated(
+                calibration=replace(LINE, integration_time=1e-5), integration_time=2e-5
+            ),
+            "of 10 us, the recording has 20",
+        ),
+        (
+            lambda: calibrated(calibration=replace(LINE, range_name="A"), range_name="B"),
+            "for the range 'A', the recording has 'B'",
+        ),
+        (lambda: calibrated(band=Band(3e-6, 5e-6)), "band 3.8-5.1 um, the recording has 3-5 um"),
+        (lambda: calibrated(pitch=None), "pitch: is missing"),
+        (lambda: calibrated(calibration=None), "calibration: is missing"),
+        (lambda: calibrated("radiance"), "holds radiance, expected counts"),
+        (lambda: calibrated("temperature", None, band=None), "band: is missing"),
+        (
+            lambda: calibrated("temperature", None, {"non_uniformity": EVEN}),
             "not linear in light",
         ),
-        ("radiance", {"bad_pixels": np.zeros((3, 3), bool)}, "are of 3 x 3 pixels"),
+        (lambda: calibrated("radiance", None, {"bad_pixels": BAD}), "are of 3 x 3 pixels"),
     ],
 )
-def test_what_is_missing_or_out_of_place_is_said(quantity, arguments, message):
-    one = recording(np.full((1, 2, 2), 900.0), quantity)
+def test_what_does_not_fit_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
-        calibrate_recording(one, **arguments)
-
-
-def test_the_band_must_be_known():
-    with pytest.raises(ValueError, match="band: is missing"):
-        calibrate_recording(recording(np.full((1, 2, 2), 900.0), "temperature", band=None))
+        call()
 
 
 def test_the_image_is_turned_mirrored_and_placed():

@@ -20,8 +20,7 @@ from chipglow.cutting import (
     OutputWindow,
     SolverError,
 )
-from chipglow.cutting.points import block_of_points
-from chipglow.cutting.watch import fastest_point, find_trouble
+from chipglow.cutting.points import block_of_points, fastest_point, find_trouble
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.digest import HDF5Sink
 from chipglow.io.interrupts import uninterrupted

@@ -1,5 +1,8 @@
 """The embedded cutting simulation."""
 
+from typing import TYPE_CHECKING, Any
+
+from chipglow.cutting import library
 from chipglow.cutting.checkpoint import Checkpoint
 from chipglow.cutting.conditions import (
     CuttingConditions,
@@ -7,14 +10,13 @@ from chipglow.cutting.conditions import (
     Numerics,
     OutputWindow,
     Surroundings,
+    unresolved,
 )
 from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
 from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz, ZerilliArmstrong
 from chipglow.cutting.library import (
-    AISI_1045,
-    CARBIDE,
     MaterialError,
     MaterialFile,
     is_own_file,
@@ -23,12 +25,19 @@ from chipglow.cutting.library import (
     tool_material,
     workpiece,
 )
-from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
-from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
-from chipglow.cutting.preview import Preview
-from chipglow.cutting.resolution import unresolved
+from chipglow.cutting.material import (
+    NonlocalViscosity,
+    RateTable,
+    TemperatureTable,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
+from chipglow.cutting.recording import Preview
 from chipglow.cutting.simulation import SOLVER_VERSION, CuttingSimulation, ForceHistory, SolverError
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody
+
+if TYPE_CHECKING:
+    from chipglow.cutting.library import AISI_1045, CARBIDE
 
 __all__ = [
     "AISI_1045",
@@ -69,3 +78,10 @@ __all__ = [
     "unresolved",
     "workpiece",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Leave the constants to the library, which reads them when they are first used."""
+    if name in ("AISI_1045", "CARBIDE"):
+        return getattr(library, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -30,19 +30,12 @@ class State(Protocol):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A simulation after some of its intervals: all that the next ones depend on.
-
-    Parameters
-    ----------
-    arrays : mapping
-        The state by name, in SI. ``time`` is how far the cut is, in s; ``records`` holds the
-        forces and energies of the intervals that are done.
-    progress : float
-        Fraction of the cut that is done, 0 to 1.
-    """
+    """A simulation after some of its intervals: all that the next ones depend on."""
 
     arrays: Mapping[str, NDArray[Any]]
+    """The state by name, in SI; ``records``: forces and energies of the intervals done."""
     progress: float
+    """Fraction of the cut that is done, 0 to 1."""
 
     @property
     def time(self) -> float:
@@ -51,20 +44,14 @@ class Checkpoint:
 
 
 def capture(state: State, records: NDArray[np.float64], progress: float) -> Checkpoint:
-    """State as it is; the arrays are the state's own, so they change when it goes on."""
+    """Return the state as it is, in its own arrays, which change when it goes on."""
     arrays = {name: np.asarray(getattr(state, name)) for name in (*_ARRAYS, *_NUMBERS)}
     arrays |= {"points": state.points[: state.count], "records": records}
     return Checkpoint(arrays, progress)
 
 
 def restore(state: State, checkpoint: Checkpoint, records: NDArray[np.float64]) -> int:
-    """Set a fresh state, and the records, to a checkpoint; return how many intervals are done.
-
-    Raises
-    ------
-    ValueError
-        If the checkpoint is of another simulation.
-    """
+    """Set a fresh state, and the records, to a checkpoint; return how many intervals are done."""
     arrays = checkpoint.arrays
     names = {*_ARRAYS, *_NUMBERS, "points", "records"}
     if set(arrays) != names:

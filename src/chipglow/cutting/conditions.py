@@ -1,5 +1,6 @@
 """What is cut and how: speed, feed, friction; when to look; how finely to compute."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
@@ -12,6 +13,9 @@ from chipglow.quantities.units import (
     TEMPERATURE,
     TIME,
 )
+
+CELLS_NEEDED: Final = 5.0
+"""Cells across a length from which its shape, and what happens along it, is resolved."""
 
 INITIAL_TEMPERATURE: Final = Parameter(
     "Temperature of workpiece and tool before the cut.", TEMPERATURE, least=200.0, most=1500.0
@@ -214,3 +218,21 @@ class Numerics(Part):
         for name in ("upstream", "downstream", "depth", "height"):
             if not 8 * self.cell <= getattr(self, name) <= 0.1:
                 raise ValueError(f"{name}: {getattr(self, name)!r} m, expected 8 cells to 0.1 m")
+
+
+def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:
+    """Return a sentence for each length in m, by its name, of fewer than `CELLS_NEEDED` cells.
+
+    0 and NaN are left out: a sharp edge has no radius.
+    """
+    return tuple(
+        f"The {name}, {length * 1e6:.3g} um, is {_cells(length / cell)}, expected "
+        f"{CELLS_NEEDED:g} or more: take a cell of {length / CELLS_NEEDED * 1e6:.2g} um."
+        for name, length in lengths.items()
+        if 0.0 < length < CELLS_NEEDED * cell * (1 - 1e-9)
+    )
+
+
+def _cells(count: float) -> str:
+    text = f"{count:.2g}"
+    return f"{text} cell" if text == "1" else f"{text} cells"

@@ -21,7 +21,6 @@ resolve a narrower one. What this layer takes is the energy of the failed surfac
 BAND_LENGTHS: Final = 2.0
 """Width of that layer in lengths of a `NonlocalViscosity`."""
 
-
 _LARGEST_LOSS: Final = 0.99
 
 
@@ -70,32 +69,24 @@ class JohnsonCookDamage(Part):
 
 
 @dataclass(frozen=True)
-class FittedDamage:
-    """How well the numbers of a damage law that were fitted to measured cuts are known.
+class FittedDamage(Part):
+    """How well the numbers of a damage law that were fitted to measured cuts are known."""
 
-    Parameters
-    ----------
-    numbers : tuple of str
-        Names of the fitted fields of `JohnsonCookDamage`.
-    relative_covariance : tuple of tuple of float
-        Covariance of their natural logarithms, shape (n, n).
-    """
-
-    numbers: tuple[str, ...]
-    relative_covariance: tuple[tuple[float, ...], ...]
+    numbers: Annotated[tuple[str, ...], Parameter("Fitted fields of `JohnsonCookDamage`.")]
+    relative_covariance: Annotated[
+        tuple[tuple[float, ...], ...], Parameter("Covariance of their natural logarithms.")
+    ]
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         known = {one.name for one in fields(JohnsonCookDamage)}
         for name in self.numbers:
             if name not in known:
                 raise ValueError(f"numbers: {name!r}, expected one of {sorted(known)}")
-        covariance = np.array(self.relative_covariance, dtype=np.float64)
         size = len(self.numbers)
-        if covariance.shape != (size, size):
-            raise ValueError(
-                f"relative_covariance: {covariance.shape[0]} rows, expected "
-                f"{size} rows of {size} numbers"
-            )
+        if not size or [len(row) for row in self.relative_covariance] != [size] * size:
+            raise ValueError(f"relative_covariance: expected {size} rows of {size} numbers")
+        covariance = np.array(self.relative_covariance, dtype=np.float64)
         lowest = np.linalg.eigvalsh(covariance).min() if size else 0.0
         if not np.allclose(covariance, covariance.T) or lowest < -1e-9 * covariance.max():
             raise ValueError(
@@ -103,15 +94,7 @@ class FittedDamage:
             )
 
     def draw(self, damage: JohnsonCookDamage, generator: np.random.Generator) -> JohnsonCookDamage:
-        """Another damage law that the measured cuts allow: log-normal about the one in use.
-
-        Parameters
-        ----------
-        damage : JohnsonCookDamage
-            The one in use.
-        generator : numpy.random.Generator
-            What draws.
-        """
+        """Draw another damage law that the measured cuts allow: log-normal about `damage`."""
         size = len(self.numbers)
         drawn = generator.multivariate_normal(
             np.zeros(size), self.relative_covariance, method="eigh"
@@ -141,7 +124,7 @@ class Damage(NamedTuple):
 
     @classmethod
     def of(cls, law: JohnsonCookDamage | None, layer: float) -> "Damage":
-        """Numbers of a law (None: nothing fails) that softens a layer of a thickness in m."""
+        """Return a law's numbers (None: nothing fails) for a softening layer's thickness in m."""
         if law is None:
             return cls(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e3, 0.0, 1.0)
         same = {name: getattr(law, name) for name in cls._fields if name != "per_work"}
@@ -150,13 +133,13 @@ class Damage(NamedTuple):
 
 @njit(**INLINE)
 def weakening(damage, law):  # type: ignore[no-untyped-def]
-    """Factor on the flow stress; damage beyond 1 counts the softening w."""
+    """Return the factor on the flow stress; damage beyond 1 counts the softening w."""
     return 1.0 - law.loss * min(max(damage - 1.0, 0.0), 1.0)
 
 
 @njit(**INLINE)
 def strain_to_failure(triaxiality, rate, temperature, law):  # type: ignore[no-untyped-def]
-    """Strain to failure at a triaxiality, plastic strain rate (1/s) and temperature (K)."""
+    """Return the strain to failure at a triaxiality, strain rate (1/s) and temperature (K)."""
     held = min(max(triaxiality, TRIAXIALITIES[0]), TRIAXIALITIES[1])
     fast = 1.0 + law.d4 * logarithm(max(rate / law.reference_rate, 1.0))
     cold = law.d1 + law.d2 * exponential(law.d3 * held)
@@ -165,7 +148,7 @@ def strain_to_failure(triaxiality, rate, temperature, law):  # type: ignore[no-u
 
 @njit(**INLINE)
 def damage_growth(damage, increment, rate, mean_stress, stress, temperature, law):  # type: ignore[no-untyped-def]
-    """What a plastic strain `increment` adds to the damage; stresses in Pa, `stress` over 0."""
+    """Return what a plastic strain `increment` adds to the damage; stresses in Pa."""
     failing = increment * stress / weakening(damage, law) * law.per_work
     limit = strain_to_failure(mean_stress / stress, rate, temperature, law)
     return increment / limit if damage < 1.0 else failing

@@ -14,42 +14,27 @@ from chipglow.cutting.stress import BULK, SHEAR, elastic_energy, kelvin_index
 class EnergyHistory:
     """Energy per width of cut since the start, in J/m, at the times of the force history.
 
-    Parameters
-    ----------
-    drive_work : ndarray
-        Work of the driven boundary, and what material brought in less what it took out, shape (n,).
-    contact_work : ndarray
-        Work of the tool's normal force: a rigid tool at rest does next to none, shape (n,).
-    kinetic_energy, elastic_energy : ndarray
-        Change of the energies that the material holds, shape (n,). The kinetic energy is that of
-        the scaled mass.
-    plastic_work : ndarray
-        Plastic work, of which the Taylor-Quinney fraction is heat, shape (n,).
-    friction_work : ndarray
-        Friction work, all of it heat, shape (n,).
-    sharing_loss : ndarray
-        Elastic energy lost because the points of a cell share one dilation, shape (n,).
-    expansion_work : ndarray
-        Elastic energy that material got from heat when it was warmed under pressure (or cooled
-        under tension), shape (n,): no drive did that work.
-    moduli_loss : ndarray
-        Elastic energy that was lost as the moduli fell with the temperature, shape (n,); less than
-        0 if material under stress cooled.
-    lost_heat : ndarray
-        Heat that free surfaces lost to the surroundings, shape (n,). It was plastic or friction
-        work before, so it is no entry of the mechanical balance.
+    Each entry has the shape (n,).
     """
 
     drive_work: NDArray[np.float64]
+    """Work of the driven boundary, and what material brought in less what it took out."""
     contact_work: NDArray[np.float64]
+    """Work of the tool's normal force: a rigid tool at rest does next to none."""
     kinetic_energy: NDArray[np.float64]
+    """Change of the energy of motion, of the scaled mass."""
     elastic_energy: NDArray[np.float64]
     plastic_work: NDArray[np.float64]
+    """Of which the Taylor-Quinney fraction is heat."""
     friction_work: NDArray[np.float64]
     sharing_loss: NDArray[np.float64]
+    """Elastic energy lost because the points of a cell share one dilation."""
     expansion_work: NDArray[np.float64]
+    """Elastic energy that material got from heat when it was warmed under pressure."""
     moduli_loss: NDArray[np.float64]
+    """Elastic energy that was lost as the moduli fell with the temperature."""
     lost_heat: NDArray[np.float64]
+    """Heat that free surfaces lost: plastic or friction work before, so no mechanical entry."""
 
     @property
     def closing_error(self) -> NDArray[np.float64]:
@@ -66,7 +51,7 @@ ENERGIES: Final = len(fields(EnergyHistory))
 
 @njit(cache=True)
 def held_energy(points, count, step, elastic, cell):  # type: ignore[no-untyped-def]
-    """Kinetic and elastic energy of the points in J/m; the affine velocity's part included.
+    """Return kinetic and elastic energy of the points in J/m; the affine velocity's part included.
 
     `elastic` is `WorkpieceMaterial.elastic_ratios`: the warmer a point is, the less energy its
     elastic strain holds.

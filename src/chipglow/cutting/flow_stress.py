@@ -60,7 +60,7 @@ class FlowStress(Part):
 
     @staticmethod
     def stress(strain: Any, rate: Any, temperature: Any, law: Any) -> Any:
-        """Flow stress in Pa; compiled by Numba.
+        """Return the flow stress in Pa; compiled by Numba.
 
         Parameters
         ----------
@@ -72,11 +72,11 @@ class FlowStress(Part):
         raise NotImplementedError
 
     def numbers(self) -> Any:
-        """The law's numbers for kernels."""
+        """Return the law's numbers for kernels."""
         return self.Numbers(*(float(getattr(self, name)) for name in self.Numbers._fields))
 
     def at(self, strain: ArrayLike, rate: ArrayLike, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Flow stress in Pa at plastic strains, rates (1/s) and temperatures (K), broadcast."""
+        """Return the flow stress in Pa at strains, rates (1/s) and temperatures (K), broadcast."""
         each = np.broadcast_arrays(strain, rate, temperature)
         numbers = self.numbers()
         points = np.stack([np.ravel(one) for one in each], axis=-1).astype(np.float64)
@@ -86,7 +86,7 @@ class FlowStress(Part):
 
 
 def comes_with_chipglow(kind: type) -> bool:
-    """Whether a law, or the named tuple of its numbers, is not a user's own."""
+    """Return whether a law, or the named tuple of its numbers, is not a user's own."""
     return kind.__module__.startswith("chipglow.")
 
 
@@ -105,7 +105,7 @@ def _numbers_of(law: Any) -> Any:
 
 
 def _kernel(law: Any) -> Any:
-    """What the nearest class defines: a law whose `stress` is another has other slopes."""
+    """Return what the nearest class defines: a law whose `stress` is another has other slopes."""
     nearest = next(one for one in law.__mro__ if {"stress", "stress_and_slopes"} & vars(one).keys())
     if "stress_and_slopes" in vars(nearest):
         return law.stress_and_slopes
@@ -127,7 +127,7 @@ def _by_differences(stress: Callable[..., Any]) -> Any:
 
 
 def stress_and_slopes(strain: float, rate: float, temperature: float, law: Any) -> Any:
-    """Flow stress (Pa) and its derivatives by strain and by ln rate; for kernels only."""
+    """Return flow stress (Pa) and derivatives by strain and by ln rate; for kernels only."""
     raise NotImplementedError("called from compiled code only")
 
 
@@ -141,7 +141,7 @@ def _choose(strain, rate, temperature, law):  # type: ignore[no-untyped-def]  # 
 
 @njit(**INLINE)
 def flow_stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-    """Flow stress in Pa at a plastic strain, its rate (1/s) and temperature (K)."""
+    """Return the flow stress in Pa at a plastic strain, its rate (1/s) and temperature (K)."""
     return stress_and_slopes(strain, rate, temperature, law)[0]
 
 

@@ -26,7 +26,7 @@ class ToolHeat(NamedTuple):
 
 @njit(cache=True)
 def tool_fraction(grid, tool):  # type: ignore[no-untyped-def]
-    """Fraction of each node's square that the tool fills, shape (columns, rows)."""
+    """Return the fraction of each node's square that the tool fills, shape (columns, rows)."""
     result = np.zeros((grid.columns, grid.rows))
     for i in range(grid.columns):
         for j in range(grid.rows):
@@ -64,7 +64,7 @@ def conduct(  # type: ignore[no-untyped-def]
 
 @njit
 def _place(p, grid):  # type: ignore[no-untyped-def]
-    """First of the nodes around a point, column and row, and its offset from it in cells."""
+    """Return the first node around a point, column and row, and the offset from it in cells."""
     i, ax = spline((p.x - grid.left) / grid.cell)
     j, ay = spline((p.y - grid.bottom) / grid.cell)
     return i, j, ax, ay
@@ -72,14 +72,14 @@ def _place(p, grid):  # type: ignore[no-untyped-def]
 
 @njit
 def nodes_around(p, grid):  # type: ignore[no-untyped-def]
-    """First of the nodes around a point, column and row, and the weights of both directions."""
+    """Return the first node around a point, column and row, and the weights each way."""
     i, j, ax, ay = _place(p, grid)
     return i, j, spline_weights(ax), spline_weights(ay)
 
 
 @njit
 def _slopes(offset):  # type: ignore[no-untyped-def]
-    """Slopes of the weights of the three nodes, per cell."""
+    """Return the slopes of the weights of the three nodes, per cell."""
     return offset - 1.5, 2.0 * (1.0 - offset), offset - 0.5
 
 
@@ -112,7 +112,7 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
 
 @njit
 def _conduct_at(p, nodes, increment, conductivity, grid, duration, part):  # type: ignore[no-untyped-def]
-    """Slopes of a point's temperature, its noise less, and the heat of its flux to its nodes."""
+    """Set the slopes of a point's temperature, damp its noise, and give its flux to its nodes."""
     i, j, ax, ay = _place(p, grid)
     wx, wy = spline_weights(ax), spline_weights(ay)
     sx, sy = _slopes(ax), _slopes(ay)
@@ -194,7 +194,7 @@ def heat_contact(  # type: ignore[no-untyped-def]
 
 @njit
 def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
-    """A point's time in contact, weighted, to its nodes."""
+    """Add a point's time in contact, weighted, to its nodes."""
     i, j, wx, wy = nodes_around(p, grid)
     for a in range(3):
         for b in range(3):
@@ -203,7 +203,7 @@ def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
 
 @njit
 def _friction_work(p, friction, touched, grid):  # type: ignore[no-untyped-def]
-    """A point's part of its nodes' friction work in J/m, by weight and time in contact."""
+    """Return a point's part of its nodes' friction work in J/m, by weight and time in contact."""
     i, j, wx, wy = nodes_around(p, grid)
     work = 0.0
     for a in range(3):
@@ -262,7 +262,7 @@ def heat_surface(p, dx, dy, heat, increment, nodes, grid):  # type: ignore[no-un
 
 @njit
 def _partner(x, y, tool, grid):  # type: ignore[no-untyped-def]
-    """Nodes and weights of the place half a cell under the tool's surface next to a point."""
+    """Return nodes and weights of the place half a cell under the tool's surface."""
     distance, nx, ny = surface_distance(x, y, tool)
     down = distance + 0.5 * grid.cell
     fx = (x - nx * down - grid.left) / grid.cell

@@ -28,7 +28,7 @@ class HeatLoss(NamedTuple):
 
     @classmethod
     def of(cls, surroundings: Surroundings, numerics: Numerics) -> "HeatLoss":
-        """Losses in the computed region; where it cuts through the material is no free surface."""
+        """Return losses in the computed region, whose own border is no free surface."""
         edge = 2 * numerics.cell
         return cls(
             surroundings.convection,
@@ -43,14 +43,14 @@ class HeatLoss(NamedTuple):
 
 @njit
 def heat_flux(temperature, loss):  # type: ignore[no-untyped-def]
-    """Heat in W/m² that a surface loses at a temperature in K."""
+    """Return the heat in W/m² that a surface loses at a temperature in K."""
     radiated = _SIGMA * (temperature**4 - loss.ambient**4)
     return loss.convection * (temperature - loss.ambient) + loss.emissivity * radiated
 
 
 @njit(cache=True)
 def free_surface(nodes, fraction, grid, i, j):  # type: ignore[no-untyped-def]
-    """Free surface of chip and tool per width (m) between node (i, j) and the next three.
+    """Return the free surface of chip and tool per width (m) at the four nodes from (i, j) on.
 
     The gradient of the filled fraction, integrated over an area, is the length of the boundary in
     it (coarea formula).

@@ -27,7 +27,7 @@ _ROUND = 6755399441055744.0
 
 @njit(**INLINE)
 def logarithm(x):  # type: ignore[no-untyped-def]
-    """Ln x for a normal x > 0, within 4e-15 + 2 units in the last place."""
+    """Return ln x for a normal x > 0, within 4e-15 + 2 units in the last place."""
     bits = np.float64(x).view(np.int64)
     exponent = (bits - _HALF_OF_TWO) >> 52
     fraction = np.int64(bits - (exponent << 52)).view(np.float64)
@@ -45,7 +45,7 @@ def logarithm(x):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def exponential(x):  # type: ignore[no-untyped-def]
-    """e^x for |x| < 700, within 1e-14 of its value."""
+    """Return e^x for |x| < 700, within 1e-14 of its value."""
     shifted = x * (1.0 / _LN2) + _ROUND
     n = shifted - _ROUND
     r = (x - n * _LN2_HIGH) - n * _LN2_LOW

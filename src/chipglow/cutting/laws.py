@@ -17,7 +17,7 @@ MELTING_LIMIT = 3000.0
 
 @njit(**INLINE)
 def homologous(temperature, law):  # type: ignore[no-untyped-def]
-    """θ = (T − T₀) / (T_melt − T₀), from 0 to 0.99."""
+    """Return θ = (T − T₀) / (T_melt − T₀), from 0 to 0.99."""
     theta = (temperature - law.reference_temperature) / (
         law.melting_temperature - law.reference_temperature
     )
@@ -27,7 +27,7 @@ def homologous(temperature, law):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _thermal(temperature, law):  # type: ignore[no-untyped-def]
-    """1 − θᵐ."""
+    """Return 1 − θᵐ."""
     heat = homologous(temperature, law)
     m = law.thermal_exponent
     return 1.0 - (heat if m == 1.0 else exponential(m * logarithm(max(heat, 1e-30))))
@@ -91,7 +91,7 @@ class HyperbolicTangent(JohnsonCook):
 
     @staticmethod
     def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-        """Flow stress in Pa."""
+        """Return the flow stress in Pa."""
         hardened = law.hardening * strain**law.hardening_exponent
         hardened = hardened * np.exp(-(strain**law.hardening_limit))
         fast = 1.0 + law.rate_sensitivity * np.log(max(rate / law.reference_rate, 1.0))
@@ -131,7 +131,7 @@ class MarusichOrtiz(FlowStress):
 
     @staticmethod
     def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-        """Flow stress in Pa."""
+        """Return the flow stress in Pa."""
         heat = law.thermal_softening * (temperature - law.reference_temperature)
         hard = (1.0 + strain / law.reference_strain) ** (1.0 / law.hardening_exponent)
         fast = (1.0 + rate / law.reference_rate) ** (1.0 / law.rate_exponent)

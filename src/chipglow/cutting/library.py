@@ -1,7 +1,7 @@
 """Materials as data files, each number with its unit and its source."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -10,17 +10,33 @@ from typing import Any, Final, NamedTuple
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FLOW_LAWS
-from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
-from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
+from chipglow.cutting.material import (
+    NonlocalViscosity,
+    RateTable,
+    TemperatureTable,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
 from chipglow.quantities import Parameter, of_other_packages
 from chipglow.quantities.units import KELVINS, STRAIN_RATE
 from chipglow.text import read_yaml
 
 FOLDER: Final = Path(__file__).with_name("materials")
-_FOLDERS: Final = {"workpiece": FOLDER / "workpieces", "tool": FOLDER / "tools"}
 _OWN: Final = {
-    kind: {path.stem: path for path in folder.glob("*.yaml")} for kind, folder in _FOLDERS.items()
+    kind: {path.stem: path for path in (FOLDER / f"{kind}s").glob("*.yaml")}
+    for kind in ("workpiece", "tool")
 }
+_GROUP: Final = "chipglow.material"
+_NAME: Final = re.compile(r"(.+\.ya?ml|[^/]*)(?:/(.*))?")
+_HEADER: Final = ("kind", "name", "description")
+_GROUPS: Final = ("flow_stress", "damage")
+_OPTIONAL: Final = ("fitted_damage", "nonlocal_viscosity")
+_TABLES_ONLY: Final = ("conductivity", "heat_capacity")
+_RATE: Final = Parameter("Strain rate.", STRAIN_RATE, over=0.0)
+_TEMPERATURE: Final = Parameter("Temperature.", KELVINS)
+
+AISI_1045: WorkpieceMaterial
+CARBIDE: ToolMaterial
 
 
 class MaterialError(ValueError):
@@ -28,96 +44,53 @@ class MaterialError(ValueError):
 
 
 class Property(NamedTuple):
-    """A number of a material as its file gives it.
-
-    The field (``flow_stress.ozel.hardening``), its value as text with the unit, and its source.
-    """
+    """A number of a material as its file gives it, with unit and source."""
 
     field: str
+    """Such as ``flow_stress.ozel.hardening``."""
     text: str
     source: str
 
 
 @dataclass(frozen=True)
 class MaterialFile:
-    """What a file of the library says.
-
-    Parameters
-    ----------
-    name, description : str
-        Of the material, for readers.
-    properties : tuple of Property
-        All numbers, in the file's order.
-    workpieces : mapping of str to WorkpieceMaterial
-        The workpiece's material by the set of its flow stress, the default first; empty for a tool.
-    tool : ToolMaterial or None
-        The tool's material.
-    """
+    """A material as its file describes it."""
 
     name: str
     description: str
     properties: tuple[Property, ...]
+    """All numbers, in the file's order."""
     workpieces: Mapping[str, WorkpieceMaterial]
+    """Material by the set of its flow stress, the default first; empty for a tool."""
     tool: ToolMaterial | None
 
-
-_RATE: Final = Parameter("Strain rate.", STRAIN_RATE, over=0.0)
-_TEMPERATURE: Final = Parameter("Temperature.", KELVINS)
-_CONSTANT_OR_TABLE: Final = ("density", "young_modulus", "poisson_ratio")
-_TABLES: Final = ("conductivity", "heat_capacity")
-_GROUP: Final = "chipglow.material"
-_HEADER: Final = ("kind", "name", "description")
-_WORKPIECE_PARTS: Final = (*_CONSTANT_OR_TABLE, "taylor_quinney", *_TABLES, "flow_stress", "damage")
-_OPTIONAL: Final = ("fitted_damage", "nonlocal_viscosity")
-_OWN_FILE: Final = re.compile(r"(.+\.ya?ml)(?:/([^/]+))?")
+    @property
+    def kind(self) -> str:
+        """``workpiece`` or ``tool``."""
+        return "tool" if self.tool else "workpiece"
 
 
 def material_names(kind: str | None = None) -> list[str]:
-    """Names of the library's materials, with those of other packages.
-
-    A package adds its own by entry points in the group ``chipglow.material``: the path of a file.
-
-    Parameters
-    ----------
-    kind : {'workpiece', 'tool'}, optional
-        Only these.
-    """
+    """Return the names of the library's materials (of one kind), with those of other packages."""
     own = {name for one, names in _OWN.items() if kind in (None, one) for name in names}
     others = of_other_packages(_GROUP).keys()
-    return sorted(own | {n for n in others if kind in (None, _kind(material_file(n)))})
+    return sorted(own | {name for name in others if kind in (None, material_file(name).kind)})
 
 
 def is_own_file(name: str) -> bool:
-    """Whether a name is the path of a file of one's own, with or without a set."""
-    return _OWN_FILE.fullmatch(name) is not None
+    """Return whether a name is the path of a file of one's own, with or without a set."""
+    match = _NAME.fullmatch(name)
+    return match is not None and match[1].endswith((".yaml", ".yml"))
 
 
 def workpiece(name: str) -> WorkpieceMaterial:
-    """Material of a workpiece.
+    """Return a workpiece's material by its name or the path of a .yaml file, and a ``/set``.
 
-    Parameters
-    ----------
-    name : str
-        A name of the library (``aisi-1045``), or the path of a file of one's own that ends in
-        .yaml; with a set of the flow stress after a slash (``aisi-1045/ozel``) or with the file's
-        first.
-
-    Raises
-    ------
-    MaterialError
-        If there is no such material, or its file is not as it should be.
-    OSError
-        If a file of one's own cannot be read.
+    Without a set it is the file's first one.
     """
-    own = _OWN_FILE.fullmatch(name)
-    file, chosen = (own[1], own[2]) if own else (name.split("/")[0], _after_slash(name))
-    material = read_material(Path(file)) if own else _in_library(file)
-    if material is None or (material.tool and not own):
-        known = ", ".join(material_names("workpiece"))
-        raise MaterialError(f"{name!r} is unknown, expected one of {known}, or a file like my.yaml")
-    sets = material.workpieces
-    if not sets:
-        raise MaterialError(f"{file}: kind: 'tool', expected workpiece")
+    match = _NAME.fullmatch(name)
+    file, chosen = (match[1], match[2]) if match else (name, None)
+    sets = material_file(file, "workpiece").workpieces
     if chosen is None:
         return next(iter(sets.values()))
     if chosen not in sets:
@@ -126,279 +99,183 @@ def workpiece(name: str) -> WorkpieceMaterial:
 
 
 def tool_material(name: str) -> ToolMaterial:
-    """Material of a tool by its name in the library, such as ``carbide``.
-
-    Raises
-    ------
-    MaterialError
-        If there is none of that name.
-    """
-    material = _in_library(name)
-    if material is None or material.tool is None:
-        known = ", ".join(material_names("tool"))
-        raise MaterialError(f"{name!r} is unknown, expected one of {known}")
-    return material.tool
+    """Return a tool's material by its name in the library, such as ``carbide``."""
+    tool = material_file(name, "tool").tool
+    assert tool is not None
+    return tool
 
 
-def material_file(name: str) -> MaterialFile:
-    """Read a material's file, by its name in the library or by a path that ends in .yaml.
-
-    Raises
-    ------
-    MaterialError
-        If the name is unknown or the file is not as it should be.
-    OSError
-        If a file of one's own cannot be read.
-    """
-    if _OWN_FILE.fullmatch(name):
-        return read_material(Path(name))
-    material = _in_library(name)
+def material_file(name: str, kind: str | None = None) -> MaterialFile:
+    """Return a material (of a kind) by its name in the library or by a path that ends in .yaml."""
+    material = read_material(Path(name)) if is_own_file(name) else _in_library(name)
     if material is None:
-        raise MaterialError(f"{name!r} is unknown, expected one of {', '.join(material_names())}")
+        known = ", ".join(material_names(kind))
+        raise MaterialError(f"{name!r} is unknown, expected one of {known}, or a file like my.yaml")
+    if kind not in (None, material.kind):
+        raise MaterialError(f"{name}: kind: {material.kind!r}, expected {kind}")
     return material
-
-
-def read_material(path: Path) -> MaterialFile:
-    """Read a material from a file.
-
-    Raises
-    ------
-    MaterialError
-        If the file is not as it should be: unknown or missing field, value without its unit.
-    OSError
-        If it cannot be read.
-    """
-    try:
-        data = read_yaml(path)
-    except ValueError as error:
-        raise MaterialError(str(error)) from None
-    return _Reader(path.name).material(data)
-
-
-def _after_slash(name: str) -> str | None:
-    _, slash, rest = name.partition("/")
-    return rest if slash else None
 
 
 @cache
 def _in_library(name: str) -> MaterialFile | None:
-    """Of the library's own, or else of other packages: those load only if they are needed."""
+    """Return one of the library's own, or else of other packages: those load only if needed."""
     own = {name: path for paths in _OWN.values() for name, path in paths.items()}
     path = own.get(name) or of_other_packages(_GROUP).get(name)
     return None if path is None else read_material(Path(path))
 
 
-def _kind(material: MaterialFile) -> str:
-    return "tool" if material.tool else "workpiece"
+def read_material(path: Path) -> MaterialFile:
+    """Read a material from a YAML file."""
+    try:
+        data = read_yaml(path)
+    except ValueError as error:
+        raise MaterialError(str(error)) from None
+    try:
+        return _material(data)
+    except ValueError as error:
+        raise MaterialError(f"{path.name}: {error}") from None
 
 
-def _has_rows(data: object) -> bool:
-    return isinstance(data, Mapping) and isinstance(data.get("value"), list)
+def _material(data: Any) -> MaterialFile:
+    kind = data.get("kind") if isinstance(data, Mapping) else None
+    if kind not in _OWN:
+        raise ValueError(f"kind: {kind!r}, expected workpiece or tool")
+    is_tool = kind == "tool"
+    declared = ToolMaterial.declared() if is_tool else WorkpieceMaterial.declared()
+    groups, optional = ((), ()) if is_tool else (_GROUPS, _OPTIONAL)
+    _check_keys("", data, (*_HEADER, *declared, *groups), optional)
+    name, description = (_text(key, data[key]) for key in ("name", "description"))
+    values = {key: _property(key, data[key], one) for key, one in declared.items()}
+    tool = _called("tool", ToolMaterial, name=name, **values) if is_tool else None
+    workpieces = {} if is_tool else _workpieces(name, data, values)
+    return MaterialFile(name, description, tuple(_numbers("", data)), workpieces, tool)
 
 
-class _Reader:
-    """Takes a file's data apart and keeps all its numbers as text."""
-
-    def __init__(self, file: str) -> None:
-        self._file = file
-        self._properties: list[Property] = []
-
-    def material(self, data: object) -> MaterialFile:
-        kind = data.get("kind") if isinstance(data, Mapping) else None
-        if kind not in ("workpiece", "tool"):
-            raise self._wrong("kind", kind, "workpiece or tool")
-        parts = tuple(ToolMaterial.declared()) if kind == "tool" else _WORKPIECE_PARTS
-        if isinstance(data, Mapping) and kind == "workpiece":
-            parts = (*parts, *(one for one in _OPTIONAL if one in data))
-        data = self._mapping("", data, (*_HEADER, *parts))
-        name, description = self._text("name", data), self._text("description", data)
-        sets: dict[str, WorkpieceMaterial] = {}
-        tool: ToolMaterial | None = None
-        if kind == "workpiece":
-            sets = self._workpieces(name, data)
-        else:
-            numbers = {
-                key: self._sourced(key, data[key], one)
-                for key, one in ToolMaterial.declared().items()
-            }
-            tool = self._build("tool", ToolMaterial, {"name": name, **numbers})
-        return MaterialFile(name, description, tuple(self._properties), sets, tool)
-
-    def _workpieces(self, name: str, data: Mapping[str, Any]) -> dict[str, WorkpieceMaterial]:
-        declared = WorkpieceMaterial.declared()
-        either = {
-            key: self._constant_or_table(key, data[key], declared[key])
-            for key in _CONSTANT_OR_TABLE
-        }
-        heat_fraction = self._heat_fraction(data["taylor_quinney"], declared["taylor_quinney"])
-        tables = {key: self._table(key, data[key], declared[key]) for key in _TABLES}
-        damage = self._damage(data["damage"])
-        fitted = self._fitted(data["fitted_damage"]) if "fitted_damage" in data else None
-        resists = self._nonlocal_viscosity(data.get("nonlocal_viscosity"))
-        laws = data["flow_stress"]
-        if not isinstance(laws, Mapping) or not laws:
-            raise self._wrong("flow_stress", laws, "one set or more by name")
-        sets = {}
-        for chosen, law in laws.items():
-            place = f"flow_stress.{chosen}"
-            fails, flow_stress = self._flow_stress(place, law)
-            values = {
-                "name": f"{name}, flow stress {chosen}",
-                "flow_stress": flow_stress,
-                "damage": damage if fails else None,
-                "fitted_damage": fitted if fails else None,
-                "nonlocal_viscosity": resists,
-                "taylor_quinney": heat_fraction,
-                **either,
-                **tables,
-            }
-            sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, values)
-        return sets
-
-    def _damage(self, data: object) -> JohnsonCookDamage | None:
-        if data == "none":
-            return None
-        damage: JohnsonCookDamage = self._build(
-            "damage", JohnsonCookDamage, self._group("damage", data, JohnsonCookDamage.declared())
-        )
-        return damage
-
-    def _nonlocal_viscosity(self, data: object) -> NonlocalViscosity | None:
-        if data is None:
-            return None
+def _workpieces(
+    name: str, data: Mapping[str, Any], values: dict[str, Any]
+) -> dict[str, WorkpieceMaterial]:
+    for key in _TABLES_ONLY:
+        if not isinstance(values[key], TemperatureTable):
+            given = data[key]["value"]
+            raise ValueError(f"{key}: {given!r}, expected rows of [temperature, value]")
+    failure: dict[str, Any] = {"damage": None}
+    if data["damage"] != "none":
+        failure["damage"] = _group("damage", data["damage"], JohnsonCookDamage)
+    if "fitted_damage" in data:
+        failure["fitted_damage"] = _fitted("fitted_damage", data["fitted_damage"])
+    if data.get("nonlocal_viscosity") is not None:
         place = "nonlocal_viscosity"
-        values = self._group(place, data, NonlocalViscosity.declared())
-        made: NonlocalViscosity = self._build(place, NonlocalViscosity, values)
-        return made
-
-    def _fitted(self, data: object) -> FittedDamage:
-        """How well the damage is known; a number that is no number is the class's to refuse."""
-        keys = ("numbers", "relative_covariance", "source")
-        data = self._mapping("fitted_damage", data, keys)
-        source = self._text("fitted_damage.source", data)
-        numbers, rows = data["numbers"], data["relative_covariance"]
-        if not isinstance(numbers, list) or not all(isinstance(one, str) for one in numbers):
-            raise self._wrong("fitted_damage.numbers", numbers, "names, such as [d1, loss]")
-        if not isinstance(rows, list) or not all(
-            isinstance(row, list) and all(isinstance(one, int | float) for one in row)
-            for row in rows
-        ):
-            raise self._wrong("fitted_damage.relative_covariance", rows, "rows of numbers")
-        for name, row in zip(numbers, rows, strict=False):
-            self._properties.append(Property(f"fitted_damage.{name}", str(row), source))
-        values = {"numbers": tuple(numbers), "relative_covariance": tuple(map(tuple, rows))}
-        fitted: FittedDamage = self._build("fitted_damage", FittedDamage, values)
-        return fitted
-
-    def _flow_stress(self, place: str, data: object) -> tuple[bool, Any]:
-        """Whether the damage of the file applies, and the law."""
-        rest = dict(data) if isinstance(data, Mapping) else data
-        law, damage = "johnson-cook", None
-        if isinstance(rest, dict):
-            law, damage = rest.pop("law", law), rest.pop("damage", None)
-        kind = FLOW_LAWS.find(law)
+        values[place] = _group(place, data[place], NonlocalViscosity)
+    laws = data["flow_stress"]
+    if not isinstance(laws, Mapping) or not laws:
+        raise ValueError(f"flow_stress: {laws!r}, expected one set or more by name")
+    sets = {}
+    for chosen, law in laws.items():
+        numbers: Any = dict(law) if isinstance(law, Mapping) else {}
+        named, damage = numbers.pop("law", "johnson-cook"), numbers.pop("damage", None)
+        place, kind = f"flow_stress.{chosen}", FLOW_LAWS.find(named)
         if kind is None:
-            raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(FLOW_LAWS.kinds))}")
+            known = ", ".join(sorted(FLOW_LAWS.kinds))
+            raise ValueError(f"{place}.law: {named!r}, expected one of {known}")
         if damage not in (None, "none"):
-            raise self._wrong(f"{place}.damage", damage, "none, or to be left out")
-        values = self._group(place, rest, kind.declared())
-        return damage is None, self._build(place, kind, values)
-
-    def _build(self, place: str, kind: Any, values: Mapping[str, Any]) -> Any:
-        try:
-            return kind(**values)
-        except ValueError as error:
-            raise MaterialError(f"{self._file}: {place}: {error}") from None
-
-    def _group(
-        self, place: str, data: object, declared: Mapping[str, Parameter]
-    ) -> dict[str, float]:
-        """Numbers that share one source."""
-        data = self._mapping(place, data, (*declared, "source"))
-        source = self._text(f"{place}.source", data)
-        return {
-            key: self._number(f"{place}.{key}", data[key], one, source)
-            for key, one in declared.items()
-        }
-
-    def _sourced(self, place: str, data: object, parameter: Parameter) -> float:
-        data = self._mapping(place, data, ("value", "source"))
-        source = self._text(f"{place}.source", data)
-        return self._number(place, data["value"], parameter, source)
-
-    def _heat_fraction(self, data: object, parameter: Parameter) -> float | RateTable:
-        """A constant fraction, or rows of [strain rate, fraction]."""
-        place = "taylor_quinney"
-        if not _has_rows(data):
-            return self._sourced(place, data, parameter)
-        rates, values = self._rows(place, data, ("strain rate", _RATE), parameter)
-        table: RateTable = self._build(place, RateTable, {"rates": rates, "values": values})
-        return table
-
-    def _constant_or_table(
-        self, place: str, data: object, parameter: Parameter
-    ) -> float | TemperatureTable:
-        if _has_rows(data):
-            return self._table(place, data, parameter)
-        return self._sourced(place, data, parameter)
-
-    def _table(self, place: str, data: object, parameter: Parameter) -> TemperatureTable:
-        temperatures, values = self._rows(place, data, ("temperature", _TEMPERATURE), parameter)
-        columns = {"temperatures": temperatures, "values": values}
-        table: TemperatureTable = self._build(place, TemperatureTable, columns)
-        return table
-
-    def _rows(
-        self, place: str, data: object, over: tuple[str, Parameter], parameter: Parameter
-    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Columns of a table whose rows are [what it is over, value]."""
-        data = self._mapping(place, data, ("value", "source"))
-        source, rows = self._text(f"{place}.source", data), data["value"]
-        if not isinstance(rows, list) or not rows:
-            raise self._wrong(place, rows, f"rows of [{over[0]}, value]")
-        pairs = []
-        for row in rows:
-            if not isinstance(row, list) or len(row) != 2:
-                raise self._wrong(place, row, f"[{over[0]}, value]")
-            pairs.append((self._si(place, row[0], over[1]), self._si(place, row[1], parameter)))
-            self._properties.append(Property(place, f"{row[1]} at {row[0]}", source))
-        first, second = zip(*pairs, strict=True)
-        return first, second
-
-    def _number(self, place: str, value: object, parameter: Parameter, source: str) -> float:
-        number = self._si(place, value, parameter)
-        self._properties.append(Property(place, str(value), source))
-        return number
-
-    def _si(self, place: str, value: object, parameter: Parameter) -> float:
-        try:
-            return parameter.number(value)
-        except ValueError as error:
-            raise MaterialError(f"{self._file}: {place}: {error}") from None
-
-    def _mapping(self, place: str, data: object, keys: tuple[str, ...]) -> Mapping[str, Any]:
-        if not isinstance(data, Mapping):
-            raise self._wrong(place, data, f"keys {', '.join(keys)}")
-        prefix = f"{place}." if place else ""
-        for key in data:
-            if key not in keys:
-                raise MaterialError(
-                    f"{self._file}: {prefix}{key}: unknown, expected one of {', '.join(keys)}"
-                )
-        for key in keys:
-            if key not in data:
-                raise MaterialError(f"{self._file}: {prefix}{key}: is missing, expected a value")
-        return data
-
-    def _text(self, place: str, data: Mapping[str, Any]) -> str:
-        text = data[place.rpartition(".")[2]]
-        if not isinstance(text, str) or not text.strip():
-            raise self._wrong(place, text, "text")
-        return text.strip()
-
-    def _wrong(self, place: str, value: object, expectation: str) -> MaterialError:
-        return MaterialError(f"{self._file}: {place}: {value!r}, expected {expectation}")
+            raise ValueError(f"{place}.damage: {damage!r}, expected none, or to be left out")
+        values |= {"name": f"{name}, flow stress {chosen}", **failure}
+        values["flow_stress"] = _group(place, numbers, kind)
+        if damage is not None:
+            values |= {"damage": None, "fitted_damage": None}
+        sets[str(chosen)] = _called("workpiece", WorkpieceMaterial, **values)
+    return sets
 
 
-AISI_1045: Final = workpiece("aisi-1045")
-CARBIDE: Final = tool_material("carbide")
+def _fitted(place: str, data: Any) -> Any:
+    names = tuple(FittedDamage.declared())
+    _check_keys(place, data, (*names, "source"))
+    _text(f"{place}.source", data["source"])
+    return _called(place, FittedDamage, **{name: data[name] for name in names})
+
+
+def _group(place: str, data: Any, kind: Any) -> Any:
+    """Return a part whose numbers share one source."""
+    declared = kind.declared()
+    _check_keys(place, data, (*declared, "source"))
+    _text(f"{place}.source", data["source"])
+    values = {
+        key: _called(f"{place}.{key}", one.number, data[key]) for key, one in declared.items()
+    }
+    return _called(place, kind, **values)
+
+
+def _property(place: str, data: Any, parameter: Parameter) -> Any:
+    """Return a number, or a table of rows over the temperature or the strain rate."""
+    _check_keys(place, data, ("value", "source"))
+    _text(f"{place}.source", data["source"])
+    rows = data["value"]
+    if not isinstance(rows, list):
+        return _called(place, parameter.number, rows)
+    by_rate = place == "taylor_quinney"
+    over, argument = ("strain rate", _RATE) if by_rate else ("temperature", _TEMPERATURE)
+    if not rows:
+        raise ValueError(f"{place}: [], expected rows of [{over}, value]")
+    pairs = []
+    for row in rows:
+        if not isinstance(row, list) or len(row) != 2:
+            raise ValueError(f"{place}: {row!r}, expected [{over}, value]")
+        columns = zip((argument, parameter), row, strict=True)
+        pairs.append([_called(place, column.number, value) for column, value in columns])
+    return _called(place, RateTable if by_rate else TemperatureTable, *zip(*pairs, strict=True))
+
+
+def _numbers(place: str, data: Mapping[str, Any]) -> Iterator[Property]:
+    """Yield all numbers below a place: they stand beside a source."""
+    for key, value in data.items():
+        below = f"{place}.{key}".lstrip(".")
+        source = str(data.get("source", "")).strip()
+        if isinstance(value, Mapping):
+            yield from _numbers(below, value)
+        elif key == "relative_covariance":
+            for name, row in zip(data["numbers"], value, strict=True):
+                yield Property(f"{place}.{name}", str(row), source)
+        elif key == "value":
+            rows = value if isinstance(value, list) else []
+            texts = [f"{row[1]} at {row[0]}" for row in rows] or [str(value)]
+            yield from (Property(place, text, source) for text in texts)
+        elif source and key not in ("source", "law", "damage", "numbers"):
+            yield Property(below, str(value), source)
+
+
+def _called(place: str, make: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
+    """Call, and put the place before the message of a ValueError."""
+    try:
+        return make(*arguments, **values)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None
+
+
+def _check_keys(
+    place: str, data: object, keys: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> None:
+    if not isinstance(data, Mapping):
+        raise ValueError(f"{place}: {data!r}, expected keys {', '.join(keys)}")
+    prefix = f"{place}." if place else ""
+    for key in data:
+        if key not in (*keys, *optional):
+            expected = ", ".join((*keys, *optional))
+            raise ValueError(f"{prefix}{key}: unknown, expected one of {expected}")
+    for key in keys:
+        if key not in data:
+            raise ValueError(f"{prefix}{key}: is missing, expected a value")
+
+
+def _text(place: str, text: object) -> str:
+    if not isinstance(text, str) or not text.strip():
+        raise ValueError(f"{place}: {text!r}, expected text")
+    return text.strip()
+
+
+def __getattr__(name: str) -> WorkpieceMaterial | ToolMaterial:
+    """Read the constants when they are first used: files and units take a third of a second."""
+    if name == "AISI_1045":
+        return workpiece("aisi-1045")
+    if name == "CARBIDE":
+        return tool_material("carbide")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,9 +8,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.cutting.damage import BAND_CELLS, BAND_LENGTHS, FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FlowStress
-from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import CONDUCTIVITY, DENSITY, HEAT_CAPACITY, STRESS
+from chipglow.quantities.units import (
+    CONDUCTIVITY,
+    DENSITY,
+    HEAT_CAPACITY,
+    LENGTH,
+    STRESS,
+    VISCOSITY,
+)
 
 TABLE_COLDEST: Final = 200.0
 TABLE_HOTTEST: Final = 3000.0
@@ -19,18 +25,12 @@ ROOM_TEMPERATURE: Final = 293.15
 
 @dataclass(frozen=True)
 class TemperatureTable:
-    """A property that depends on temperature: linear between the points, constant beyond.
-
-    Parameters
-    ----------
-    temperatures : tuple of float
-        In K, ascending.
-    values : tuple of float
-        The property in SI units, whose limits its field declares.
-    """
+    """A property that depends on temperature: linear between the points, constant beyond."""
 
     temperatures: tuple[float, ...]
+    """In K, ascending."""
     values: tuple[float, ...]
+    """In SI units."""
 
     def __post_init__(self) -> None:
         if len(self.temperatures) != len(self.values) or not self.values:
@@ -39,14 +39,12 @@ class TemperatureTable:
             raise ValueError("temperature table: temperatures must ascend")
 
     def at(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Values at temperatures in K, of the same shape."""
-        return np.asarray(
-            np.interp(np.asarray(temperature, dtype=np.float64), self.temperatures, self.values),
-            dtype=np.float64,
-        )
+        """Return values at temperatures in K, of the same shape."""
+        given = np.asarray(temperature, np.float64)
+        return np.asarray(np.interp(given, self.temperatures, self.values), np.float64)
 
     def sampled(self) -> NDArray[np.float64]:
-        """Values at every kelvin from 200 K to 3000 K, for kernels."""
+        """Return values at every kelvin from 200 K to 3000 K, for kernels."""
         return self.at(_KELVINS)
 
 
@@ -61,19 +59,10 @@ def _at(quantity: float | TemperatureTable, temperature: ArrayLike) -> NDArray[n
 
 @dataclass(frozen=True)
 class RateTable:
-    """A number that depends on the plastic strain rate.
-
-    Linear over the logarithm of the rate between the points, constant beyond.
-
-    Parameters
-    ----------
-    rates : tuple of float
-        Plastic strain rates in 1/s, ascending, over 0.
-    values : tuple of float
-        The number at these rates.
-    """
+    """A number over the plastic strain rate: linear over its logarithm, constant beyond."""
 
     rates: tuple[float, ...]
+    """In 1/s, ascending, over 0."""
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -84,38 +73,27 @@ class RateTable:
 
 
 @dataclass(frozen=True)
-class WorkpieceMaterial(Part):
-    """What is cut.
+class NonlocalViscosity(Part):
+    """Viscous stress by the plastic strain rate over its mean around the point.
 
-    A table over the temperature holds for density (which is thermal expansion), moduli,
-    conductivity and heat capacity.
-
-    Parameters
-    ----------
-    name : str
-        Name with the source of the numbers.
-    density, young_modulus, poisson_ratio : float or TemperatureTable
-        In kg/m³, in Pa, and a number: constant, or over the temperature.
-    flow_stress : FlowStress
-        Law of the flow stress.
-    damage : JohnsonCookDamage or None
-        Failure, or None for a material that does not fail.
-    conductivity, heat_capacity : TemperatureTable
-        In W/(m K) and J/(kg K).
-    taylor_quinney : float or RateTable
-        Fraction of the plastic work that becomes heat: constant, or over the plastic strain rate.
-    fitted_damage : FittedDamage, optional
-        How well the damage is known, where measured cuts determined it.
-    nonlocal_viscosity : NonlocalViscosity, optional
-        What gives shear bands a width of their own; without it they are as narrow as the cell.
-
-    Raises
-    ------
-    ValueError
-        If a value, or one in a table, is outside the limits of its parameter.
+    The flow stress is σ + 3 η (ε̇ − ⟨ε̇⟩), where ⟨ε̇⟩ is the mean of the rate with Gaussian weights
+    of the standard deviation ℓ. For rates that vary over much more than ℓ this is
+    σ − (3/2) η ℓ² ∇²ε̇: plasticity that dissipates by gradients of the rate, as in Gurtin and Anand
+    (2005), J. Mech. Phys. Solids 53, 1624. Even flow costs nothing, whatever its rate; a band
+    cannot become much narrower than ℓ, however the material softens. Softening by failure has the
+    thickness of its layer from it as well, 2 ℓ: see `JohnsonCookDamage`.
     """
 
+    viscosity: Annotated[float, Parameter("η, of shear.", VISCOSITY, over=0.0)]
+    length: Annotated[float, Parameter("ℓ.", LENGTH, over=0.0)]
+
+
+@dataclass(frozen=True)
+class WorkpieceMaterial(Part):
+    """What is cut; a density over the temperature is thermal expansion."""
+
     name: str
+    """With the source of the numbers."""
     density: Annotated[float | TemperatureTable, Parameter("Density.", DENSITY, over=0.0)]
     young_modulus: Annotated[
         float | TemperatureTable, Parameter("Young's modulus.", STRESS, over=0.0)
@@ -125,6 +103,7 @@ class WorkpieceMaterial(Part):
     ]
     flow_stress: FlowStress
     damage: JohnsonCookDamage | None
+    """None for a material that does not fail."""
     conductivity: Annotated[TemperatureTable, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
     heat_capacity: Annotated[TemperatureTable, Parameter("Heat.", HEAT_CAPACITY, over=0.0)]
     taylor_quinney: Annotated[
@@ -132,6 +111,7 @@ class WorkpieceMaterial(Part):
     ] = 0.9
     fitted_damage: FittedDamage | None = None
     nonlocal_viscosity: NonlocalViscosity | None = None
+    """Without it, shear bands are as narrow as the cell."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -140,28 +120,24 @@ class WorkpieceMaterial(Part):
                 parameter.check(f"{type(self).__name__}.{name}", value)
 
     def density_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Densities without stress in kg/m³ at temperatures in K, of the same shape."""
+        """Return densities without stress in kg/m³ at temperatures in K, of the same shape."""
         return _at(self.density, temperature)
 
     def shear_modulus_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Shear moduli in Pa at temperatures in K, of the same shape."""
+        """Return shear moduli in Pa at temperatures in K, of the same shape."""
         young, poisson = self._elastic_at(temperature)
         return np.asarray(young / (2 * (1 + poisson)))
 
     def bulk_modulus_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Bulk moduli in Pa at temperatures in K, of the same shape."""
+        """Return bulk moduli in Pa at temperatures in K, of the same shape."""
         young, poisson = self._elastic_at(temperature)
         return np.asarray(young / (3 * (1 - 2 * poisson)))
 
     def elastic_ratios(self) -> NDArray[np.float64]:
-        """Moduli and volume without stress over those at room temperature, for kernels.
+        """Return what kernels take for elasticity, shape (n, 4), a row for every kelvin.
 
-        Returns
-        -------
-        ndarray
-            Shear modulus, bulk modulus and volume without stress as fractions of their values at
-            `ROOM_TEMPERATURE`, and the rise of the last to the next row, at every kelvin as
-            `TemperatureTable.sampled` has it, shape (n, 4); one row if all are constant.
+        Shear modulus, bulk modulus and volume without stress over those at `ROOM_TEMPERATURE`, and
+        the rise of the last to the next row; one row if all are constant.
         """
         tables = (self.young_modulus, self.poisson_ratio, self.density)
         vary = any(isinstance(each, TemperatureTable) for each in tables)
@@ -172,31 +148,27 @@ class WorkpieceMaterial(Part):
         rise = np.diff(volume, append=volume[-1])
         return np.stack([*ratios, volume, rise], axis=-1)
 
+    def heat_fractions(self) -> NDArray[np.float64]:
+        """Return `taylor_quinney` for kernels: strain rates and fractions, shape (2, n)."""
+        table = self.taylor_quinney
+        if not isinstance(table, RateTable):
+            table = RateTable((1.0,), (table,))
+        return np.array([table.rates, table.values], dtype=np.float64)
+
     def drawn(self, generator: np.random.Generator) -> "WorkpieceMaterial":
-        """The material with a damage that the cuts it was fitted to allow as well.
-
-        Parameters
-        ----------
-        generator : numpy.random.Generator
-            What draws.
-
-        Raises
-        ------
-        ValueError
-            If the damage was not fitted.
-        """
+        """Return the material with a damage that the cuts it was fitted to allow as well."""
         if self.damage is None or self.fitted_damage is None:
             raise ValueError(f"{self.name}: its damage was not fitted, nothing to draw from")
         return replace(self, damage=self.fitted_damage.draw(self.damage, generator))
 
     def failing_layer(self, cell: float) -> float:
-        """Thickness in m of the layer that a failure softens, on a grid with a cell in m."""
+        """Return the thickness in m of the layer that a failure softens; `cell` in m."""
         if self.nonlocal_viscosity is None:
             return BAND_CELLS * cell
         return BAND_LENGTHS * self.nonlocal_viscosity.length
 
     def sound_speed(self) -> float:
-        """Speed of longitudinal waves in m/s at the temperature where it is highest."""
+        """Return the speed of longitudinal waves in m/s at the temperature where it is highest."""
         stiffness = self.bulk_modulus_at(_KELVINS) + 4 / 3 * self.shear_modulus_at(_KELVINS)
         return float(np.sqrt((stiffness / self.density_at(_KELVINS)).max()))
 
@@ -211,17 +183,10 @@ class WorkpieceMaterial(Part):
 
 @dataclass(frozen=True)
 class ToolMaterial(Part):
-    """What cuts: rigid, but it conducts heat.
-
-    Parameters
-    ----------
-    name : str
-        Name with the source of the numbers.
-    density, conductivity, heat_capacity : float
-        In kg/m³, W/(m K) and J/(kg K).
-    """
+    """What cuts: rigid, but it conducts heat."""
 
     name: str
+    """With the source of the numbers."""
     density: Annotated[float, Parameter("Density.", DENSITY, over=0.0)]
     conductivity: Annotated[float, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
     heat_capacity: Annotated[float, Parameter("Heat capacity.", HEAT_CAPACITY, over=0.0)]

@@ -14,7 +14,6 @@ import numpy as np
 from numba import njit, prange
 
 from chipglow.cutting.flow_stress import comes_with_chipglow, flow_stress
-from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST, INLINE
 from chipglow.cutting.stencil import ADDED, SUMMED, add_to_nodes, sum_nodes
 from chipglow.cutting.stress import (
@@ -98,26 +97,26 @@ class Step(NamedTuple):
 
 @njit(**INLINE)
 def spline(position):  # type: ignore[no-untyped-def]
-    """First of three nodes and the offset from it to a position in cells: quadratic B-spline."""
+    """Return the first of three nodes of a quadratic B-spline and the offset from it in cells."""
     first = int(position - 0.5)
     return first, position - first
 
 
 @njit(**INLINE)
 def spline_weights(offset):  # type: ignore[no-untyped-def]
-    """Weights of the three nodes."""
+    """Return the weights of the three nodes."""
     return 0.5 * (1.5 - offset) ** 2, 0.75 - (offset - 1.0) ** 2, 0.5 * (offset - 0.5) ** 2
 
 
 @njit(**INLINE)
 def _distances(offset):  # type: ignore[no-untyped-def]
-    """Of the three nodes from the position, in cells."""
+    """Return the distances of the three nodes from the position, in cells."""
     return -offset, 1.0 - offset, 2.0 - offset
 
 
 @njit(**INLINE)
 def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
-    """Velocity and its gradient from the grid; the point moves. True if it is on the grid."""
+    """Take velocity and its gradient from the grid; move the point. True if it is on the grid."""
     inverse = 1.0 / grid.cell
     i, ax = spline((p.x - grid.left) * inverse)
     j, ay = spline((p.y - grid.bottom) * inverse)
@@ -139,7 +138,7 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-def]
-    """Mass, momentum, stress and contact impulse to the grid. True if the point is on it."""
+    """Give mass, momentum, stress and contact impulse to the grid. True if it is on it."""
     inverse = 1.0 / grid.cell
     i, ax = spline((p.x - grid.left) * inverse)
     j, ay = spline((p.y - grid.bottom) * inverse)
@@ -169,9 +168,18 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
     return True
 
 
+@njit
+def friction_coefficient(coefficient, exponent, melting_temperature, temperature):  # type: ignore[no-untyped-def]
+    """Return Coulomb's coefficient at a temperature: see `Friction`.
+
+    With an infinite melting temperature it is `coefficient`, to the last bit.
+    """
+    return coefficient * max(1.0 - (temperature / melting_temperature) ** exponent, 0.0)
+
+
 @njit(**FAST)
 def _contact(p, stress, tool, step, law):  # type: ignore[no-untyped-def]
-    """Force of the tool's surface on a point (N/m) and the limit of its friction impulse."""
+    """Return the force of the tool on a point (N/m) and the limit of its friction impulse."""
     distance, nx, ny = surface_distance(p.x, p.y, tool)
     depth = step.reach - distance
     if depth <= 0.0:
@@ -223,7 +231,7 @@ def _work_block(  # type: ignore[no-untyped-def]
     points, starts, block, velocity, nodes, tool, grid, step, law, damage, elastic, capacity,
     heat_fractions, sums, buffer,
 ):  # fmt: skip
-    """One step of the points of a block; False if a point left the grid."""
+    """Do one step of the points of a block; False if a point left the grid."""
     first = block * BLOCK_COLUMNS * grid.rows
     last = min(first + BLOCK_COLUMNS * grid.rows, starts.size - 1)
     on_grid = True
@@ -255,7 +263,7 @@ def _work_block(  # type: ignore[no-untyped-def]
 
 @njit(**FAST)
 def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ignore[no-untyped-def]
-    """New velocities of a column of nodes: driven boundary and friction; sums are reset."""
+    """Set new velocities of a column of nodes: driven boundary and friction; reset its sums."""
     x = grid.left + i * grid.cell
     for j in range(grid.rows):
         node = nodes[i, j]
@@ -325,7 +333,7 @@ advance = njit(cache=True, parallel=True)(_advance)
 
 
 def advance_with(law: Any) -> Any:
-    """`advance` for the numbers of a flow-stress law.
+    """Return `advance` for the numbers of a flow-stress law.
 
     Compiled code is kept on disk for the laws that come with chipglow only: for a law of one's own
     it would not be seen that the law has changed.

@@ -25,20 +25,10 @@ _FILL_PASSES: Final = 3
 
 
 class Picture:
-    """Makes the frames of a scene from points and the tool's temperature.
+    """Maker of a scene's frames from points and the tool's temperature.
 
-    Parameters
-    ----------
-    grid : Grid
-        The solver's grid.
-    raster : Raster
-        Samples of the frames; the grid must cover them.
-    tool : Tool
-        Outline of the tool.
-    filled_by_tool : ndarray
-        Fraction of each node's square that the tool fills, shape (columns, rows).
-    ambient : float
-        Temperature in K of samples that show nothing.
+    The grid must cover the raster. `filled_by_tool` is the fraction of each node's square, shape
+    (columns, rows), `ambient` the temperature in K of samples that show nothing.
     """
 
     def __init__(
@@ -70,19 +60,7 @@ class Picture:
         values: Mapping[str, NDArray[np.float64]],
         tool_temperature: NDArray[np.float64],
     ) -> Frame:
-        """Fields at one time.
-
-        Parameters
-        ----------
-        time : float
-            In s.
-        points : ndarray
-            The material points.
-        values : mapping
-            Value of every field at the points, by the names of a `Frame`.
-        tool_temperature : ndarray
-            In K on the grid, shape (columns, rows).
-        """
+        """Return the fields at a time in s, of values at the points by the names of a `Frame`."""
         left, right, bottom, top = self._view
         seen = (points["x"] > left) & (points["x"] < right)
         seen &= (points["y"] > bottom) & (points["y"] < top)
@@ -109,19 +87,7 @@ class Picture:
 
 
 def lattice_of(grid: Grid, raster: Raster, tool: Tool, ambient: float) -> Lattice:
-    """The nodes of the solver's grid that a raster's frames need.
-
-    Parameters
-    ----------
-    grid : Grid
-        The solver's grid; it must cover the samples.
-    raster : Raster
-        Samples of the frames.
-    tool : Tool
-        Outline of the tool.
-    ambient : float
-        Temperature in K of samples that show nothing.
-    """
+    """Return the nodes of the solver's grid that a raster's frames need."""
     in_tool = _inside(raster.x, raster.y, tool.surface)
     return Lattice.within(raster, (grid.left, grid.bottom), grid.cell, in_tool, ambient)
 
@@ -137,7 +103,7 @@ def _inside(x, y, tool):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _fit(fx, fy, values, area, columns, rows, corrections):  # type: ignore[no-untyped-def]
-    """B-spline coefficients (columns, rows, fields), filled fraction and where points are near."""
+    """Return coefficients (columns, rows, fields), filled fraction and where points are near."""
     fields = values.shape[1]
     weight = np.zeros((columns, rows))
     result = np.zeros((columns, rows, fields))

@@ -1,5 +1,7 @@
 """Which intervals of a cut are recorded as frames: a window, and later bands once developed."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from math import ceil, floor
 from typing import Final
 
@@ -7,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import OutputWindow
+from chipglow.scene import Frame, Raster
 
 _SMOOTH: Final = 5e-6
 _STANDS_OUT: Final = 0.05
@@ -14,15 +17,28 @@ _APART: Final = 3
 """Intervals from one recorded part to the next, so that a scene shows a gap between them."""
 
 
+@dataclass(frozen=True)
+class Preview:
+    """A coarse look at a cut while it is computed; nothing of the cut depends on it."""
+
+    raster: Raster
+    frames: int
+    """About how many frames are spread evenly over the cut; the last is at its end."""
+    on_frame: Callable[[Frame], None]
+
+    def __post_init__(self) -> None:
+        if self.frames < 1:
+            raise ValueError(f"preview frames: expected 1 or more, got {self.frames!r}")
+
+    def shows(self, number: int, last: int) -> bool:
+        """Return whether it shows one of the frames from 1 to `last`."""
+        return (last - number) % max(last // self.frames, 1) == 0
+
+
 class Valleys:
-    """Valleys of a force that comes in value by value.
+    """Valleys of a force that comes in value by value, an `interval` in s apart.
 
     A valley is the least of the force, smoothed over 5 µs, between two rises of 5 % of its mean.
-
-    Parameters
-    ----------
-    interval : float
-        Time between values in s.
     """
 
     def __init__(self, interval: float) -> None:
@@ -33,17 +49,9 @@ class Valleys:
         self._extreme, self._at = 0.0, 0
 
     def add(self, force: float) -> float | None:
-        """Take the next value.
+        """Take the next force; return the place of a valley that has just been left.
 
-        Parameters
-        ----------
-        force : float
-            In N/m.
-
-        Returns
-        -------
-        float or None
-            If a valley has just been left: its place, as a number of values since the first.
+        The place is a number of values since the first.
         """
         self._values.append(force)
         self._total += force
@@ -68,17 +76,7 @@ class Valleys:
 
 
 class Recorder:
-    """Says after each interval of a cut whether its end is recorded as a frame.
-
-    Parameters
-    ----------
-    window : OutputWindow
-        What to record.
-    speed : float
-        Cutting speed in m/s.
-    cutting_length : float
-        In m.
-    """
+    """The choice of intervals whose end is recorded as a frame."""
 
     def __init__(self, window: OutputWindow, speed: float, cutting_length: float) -> None:
         step = speed * window.interval
@@ -93,15 +91,7 @@ class Recorder:
         self._starts: list[int] = []
 
     def wants(self, record: int, force: float) -> bool:
-        """Whether to record the end of an interval; to be asked for each of them in their order.
-
-        Parameters
-        ----------
-        record : int
-            Number of the interval, from 1.
-        force : float
-            Its mean cutting force in N/m.
-        """
+        """Return whether to record the end of interval `record` (from 1; ask in their order)."""
         self._look(record, force)
         if self.first <= record <= self._last_of_window:
             return True

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import ceil, inf, sqrt
 from typing import Final
 
@@ -17,6 +17,7 @@ from chipglow.cutting.conditions import (
     Numerics,
     OutputWindow,
     Surroundings,
+    unresolved,
 )
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
@@ -29,7 +30,7 @@ from chipglow.cutting.heat import (
     tool_fraction as fraction_of_tool,
 )
 from chipglow.cutting.heat_loss import HeatLoss, lose_heat
-from chipglow.cutting.library import AISI_1045, CARBIDE
+from chipglow.cutting.library import tool_material, workpiece
 from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.mean_rate import average_rates
 from chipglow.cutting.momentum import (
@@ -50,14 +51,21 @@ from chipglow.cutting.momentum import (
     advance_with,
 )
 from chipglow.cutting.picture import Picture, lattice_of
-from chipglow.cutting.plastic_heat import heat_fractions
-from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
-from chipglow.cutting.preview import Preview
-from chipglow.cutting.recording import Recorder
-from chipglow.cutting.resolution import unresolved
+from chipglow.cutting.points import (
+    POINT,
+    Grid,
+    Points,
+    Trouble,
+    block_of_points,
+    fastest_point,
+    find_lost,
+    find_off_grid,
+    find_trouble,
+    sort_by_cell,
+)
+from chipglow.cutting.recording import Preview, Recorder
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
-from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
@@ -74,7 +82,6 @@ _FASTEST_DRIFT: Final = 0.4
 _HEAT_STABILITY: Final = 0.15
 _INERTIA_FRACTION: Final = 0.0045
 _LARGEST_SCALING: Final = 1000.0
-
 
 STEADY_TOLERANCE: Final = 1.0
 """Change in K of the contact's mean temperature, over the last rounds, under which a tool counts as
@@ -94,21 +101,13 @@ class SolverError(RuntimeError):
 
 @dataclass(frozen=True)
 class ForceHistory:
-    """Force of the tool on the workpiece per width of cut, over the whole cut.
-
-    Parameters
-    ----------
-    time : ndarray
-        Ends of the intervals over which the forces are averaged, in s, shape (n,).
-    cutting, thrust : ndarray
-        Against the motion of the workpiece, and away from the tool into it, in N/m, shape (n,).
-    energy : EnergyHistory
-        Where the work went, at the same times.
-    """
+    """Force of the tool on the workpiece per width of cut, over the whole cut."""
 
     time: NDArray[np.float64]
+    """Ends of the intervals over which the forces are averaged, in s, shape (n,)."""
     cutting: NDArray[np.float64]
     thrust: NDArray[np.float64]
+    """Against the motion of the workpiece, and away from the tool into it, in N/m, shape (n,)."""
     energy: EnergyHistory
 
 
@@ -144,8 +143,8 @@ class CuttingSimulation:
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
     tool: Tool = field(default_factory=ToolGeometry)
-    workpiece: WorkpieceMaterial = AISI_1045
-    tool_material: ToolMaterial = CARBIDE
+    workpiece: WorkpieceMaterial = field(default_factory=partial(workpiece, "aisi-1045"))
+    tool_material: ToolMaterial = field(default_factory=partial(tool_material, "carbide"))
     friction: Friction = field(default_factory=Friction)
     numerics: Numerics = field(default_factory=Numerics)
     surroundings: Surroundings = field(default_factory=Surroundings)
@@ -225,7 +224,7 @@ class CuttingSimulation:
 
     @property
     def momentum_flow(self) -> float:
-        """Momentum of the scaled mass that arrives at the tool per time and width of cut, in N/m.
+        """Momentum of the scaled mass that arrives at the tool per time and width, in N/m.
 
         ρV² times the uncut chip thickness: inertia can matter that much beside the cutting force.
         """
@@ -272,20 +271,13 @@ class CuttingSimulation:
         return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MOST_ROUNDS
 
     def steady_tool(self) -> SteadyTool:
-        """The tool after a long cut: cut and conduct in turn until its temperature is steady.
+        """Return the tool after a long cut: cut and conduct in turn until it is steady.
 
         A cut on a coarser grid gives the heat that enters the tool, averaged over about two
         segments; conduction in the tool's body gives the temperature that this heat makes. The
         warmer the tool is, the more of the heat the chip takes, as a half-space would that slides
         past the contact (Jaeger). With that slope each round comes close to where cut and
         conduction agree; from the fourth on rounds are averaged, since no two segments are alike.
-
-        Raises
-        ------
-        ValueError
-            If `tool_temperature` is no body.
-        SolverError
-            If the simulation goes wrong, or the temperature does not settle to 1 °C.
         """
         body = self.tool_temperature
         if not isinstance(body, ToolBody):
@@ -308,7 +300,7 @@ class CuttingSimulation:
         return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
 
     def _long_cut(self) -> "CuttingSimulation":
-        """The cut that gives the heat of a steady tool, as long as it may become."""
+        """Return the cut that gives the heat of a steady tool, as long as it may become."""
         feed = self.conditions.feed
         return replace(
             self,
@@ -334,18 +326,7 @@ class CuttingSimulation:
             )
 
     def lattice(self, raster: Raster) -> Lattice:
-        """Where the nodes are whose splines its frames are.
-
-        Parameters
-        ----------
-        raster : Raster
-            Samples of the frames.
-
-        Raises
-        ------
-        ValueError
-            If the raster reaches beyond what is simulated.
-        """
+        """Return the nodes whose splines the frames are; the raster must be simulated."""
         grid = _grid(self.numerics)
         self._check_raster(raster, grid)
         return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
@@ -387,13 +368,13 @@ class _State:
         self.tool = simulation.tool.surface
         self.speed, self.spacing = conditions.speed, spacing
         self.simulation, self.interval = simulation, interval
-        heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
-        mass = heat_mass * simulation.mass_scaling
+        self.heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
+        mass = self.heat_mass * simulation.mass_scaling
         resists = material.nonlocal_viscosity
         self.step = Step(
             mass=mass,
-            heat_mass=heat_mass,
-            volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
+            heat_mass=self.heat_mass,
+            volume=self.heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
             time_step=0.0,
             kept=_KEPT,
             shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
@@ -411,12 +392,17 @@ class _State:
             viscosity=resists.viscosity if resists is not None else 0.0,
             **_thermal_friction(simulation),
         )
-        self.law = material.flow_stress.numbers()
-        self.step_points = advance_with(self.law)
-        self.damage = Damage.of(material.damage, material.failing_layer(cell))
+        law, damage = material.flow_stress.numbers(), material.damage
+        self.step_points = advance_with(law)
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.heat_fractions = heat_fractions(material.taylor_quinney)
+        self.matter = (
+            law,
+            Damage.of(damage, material.failing_layer(cell)),
+            self.elastic,
+            self.capacity,
+            material.heat_fractions(),
+        )
         self.conductivity = material.conductivity.sampled()
         self.diffusivity, self.effusivity = _conduction(material, conditions.initial_temperature)
         self.tool_heat = _tool_heat(simulation, self.effusivity, spacing)
@@ -442,8 +428,10 @@ class _State:
         far = (len(self.tool_border), CELLS)
         self.tool_beyond = np.full(far, of_tool)
         self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
-        self.right = numerics.downstream
-        self.top = numerics.height
+        self.grids = (
+            self.starts, self.velocity, self.nodes, self.friction_heat, self.tool, self.grid
+        )  # fmt: skip
+        self.right, self.top = numerics.downstream, numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
         self.choose_steps()
@@ -527,30 +515,15 @@ class _State:
 
     @np.errstate(invalid="ignore", over="ignore")  # `find_trouble` finds what is not finite
     def advance(self) -> NDArray[np.float64]:
-        """Advance by one interval; mean forces in N/m, then the energies of `EnergyHistory`."""
-        sums = np.zeros_like(self.work)
+        """Advance by one interval; return mean forces in N/m, and the energies."""
+        sums, threads = np.zeros_like(self.work), get_num_threads()
         for _ in range(self.cycles):
             before = self._held().sum()
             self._let_in(self.time)
             self._sort()
             self.carried += self._held().sum() - before
             good = self.step_points(
-                self.steps,
-                self.points,
-                self.starts,
-                self.velocity,
-                self.nodes,
-                self.friction_heat,
-                self.tool,
-                self.grid,
-                self.step,
-                self.law,
-                self.damage,
-                self.elastic,
-                self.capacity,
-                self.heat_fractions,
-                sums,
-                get_num_threads(),
+                self.steps, self.points, *self.grids, self.step, *self.matter, sums, threads
             )
             self.time += self.cycle
             if not good:
@@ -569,7 +542,7 @@ class _State:
         )
 
     def choose_steps(self, allowed: float = inf) -> None:
-        """Time step and cycles of the next interval, by the fastest point.
+        """Choose time step and cycles of the next interval, by the fastest point.
 
         It may not have been faster than `allowed` (m/s) by the steps of the interval before.
         """
@@ -586,7 +559,7 @@ class _State:
         self.step = self.step._replace(time_step=time_step)
 
     def _held(self) -> NDArray[np.float64]:
-        """Kinetic and elastic energy of the points in J/m."""
+        """Return kinetic and elastic energy of the points in J/m."""
         return np.array(
             held_energy(self.points, self.count, self.step, self.elastic, self.grid.cell)
         )
@@ -594,72 +567,27 @@ class _State:
     def _average_rates(self) -> None:
         resists = self.simulation.workpiece.nonlocal_viscosity
         if resists is not None:
-            average_rates(
-                self.points,
-                self.count,
-                self.rate_nodes,
-                self.rate_spare,
-                self.grid,
-                self.cycle,
-                resists.length,
-            )
+            nodes, spare, length = self.rate_nodes, self.rate_spare, resists.length
+            average_rates(self.points, self.count, nodes, spare, self.grid, self.cycle, length)
 
     def _conduct(self) -> None:
-        conduct(
-            self.points,
-            self.count,
-            self.heat_nodes,
-            self.increment,
-            self.conductivity,
-            self.capacity,
-            self.step.heat_mass,
-            self.grid,
-            self.cycle,
-            min(self.diffusivity * self.cycle / self.grid.cell**2, 1.0),
-        )
-        conduct_tool(
-            self.tool_temperature, self.tool_fraction, self.tool_heat, self.grid, self.cycle
-        )
-        conduct_beyond(
-            self.tool_temperature,
-            self.tool_beyond,
-            self.tool_border,
-            self.tool_fraction,
-            self.tool_heat,
-            self.grid,
-            self.cycle,
-        )
+        points, count, grid, cycle = self.points, self.count, self.grid, self.cycle
+        nodes, rise, capacity, mass = self.heat_nodes, self.increment, self.capacity, self.heat_mass
+        tool, filled, heat = self.tool_temperature, self.tool_fraction, self.tool_heat
+        part = min(self.diffusivity * cycle / grid.cell**2, 1.0)
+        conduct(points, count, nodes, rise, self.conductivity, capacity, mass, grid, cycle, part)
+        conduct_tool(tool, filled, heat, grid, cycle)
+        conduct_beyond(tool, self.tool_beyond, self.tool_border, filled, heat, grid, cycle)
         if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
-            self.lost_heat += lose_heat(
-                self.heat_nodes,
-                self.increment,
-                self.tool_temperature,
-                self.tool_fraction,
-                self.tool_heat,
-                self.loss,
-                self.grid,
-                self.cycle,
-            )
+            self.lost_heat += lose_heat(nodes, rise, tool, filled, heat, self.loss, grid, cycle)
         heat_contact(
-            self.points,
-            self.count,
-            self.friction_heat,
-            self.touched,
-            self.entered,
-            self.increment,
-            self.heat_nodes,
-            self.tool_temperature,
-            self.tool_fraction,
-            self.tool,
-            self.tool_heat,
-            self.capacity,
-            self.step.heat_mass,
-            self.grid,
-        )
-        return_heat(self.points, self.count, self.increment, self.grid)
+            points, count, self.friction_heat, self.touched, self.entered, rise, nodes, tool,
+            filled, self.tool, heat, capacity, mass, grid,
+        )  # fmt: skip
+        return_heat(points, count, rise, grid)
 
     def frame(self, picture: Picture) -> Frame:
-        """Fields now; the strain rate is the mean over the last interval."""
+        """Return the fields now; the strain rate is the mean over the last interval."""
         points: Points = self.points[: self.count]
         values = {
             "temperature": points["temperature"],
@@ -706,14 +634,14 @@ def _grid(numerics: Numerics) -> Grid:
 
 
 def _sound(simulation: CuttingSimulation) -> float:
-    """Speed of sound in the workpiece with its scaled mass in m/s."""
+    """Return the speed of sound in the workpiece with its scaled mass in m/s."""
     return simulation.workpiece.sound_speed() / sqrt(simulation.mass_scaling)
 
 
 def _time_steps(
     simulation: CuttingSimulation, interval: float, fastest: float
 ) -> tuple[int, int, float]:
-    """Cycles in an interval, steps in a cycle, and the time step in s.
+    """Return cycles in an interval, steps in a cycle, and the time step in s.
 
     Within a cycle no point may drift far from the cell it was sorted into, the `fastest` (m/s) as
     little as the others, and explicit conduction must be stable; within a step sound may not cross
@@ -738,14 +666,14 @@ def _time_steps(
 
 
 def _conduction(material: WorkpieceMaterial, temperature: float) -> tuple[float, float]:
-    """Thermal diffusivity in m²/s and effusivity in W s^½/(m² K)."""
+    """Return thermal diffusivity in m²/s and effusivity in W s^½/(m² K)."""
     conductivity = material.conductivity.at(temperature)
     capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
     return float(conductivity / capacity), float(np.sqrt(conductivity * capacity))
 
 
 def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
-    """What `Step` takes if friction depends on the temperature."""
+    """Return what `Step` takes if friction depends on the temperature."""
     exponent = simulation.friction.thermal_exponent
     if exponent is None:
         return {}
@@ -754,7 +682,7 @@ def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
 
 
 def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> ToolHeat:
-    """Heat of the tool, beside a chip of that effusivity."""
+    """Return the heat of the tool, beside a chip of that effusivity."""
     tool = simulation.tool_material
     return ToolHeat(
         capacity=tool.density * tool.heat_capacity,
@@ -766,7 +694,7 @@ def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> To
 
 
 def _touching(tool: ToolSurface, heights: NDArray[np.float64]) -> float:
-    """Place of a vertical face that touches the tool from the left."""
+    """Return the place of a vertical face that touches the tool from the left."""
     low, high = -1e-2, 0.0
     for _ in range(60):
         middle = (low + high) / 2

@@ -43,7 +43,7 @@ class ToolBody(Part):
     ] = 293.15
 
     def fall(self, r: Field) -> Field:
-        """Φ(r) − Φ(R) at distances r from the edge in m; 0 from the holder on."""
+        """Return Φ(r) − Φ(R) at distances r from the edge in m; 0 from the holder on."""
 
         def potential(distance: Field) -> Field:
             return np.asarray(np.log1p(self.width / distance))
@@ -51,33 +51,24 @@ class ToolBody(Part):
         return np.maximum(potential(r) - potential(np.asarray(self.holder_distance)), 0.0)
 
     def spreading(self, r: Field) -> Field:
-        """Width that the heat flows through at a distance from the edge, over that of the cut."""
+        """Return the width that heat flows through at a distance, over that of the cut."""
         return 1.0 + r / self.width
 
 
 @dataclass(frozen=True)
 class SteadyTool:
-    """Temperature of a tool's nodes after a long cut.
-
-    Parameters
-    ----------
-    grid : Grid
-        The nodes.
-    fraction : ndarray
-        Fraction of each node's square that the tool fills, shape (columns, rows).
-    temperature : ndarray
-        In K, shape (columns, rows).
-    rounds : tuple of float
-        Mean temperature of the contact in K after each round of cutting and conduction.
-    """
+    """Temperature of a tool's nodes after a long cut."""
 
     grid: Grid
     fraction: Field
+    """Of each node's square that the tool fills, shape (columns, rows)."""
     temperature: Field
+    """In K, shape (columns, rows)."""
     rounds: tuple[float, ...]
+    """Mean temperature of the contact in K after each round of cutting and conduction."""
 
     def on(self, grid: Grid, fraction: Field) -> Field:
-        """The temperature on the nodes of another grid, in K, shape (columns, rows)."""
+        """Return the temperature on the nodes of another grid, in K, shape (columns, rows)."""
         x, y = _axes(self.grid)
         filled = self.fraction > 0.0
         places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
@@ -100,22 +91,10 @@ def steady_temperature(
     heat: Field,
     draining: Field,
 ) -> Field:
-    """Temperature in K of a tool's nodes under a steady heat, shape (columns, rows).
+    """Return the temperature in K of a tool's nodes under a steady heat, shape (columns, rows).
 
-    Parameters
-    ----------
-    grid : Grid
-        The nodes.
-    fraction : ndarray
-        Fraction of each node's square that the tool fills, shape (columns, rows).
-    tool_heat : ToolHeat
-        The tool's conductivity.
-    body : ToolBody
-        What is beyond the grid.
-    heat : ndarray
-        Heat that enters each node per time and width in W/m, shape (columns, rows).
-    draining : ndarray
-        How much less heat enters per kelvin of the node, in W/(m K), shape (columns, rows).
+    `heat` enters each node, per time and width in W/m; by `draining` less per kelvin of the node,
+    in W/(m K).
     """
     filled = fraction > 0.0
     number = np.full(fraction.shape, -1)
@@ -141,7 +120,7 @@ def steady_temperature(
 def _conduction(
     links: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], Field]], drained: Field
 ) -> scipy.sparse.csc_array:
-    """Matrix of the heat that leaves each node, per kelvin of each."""
+    """Return the matrix of the heat that leaves each node, per kelvin of each."""
     one, other, flow = (np.concatenate(part) for part in zip(*links, strict=True))
     every = np.arange(drained.size)
     rows = np.concatenate([every, one, other, one, other])
@@ -151,20 +130,20 @@ def _conduction(
 
 
 def _axes(grid: Grid) -> tuple[Field, Field]:
-    """Places of the nodes in m."""
+    """Return the places of the nodes in m."""
     x = grid.left + grid.cell * np.arange(grid.columns, dtype=np.float64)
     y = grid.bottom + grid.cell * np.arange(grid.rows, dtype=np.float64)
     return x, y
 
 
 def _distance(grid: Grid) -> Field:
-    """Distance of the nodes from the edge in m, a cell at least."""
+    """Return the distance of the nodes from the edge in m, a cell at least."""
     x, y = _axes(grid)
     return np.maximum(np.hypot(x[:, None], y[None, :]), grid.cell)
 
 
 def _outward(grid: Grid, border: NDArray[np.int64], conductivity: Field, body: ToolBody) -> Field:
-    """Heat through the border per area and kelvin over the holder, W/(m² K), shape (n,).
+    """Return the heat through the border per area and kelvin over the holder, W/(m² K), shape (n,).
 
     −dΦ/dr = w / (r (w + r)); the widening is part of the conductivity.
     """
@@ -179,7 +158,7 @@ def _outward(grid: Grid, border: NDArray[np.int64], conductivity: Field, body: T
 
 
 def beyond(grid: Grid, border: NDArray[np.int64], temperature: Field, body: ToolBody) -> Field:
-    """Temperature in K of the cells beyond the border (see `tool_border`), shape (n, `CELLS`)."""
+    """Return the temperature in K of the cells beyond the border, shape (n, `CELLS`)."""
     lengths = grid.cell * GROWTH ** np.arange(CELLS)
     out = np.cumsum(lengths) - 0.5 * lengths + 0.5 * grid.cell
     i, j = border[:, 0], border[:, 1]

@@ -36,14 +36,14 @@ class _Vectors:
         self.zero = ir.Constant(self.type, [0.0] * length)
 
     def of(self, values: list[Any]) -> Any:
-        """Vector of some values; the rest is zero."""
+        """Return a vector of some values; the rest is zero."""
         vector = self.zero
         for lane, value in enumerate(values):
             vector = self.builder.insert_element(vector, value, _LANE(lane))
         return vector
 
     def repeated(self, value: Any) -> Any:
-        """Vector of one value."""
+        """Return a vector of one value."""
         first = self.builder.insert_element(self.zero, value, _LANE(0))
         lanes = ir.Constant(ir.VectorType(_LANE, self.length), [0] * self.length)
         return self.builder.shuffle_vector(first, first, lanes)
@@ -52,7 +52,7 @@ class _Vectors:
         return self.builder.fmul(a, b, flags=_FUSE)
 
     def add_product(self, c: Any, a: Any, b: Any) -> Any:
-        """C + a b."""
+        """Return c + a b."""
         return self.builder.fadd(c, self.product(a, b), flags=_FUSE)
 
     def load(self, place: Any) -> Any:
@@ -62,7 +62,7 @@ class _Vectors:
         self.builder.store(vector, place, align=_ALIGNED_TO)
 
     def nodes(self, array: Any, i: Any, j: Any) -> list[list[Any]]:
-        """Addresses of the nodes (i + a, j + b), [a][b]."""
+        """Return the addresses of the nodes (i + a, j + b), [a][b]."""
         rows = self.builder.extract_value(array.shape, 1)
         first = self.builder.add(self.builder.mul(i, rows), j)
         columns = [first, self.builder.add(first, rows)]
@@ -87,7 +87,7 @@ def _parts(builder: Any, values: Any, count: int) -> list[Any]:
 
 @intrinsic
 def sum_nodes(_context, nodes, i, j, wx, wy, dx, dy):  # type: ignore[no-untyped-def]
-    """Weighted sums of the values of nodes, and of their products with x and y; for kernels only.
+    """Return weighted sums of the values of nodes, and of their products with x and y.
 
     Arguments are `nodes` (columns, rows, `SUMMED`), the first column i and row j, and for the three
     columns and the three rows their weights wx, wy and their distances dx, dy from the point.

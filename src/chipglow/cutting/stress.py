@@ -14,7 +14,6 @@ from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import FAST, INLINE, exponential
 from chipglow.cutting.material import TABLE_COLDEST
-from chipglow.cutting.plastic_heat import heat_fraction
 
 LANES = 128
 """Points of a batch: their rows stay in the fastest cache."""
@@ -46,7 +45,7 @@ SHEAR, BULK, VOLUME_FREE, VOLUME_RISE = range(4)
 
 @njit(**FAST)
 def plastic_increments(b, count, shear_modulus, time_step, viscosity, law, damage):  # type: ignore[no-untyped-def]
-    """Plastic strains of a step that take trial stresses back to the flow stress.
+    """Find the plastic strains of a step that take trial stresses back to the flow stress.
 
     Solves trial − 3GΔ = weakening · σ(strain + Δ, Δ/dt, temperature) + 3η(Δ/dt − mean rate) for Δ
     by Newton's method over ln Δ; weakening, temperature and mean rate are those of the step's
@@ -80,7 +79,7 @@ def plastic_increments(b, count, shear_modulus, time_step, viscosity, law, damag
 
 @njit(**FAST)
 def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # type: ignore[no-untyped-def]
-    """One step of Newton over the logarithm of the increment; how many change much."""
+    """Do a step of Newton over the logarithm of the increment; return how many change much."""
     slowest = SLOWEST_RATE * time_step
     per_step = 1.0 / time_step
     far = 0
@@ -109,7 +108,7 @@ def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # typ
 
 @njit(**FAST)
 def _try(b, count, step):  # type: ignore[no-untyped-def]
-    """Trial deviator (Jaumann rate), its equivalent stress, and mean stress."""
+    """Compute the trial deviator (Jaumann rate), its equivalent stress, and mean stress."""
     time_step = step.time_step
     two_g = 2.0 * step.shear_modulus * time_step
     for k in range(count):
@@ -134,7 +133,7 @@ def _try(b, count, step):  # type: ignore[no-untyped-def]
 
 @njit(**FAST)
 def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
-    """Deviator back to the flow stress; strain, damage, and plastic work (J/m)."""
+    """Bring the deviator back to the flow stress; strain, damage, and plastic work (J/m)."""
     per_step = 1.0 / step.time_step
     fails = 1.0 if damage.loss > 0.0 else 0.0
     for k in range(count):
@@ -163,7 +162,7 @@ def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
 # Inlined before it is compiled: its arithmetic follows the rules of the kernel that calls it.
 @njit(inline="always")
 def elastic_energy(p, shear, bulk, step):  # type: ignore[no-untyped-def]
-    """Energy in J/m that a point's shear and dilation hold, sheared and pressed.
+    """Return the energy in J/m that a point's shear and dilation hold, sheared and pressed.
 
     `shear` and `bulk` are the moduli over those at room temperature.
     """
@@ -176,7 +175,7 @@ def elastic_energy(p, shear, bulk, step):  # type: ignore[no-untyped-def]
 
 @njit(**INLINE)
 def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
-    """Elastic energy (J/m) that a point lost since its last step, as its moduli fell.
+    """Return the elastic energy (J/m) that a point lost since its last step, as its moduli fell.
 
     The energy is that of the strain before this step's.
     """
@@ -193,7 +192,7 @@ def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
 def update_stresses(  # type: ignore[no-untyped-def]
     points, begin, end, step, law, damage, elastic, capacity, heat_fractions, b
 ):
-    """Stress of up to `LANES` points.
+    """Update the stress of up to `LANES` points.
 
     Leaves their equivalent and mean stress, the soft fraction of the shear modulus, plastic work
     and that of expansion in `b`. `elastic` is `WorkpieceMaterial.elastic_ratios`.
@@ -234,12 +233,26 @@ def update_stresses(  # type: ignore[no-untyped-def]
 
 
 @njit
+def heat_fraction(rate, fractions):  # type: ignore[no-untyped-def]
+    """Return the fraction of the plastic work that becomes heat at a plastic strain rate in 1/s."""
+    last = fractions.shape[1] - 1
+    if rate <= fractions[0, 0]:
+        return fractions[1, 0]
+    for i in range(last):
+        low, high = fractions[0, i], fractions[0, i + 1]
+        if rate < high:
+            way = np.log(rate / low) / np.log(high / low)
+            return fractions[1, i] + way * (fractions[1, i + 1] - fractions[1, i])
+    return fractions[1, last]
+
+
+@njit
 def property_at(table, temperature):  # type: ignore[no-untyped-def]
-    """Value of a sampled `TemperatureTable`."""
+    """Return the value of a sampled `TemperatureTable`."""
     return table[kelvin_index(temperature, table.size)]
 
 
 @njit(**INLINE)
 def kelvin_index(temperature, size):  # type: ignore[no-untyped-def]
-    """Row of a temperature in a table of `size` rows, one for each kelvin from 200 K."""
+    """Return the row of a temperature in a table of `size` rows, one for each kelvin from 200 K."""
     return min(max(int(temperature - TABLE_COLDEST), 0), size - 1)

@@ -18,12 +18,9 @@ GROWTH: Final = 1.25
 
 
 def border_nodes(fraction: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Nodes from which the tool goes on beyond the grid, shape (n, 2); a corner is there twice.
+    """Return the nodes from which the tool goes on beyond the grid, (n, 2); a corner is twice.
 
-    Parameters
-    ----------
-    fraction : ndarray
-        Fraction of each node's square that the tool fills, shape (columns, rows).
+    `fraction` is that of each node's square that the tool fills, shape (columns, rows).
     """
     columns, rows = fraction.shape
     i, j = np.arange(columns), np.arange(rows)

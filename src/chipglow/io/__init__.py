@@ -1,7 +1,6 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
-from chipglow.io.example_scene import example_scene
 from chipglow.io.import_description import (
     IMPORT_SOURCES,
     ImportDescription,
@@ -21,6 +20,7 @@ from chipglow.io.scene_file import (
     SCENE_FORMAT,
     SceneWriter,
     StoredScene,
+    example_scene,
     is_scene,
     open_scene,
     write_scene,

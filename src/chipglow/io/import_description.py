@@ -15,7 +15,6 @@ from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import (
     FieldMovie,
-    Legend,
     MovieSource,
     NamedMap,
     Pixel,
@@ -129,9 +128,7 @@ def _field_movie(name: str, section: FieldMovieSection, whole: "ImportDescriptio
     if file is None:
         raise ValueError(f"movie.{name}.file: is missing, expected the name of a movie")
     ends = [_value(f"movie.{name}.{end}", name, getattr(section, end)) for end in ("first", "last")]
-    colours = (
-        NamedMap(section.colours, section.bands) if section.colours else Legend(section.legend)
-    )
+    colours = NamedMap(section.colours, section.bands) if section.colours else section.legend
     return FieldMovie(Path(file), (ends[0], ends[1]), colours)
 
 

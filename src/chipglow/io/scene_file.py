@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import lru_cache, partial
 from importlib.metadata import version
+from importlib.resources import files
 from math import prod
 from pathlib import Path
 from types import TracebackType
@@ -83,31 +84,11 @@ CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
-    A context manager. Frames are kept in a `Spool` beside the file, which is written at the end;
-    if the block raises, nothing is left unless there is a checkpoint to go on from.
+    A context manager: frames lie in a `Spool` beside the file, which is written at the end.
+    `hottest` is the greatest temperature in K that frames may have; over the default it takes 32
+    bits instead of 16. With a `lattice` the splines of the frames are kept instead of their
+    samples. `resume` begins with the frames of the last checkpoint of an earlier writer.
 
-    Parameters
-    ----------
-    path : path-like
-        The file to write.
-    raster : Raster
-        Where the samples are.
-    tool : Tool, optional
-        The tool's outline.
-    attributes : mapping, optional
-        Attributes of the file, such as provenance: text and numbers.
-    fields : sequence of str
-        Names of the fields that the frames have; by default those of a cut.
-    hottest : float
-        Greatest temperature in K that the frames may have. Over the default, 1838.375 K,
-        temperature takes 32 bits instead of 16 and reaches all that a scene may have.
-    lattice : Lattice, optional
-        Keep the splines of the frames instead of their samples; for frames that have them.
-    resume : UnfinishedScene, optional
-        Begin with the frames that an earlier writer of the same scene had at its last checkpoint.
-
-    Notes
-    -----
     One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K up,
     material coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are
     within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
@@ -245,8 +226,7 @@ class SceneWriter:
         if self._lattice is not None:
             spline_file.create(file, self._lattice)
         else:
-            for name in self._units:
-                self._create_field(file, name)
+            self._create_fields(file)
         if self._forces:
             file.dimensions["force_time"] = self._forces["force_time"][1].size
         for name, (unit, values) in self._forces.items():
@@ -254,18 +234,14 @@ class SceneWriter:
             long_name = _LONG_NAMES.get(name, "time of the force history")
             variable.attrs.update(units=unit, long_name=long_name)
 
-    def _create_field(self, file: h5netcdf.File, name: str) -> None:
-        packing = self._packing[name]
-        variable = file.create_variable(
-            name,
-            ("time", "y", "x"),
-            packing.dtype,
-            chunks=(1, *self.raster.shape),
-            **COMPRESSION,
-        )
-        variable.attrs.update(
-            units=self._units[name], long_name=_LONG_NAMES[name], **packing.attributes
-        )
+    def _create_fields(self, file: h5netcdf.File) -> None:
+        chunks = (1, *self.raster.shape)
+        for name, unit in self._units.items():
+            packing = self._packing[name]
+            variable = file.create_variable(
+                name, ("time", "y", "x"), packing.dtype, chunks=chunks, **COMPRESSION
+            )
+            variable.attrs.update(units=unit, long_name=_LONG_NAMES[name], **packing.attributes)
 
 
 class StoredScene(Scene):
@@ -414,6 +390,19 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
         raise SceneError(
             f"{path}: not a scene, or cut short, expected a NetCDF-4 file: {_first_line(error)}"
         ) from error
+
+
+def example_scene() -> StoredScene:
+    """Open a chip to try things with: 43 µs of the quick study, in which a shear band develops.
+
+    Returns
+    -------
+    StoredScene
+        44 frames, 1 µs apart, of 360 × 440 samples of 1.5 µm: the cut of Heigel and Whitenton
+        (2010) on cells of 20 µm, which is coarse for a shear band. Its numbers are for a first
+        look; those to rely on are the full study's.
+    """
+    return open_scene(Path(str(files("chipglow.io").joinpath("example-scene.nc"))))
 
 
 def is_scene(path: str | os.PathLike[str]) -> bool:

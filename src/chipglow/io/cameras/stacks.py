@@ -17,13 +17,12 @@ from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
-    StoredArray,
+    FileArray,
     exported_table,
     open_arrays,
 )
 from chipglow.io.sources.layout import (
     AXES,
-    Chosen,
     axes_of,
     check_times,
     coordinate,
@@ -101,14 +100,14 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
         one = _dataset(path, arrays, stated.dataset)
         notes = Notes()
         axes = axes_of(one, stated.axes, notes)
-        lengths = dict(zip(axes, one.array.shape, strict=True))
+        lengths = dict(zip(axes, one.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
         unit, times = _unit(one, stated), _times(one, arrays, axes, chosen, stated, notes)
         if unit is None or times is None:
             raise MissingError(f"{one}: {_missing(one, unit, times)}")
         signal = _signal(one, axes, chosen)
-    if skipped := one.array.attributes.get("lines_of_text"):
+    if skipped := one.attributes.get("lines_of_text"):
         notes.remarks.append(f"Ignored {skipped} lines of text before the numbers.")
     quantity, offset = RECORDING_UNITS[unit]
     if quantity != "counts":
@@ -118,7 +117,7 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
     return Recording(signal=signal, quantity=quantity, times=times, camera="unknown", notes=notes)
 
 
-def _dataset(path: Path, arrays: Mapping[str, StoredArray], name: str | None) -> Chosen:
+def _dataset(path: Path, arrays: Mapping[str, FileArray], name: str | None) -> FileArray:
     if name is None:
         labels = [label for label, array in arrays.items() if _may_be_pictures(array)]
         wrong = "give the dataset with the frames"
@@ -127,17 +126,17 @@ def _dataset(path: Path, arrays: Mapping[str, StoredArray], name: str | None) ->
         labels = [name] if name in arrays else labels
         wrong = f"has no dataset {name!r}"
     if len(labels) == 1:
-        return Chosen(str(path), labels[0], arrays[labels[0]])
+        return arrays[labels[0]]
     listed = ", ".join(f"{name!r} of shape {arrays[name].shape}" for name in sorted(arrays)[:10])
     raise SourceError(f"{path}: {wrong}, it has {listed}")
 
 
-def _may_be_pictures(array: StoredArray) -> bool:
+def _may_be_pictures(array: FileArray) -> bool:
     # MATLAB keeps lists as matrices of one row or column.
     return len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
 
 
-def _missing(one: Chosen, unit: str | None, times: NDArray[np.float64] | None) -> str:
+def _missing(one: FileArray, unit: str | None, times: NDArray[np.float64] | None) -> str:
     parts = []
     if unit is None:
         parts.append(
@@ -149,11 +148,11 @@ def _missing(one: Chosen, unit: str | None, times: NDArray[np.float64] | None) -
     return "; ".join(parts)
 
 
-def _unit(one: Chosen, stated: Stated) -> str | None:
+def _unit(one: FileArray, stated: Stated) -> str | None:
     """Return the unit of the samples, as the user or the file says; None if neither does."""
     if stated.unit is not None:
         return stated.unit
-    said = one.unit if isinstance(one.unit, str) else ""
+    said = one.unit or ""
     unit = said if said in RECORDING_UNITS else _SPELLINGS.get(said.strip().lower())
     if unit is None and stated.quantity in ("counts", "radiance"):
         unit = "counts" if stated.quantity == "counts" else "W/m2/sr"
@@ -165,8 +164,8 @@ def _unit(one: Chosen, stated: Stated) -> str | None:
 
 
 def _times(
-    one: Chosen,
-    arrays: Mapping[str, StoredArray],
+    one: FileArray,
+    arrays: Mapping[str, FileArray],
     axes: tuple[str, ...],
     chosen: range,
     stated: Stated,
@@ -175,12 +174,12 @@ def _times(
     """Return times of the chosen frames in s; None if neither the user nor the file says them."""
     if stated.interval is not None:
         return np.asarray(chosen, np.float64) * stated.interval
-    count = one.array.shape[axes.index("time")] if "time" in axes else 1
+    count = one.shape[axes.index("time")] if "time" in axes else 1
     if count == 1:
         return np.zeros(1)
-    dim = one.array.dims[axes.index("time")] if one.array.dims else ""
-    found = coordinate("time", {one.path: arrays}, None, dim, count)
-    if found is None or found.label == one.label:
+    dim = one.dims[axes.index("time")] if one.dims else ""
+    found = coordinate("time", arrays.values(), None, dim, count)
+    if found is None or found.name == one.name:
         return None
     times = check_times(str(found), read_list("time", found, SI, notes))
     if not isfinite(times[-1] - times[0]):
@@ -189,7 +188,7 @@ def _times(
     return since
 
 
-def _signal(one: Chosen, axes: tuple[str, ...], chosen: range) -> NDArray[Any]:
+def _signal(one: FileArray, axes: tuple[str, ...], chosen: range) -> NDArray[Any]:
     """Return samples of the chosen frames, shape (time, y, x)."""
     if abs(chosen.step) == 1:
         first, last = min(chosen[0], chosen[-1]), max(chosen[0], chosen[-1])

@@ -1,4 +1,4 @@
-"""Colour scales: from the colours of a picture back to the values that they stand for."""
+"""Colour scales: values from the colours of a picture."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -53,27 +53,14 @@ def lab(colours: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class ColourScale:
-    """Colours that stand for values.
-
-    Parameters
-    ----------
-    values : ndarray
-        Values of the colours in SI units, ascending, shape (n,).
-    colours : ndarray
-        sRGB of 0 to 1, shape (n, 3).
-    banded : bool
-        Whether each colour stands for a band of values; otherwise the colours between two of the
-        scale stand for the values between theirs.
-
-    Raises
-    ------
-    SourceError
-        If values do not ascend, colours are not of 0 to 1, or a colour stands for two values.
-    """
+    """Colours that stand for values; none may stand for two values."""
 
     values: NDArray[np.float64]
+    """Values of the colours in SI units, ascending, shape (n,)."""
     colours: NDArray[np.float64]
+    """sRGB of 0 to 1, shape (n, 3)."""
     banded: bool = False
+    """Whether each colour stands for a band of values; otherwise values are interpolated."""
 
     def __post_init__(self) -> None:
         least = 1 if self.banded else 2
@@ -91,23 +78,11 @@ class ColourScale:
 
     @classmethod
     def named(cls, name: str, values: tuple[float, float], bands: int = 0) -> "ColourScale":
-        """Scale of a named map.
+        """Return the scale of a map between the values in SI at its first and last edge.
 
-        Parameters
-        ----------
-        name : str
-            `RAINBOW` or a colour map of matplotlib (``jet``, ``turbo``, ``viridis``, ``jet_r``);
-            ``matplotlib.rainbow`` is matplotlib's own.
-        values : tuple of float
-            Values at the first and the last edge of the scale, in SI units.
-        bands : int
-            Number of bands of equal width, the first and the last with the end colours of the map;
-            0 for a map that runs without steps.
-
-        Raises
-        ------
-        SourceError
-            If there is no such map, or a colour of it stands for two values.
+        The map is `RAINBOW` or one of matplotlib (``jet``, ``turbo``, ``viridis``, ``jet_r``);
+        ``matplotlib.rainbow`` is matplotlib's own. It has bands of equal width, the first and the
+        last with its end colours, or 0 for none.
         """
         count = bands or _LEVELS
         with naming(name):
@@ -115,18 +90,9 @@ class ColourScale:
 
     @classmethod
     def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":
-        """Scale of a legend's pixels.
+        """Return the scale of a legend's colours, shape (n, 3), and values at its two edges.
 
-        Parameters
-        ----------
-        pixels : ndarray
-            Colours along the legend, shape (n, 3), uint8.
-        values : tuple of float
-            Values at its first and last edge, in SI units.
-
-        Notes
-        -----
-        It has bands if its colour stands still but for jumps.
+        It has bands if its colour stands still except for jumps.
         """
         colours = pixels / 255.0
         count = _equal_bands(colours)
@@ -164,10 +130,7 @@ class ColourScale:
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:
-        """Values of the colours that differ in 8 bits, ascending, shape (m,).
-
-        Where the colour stands still, the middle of its values.
-        """
+        """Values of the colours that differ in 8 bits, the middle of those of one, shape (m,)."""
         first, last = self._runs
         return np.asarray((self.values[first] + self.values[last]) / 2)
 
@@ -193,10 +156,7 @@ class ColourScale:
 
     @cached_property
     def slope(self) -> NDArray[np.float64]:
-        """How much the value changes with the colour, per unit of CIE L*a*b*, shape (m,).
-
-        It is taken over the chord of 2 % of the scale.
-        """
+        """Change of the value per unit of CIE L*a*b*, over 2 % of the scale, shape (m,)."""
         rise, chord = self._chords
         return np.asarray(rise / _lengths(chord))
 
@@ -204,8 +164,8 @@ class ColourScale:
     def sensitivity(self) -> NDArray[np.float64]:
         """Standard deviation of the value for a root mean square distance of 1, shape (m,).
 
-        For noise that is equally large in red, green and blue: it has one component along the
-        scale, which changes the value, and two across, which make the distance.
+        The noise is equally large in red, green and blue: it has one component along the scale,
+        which changes the value, and two across, which make the distance.
         """
         chord = self._chords[1]
         tangent = chord / _lengths(chord)[:, None]
@@ -224,27 +184,18 @@ class ColourScale:
         return self.knots[above] - self.knots[below], self.labs[above] - self.labs[below]
 
     def invert(self, picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Values that the colours of a picture stand for.
+        """Return values and distances of a picture's colours, shape (y, x), float32.
 
-        Returns
-        -------
-        values : ndarray
-            Value of the nearest place on the scale, shape (y, x), float32.
-        distance : ndarray
-            Distance from it in CIE L*a*b* (1976 difference), shape (y, x), float32.
-
-        Notes
-        -----
-        Exact: the first pixel of each of the 2^24 colours is projected onto all segments of the
-        scale; the answer is kept for the others.
+        A value is that of the nearest place on the scale; its distance is the CIE L*a*b*
+        difference of 1976. Each of the 2^24 colours is projected onto the scale only once.
         """
-        values = np.empty(picture.shape[:2], np.float32)
-        distance = np.empty(picture.shape[:2], np.float32)
-        _invert(
-            np.ascontiguousarray(picture), self.labs, self.knots, self.banded, _linear_light(),
-            _TO_XYZ, self._known, values, distance,
-        )  # fmt: skip
-        return values, distance
+        red, green, blue = np.moveaxis(picture.astype(np.int32), -1, 0)
+        keys = (red << 16) | (green << 8) | blue
+        new = np.unique(keys[self._known[keys, 1] == 0.0])
+        if new.size:
+            colours = np.stack([new >> 16, new >> 8 & 0xFF, new & 0xFF], axis=1) / 255.0
+            self._known[new] = _nearest(lab(colours), self.labs, self.knots, self.banded)
+        return self._known[keys, 0], self._known[keys, 1] - np.float32(1.0)
 
     @cached_property
     def _known(self) -> NDArray[np.float32]:
@@ -252,7 +203,7 @@ class ColourScale:
         return np.zeros((1 << 24, 2), np.float32)
 
     def _refuse_colours_that_come_back(self) -> None:
-        """A scale may not return to a colour that it left."""
+        """Refuse a scale that returns to a colour that it left."""
         chosen = np.unique(np.linspace(0, len(self.knots) - 1, 192).astype(int))
         labs = self.labs[chosen]
         apart = np.triu(np.linalg.norm(labs[:, None] - labs[None, :], axis=2))
@@ -268,47 +219,30 @@ class ColourScale:
 
 @dataclass(frozen=True)
 class ColourUncertainty:
-    """What the colours of a movie leave unknown of a field: standard deviations in its unit.
-
-    Parameters
-    ----------
-    colours : float
-        Because the scale has a finite number of colours.
-    noise : float
-        Because the colours are not those of the scale: compression and rounding.
-    legend : float
-        Because the ends of a legend are known to a pixel.
-    lines : float
-        Because values under lines and text are those of pixels beside them.
-    """
+    """Standard uncertainties of a field that is read from colours, in its unit."""
 
     colours: float
+    """By the finite number of colours of the scale."""
     noise: float
+    """By colours that are not of the scale: compression and rounding."""
     legend: float = 0.0
+    """By the ends of a legend, which are known to a pixel."""
     lines: float = 0.0
+    """By lines and text, under which values are those of pixels beside them."""
 
     @property
     def total(self) -> float:
-        """All together."""
+        """Combined standard uncertainty."""
         return sqrt(self.colours**2 + self.noise**2 + self.legend**2 + self.lines**2)
 
 
 def colour_uncertainty(
     scale: ColourScale, values: ArrayLike, distance: ArrayLike
 ) -> ColourUncertainty:
-    """Uncertainty of values that were read from colours.
+    """Return the uncertainty of values and distances that `ColourScale.invert` gave.
 
-    Parameters
-    ----------
-    scale : ColourScale
-        The scale.
-    values, distance : array_like
-        What `ColourScale.invert` gave for the pixels that show the field.
-
-    Notes
-    -----
-    Noise is taken to be as large along the scale as across it, where it is seen as a distance: see
-    `ColourScale.sensitivity`. Bands are wrong only where noise is enough for the next band.
+    Noise is assumed as large along the scale as across it, where it is seen as a distance: see
+    `ColourScale.sensitivity`. Bands are wrong only where noise reaches the next band.
     """
     values, distance = np.ravel(values), np.ravel(distance).astype(np.float64)
     widths = np.interp(values, scale.knots, scale.widths)
@@ -324,12 +258,12 @@ def _root_mean_square(values: NDArray[np.float64]) -> float:
 
 
 def _lengths(chords: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lengths of chords; where the colour stands still, that of a rounding of 8 bits."""
+    """Return lengths of chords, at least that of a rounding of 8 bits."""
     return np.asarray(np.maximum(np.linalg.norm(chords, axis=1), 0.1))
 
 
 def _lab_per_colour(colours: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives of L*a*b* with respect to red, green and blue, shape (n, 3, 3)."""
+    """Return derivatives of L*a*b* with respect to red, green and blue, shape (n, 3, 3)."""
     columns = []
     for direction in np.eye(3) / 255:
         above, below = np.minimum(colours + direction, 1), np.maximum(colours - direction, 0)
@@ -351,10 +285,10 @@ def _map_colours(name: str, count: int) -> NDArray[np.float64]:
 
 
 def _equal_bands(colours: NDArray[np.float64]) -> int:
-    """Number of bands of equal width that a legend has; 0 if its colours run on, or for others.
+    """Return the number of bands of equal width of a legend, 0 if it has none.
 
-    Bands are told from a run of colours by how near the pixels are to the middle of their band, and
-    to lines between the middles: codecs blur the jumps, by which they cannot be counted.
+    Pixels of bands are nearer to the middle of their band than to lines between the middles: codecs
+    blur the jumps, by which they cannot be counted.
     """
     labs = lab(colours)
     tried = range(_FEWEST_BANDS, min(_MOST_BANDS, len(colours) // _NARROWEST_BAND) + 1)
@@ -368,7 +302,7 @@ def _equal_bands(colours: NDArray[np.float64]) -> int:
 
 
 def _misfits(labs: NDArray[np.float64], count: int) -> tuple[float, float]:
-    """Mean distance of a legend's pixels from equal bands, and from lines between their middles."""
+    """Return the mean distances of pixels from equal bands and from lines between their middles."""
     edges = np.linspace(0, len(labs), count + 1)
     middles = np.array([np.median(_inner(labs, *ends), axis=0) for ends in pairwise(edges)])
     place = np.arange(len(labs)) + 0.5
@@ -384,14 +318,14 @@ def _misfits(labs: NDArray[np.float64], count: int) -> tuple[float, float]:
 
 
 def _inner(colours: NDArray[np.float64], first: float, last: float) -> NDArray[np.float64]:
-    """The middle of a band, at least a pixel."""
+    """Return the middle of a band, at least a pixel."""
     trim = min(_BLURRED, (last - first) / 4)
     start = int(np.ceil(first + trim - 0.5))
     return colours[start : max(int(last - trim + 0.5), start + 1)]
 
 
 def _bands(colours: NDArray[np.float64], jumps: NDArray[np.intp]) -> list[slice]:
-    """Runs of one colour between jumps; a run of one or two blurred pixels goes to the next."""
+    """Return runs of one colour between jumps; a few blurred pixels go to the next run."""
     edges = [0, *(int(jump) + 1 for jump in jumps), len(colours)]
     longest = max(np.diff(edges))
     kept = [0]
@@ -401,65 +335,35 @@ def _bands(colours: NDArray[np.float64], jumps: NDArray[np.intp]) -> list[slice]
     return [slice(first, last) for first, last in pairwise(kept)]
 
 
-def _linear_light() -> NDArray[np.float64]:
-    srgb = np.arange(256) / 255.0
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-
-
 @njit(cache=True)
-def _invert(picture, labs, scale, banded, linear, to_xyz, known, values, distance):  # type: ignore[no-untyped-def]
-    for row in range(picture.shape[0]):
-        for column in range(picture.shape[1]):
-            red, green, blue = picture[row, column]
-            key = (np.int64(red) << 16) | (np.int64(green) << 8) | np.int64(blue)
-            if known[key, 1] == 0.0:
-                place = _lab(linear[red], linear[green], linear[blue], to_xyz)
-                value, apart = _nearest(place, labs, scale, banded)
-                known[key, 0] = value
-                known[key, 1] = 1.0 + apart
-            values[row, column] = known[key, 0]
-            distance[row, column] = known[key, 1] - np.float32(1.0)
-
-
-@njit(cache=True)
-def _lab(red, green, blue, to_xyz):  # type: ignore[no-untyped-def]
-    x = _root(to_xyz[0, 0] * red + to_xyz[0, 1] * green + to_xyz[0, 2] * blue)
-    y = _root(to_xyz[1, 0] * red + to_xyz[1, 1] * green + to_xyz[1, 2] * blue)
-    z = _root(to_xyz[2, 0] * red + to_xyz[2, 1] * green + to_xyz[2, 2] * blue)
-    return 116 * y - 16, 500 * (x - y), 200 * (y - z)
-
-
-@njit(cache=True)
-def _root(value):  # type: ignore[no-untyped-def]
-    if value <= (6 / 29) ** 3:
-        return value * (29 / 6) ** 2 / 3 + 4 / 29
-    return np.cbrt(value)
-
-
-@njit(cache=True)
-def _nearest(place, labs, scale, banded):  # type: ignore[no-untyped-def]
-    """Value of the nearest place on the scale, and its distance."""
-    best = np.inf
-    value = scale[0]
-    for index in range(len(scale) if banded else len(scale) - 1):
-        u0 = place[0] - labs[index, 0]
-        u1 = place[1] - labs[index, 1]
-        u2 = place[2] - labs[index, 2]
-        fraction = 0.0
-        if not banded:
-            v0 = labs[index + 1, 0] - labs[index, 0]
-            v1 = labs[index + 1, 1] - labs[index, 1]
-            v2 = labs[index + 1, 2] - labs[index, 2]
-            square = v0 * v0 + v1 * v1 + v2 * v2
-            if square > 0:
-                fraction = min(max((u0 * v0 + u1 * v1 + u2 * v2) / square, 0.0), 1.0)
-            u0 -= fraction * v0
-            u1 -= fraction * v1
-            u2 -= fraction * v2
-        apart = u0 * u0 + u1 * u1 + u2 * u2
-        if apart < best:
-            best = apart
-            value = scale[index]
-            if fraction > 0:
-                value += fraction * (scale[index + 1] - scale[index])
-    return value, np.sqrt(best)
+def _nearest(places, labs, scale, banded):  # type: ignore[no-untyped-def]
+    """Return values of the nearest places on the scale, and 1 + their distances, float32."""
+    result = np.empty((len(places), 2), np.float32)
+    for number in range(len(places)):
+        place = places[number]
+        best = np.inf
+        value = scale[0]
+        for index in range(len(scale) if banded else len(scale) - 1):
+            u0 = place[0] - labs[index, 0]
+            u1 = place[1] - labs[index, 1]
+            u2 = place[2] - labs[index, 2]
+            fraction = 0.0
+            if not banded:
+                v0 = labs[index + 1, 0] - labs[index, 0]
+                v1 = labs[index + 1, 1] - labs[index, 1]
+                v2 = labs[index + 1, 2] - labs[index, 2]
+                square = v0 * v0 + v1 * v1 + v2 * v2
+                if square > 0:
+                    fraction = min(max((u0 * v0 + u1 * v1 + u2 * v2) / square, 0.0), 1.0)
+                u0 -= fraction * v0
+                u1 -= fraction * v1
+                u2 -= fraction * v2
+            apart = u0 * u0 + u1 * u1 + u2 * u2
+            if apart < best:
+                best = apart
+                value = scale[index]
+                if fraction > 0:
+                    value += fraction * (scale[index + 1] - scale[index])
+        result[number, 0] = value
+        result[number, 1] = 1.0 + np.sqrt(best)
+    return result

@@ -1,6 +1,6 @@
 """Names, units and axes of fields in other programs' files."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, TypeVar
 
@@ -79,26 +79,25 @@ def match_names(
     given: Mapping[str, str],
     known: Iterable[str] = READABLE,
     among: Iterable[str] | None = None,
+    names: Mapping[str, Sequence[str]] = COMMON_NAMES,
 ) -> dict[str, str]:
     """Return a source's fields by the names of a scene: those given, then guesses for those known.
 
-    The guesses are ``among`` some of the available fields; ``velocity`` is a vector.
+    The guesses are ``among`` some of the available fields, by their usual names.
     """
-    names = sorted(available)
+    there = sorted(available)
     for ours, theirs in given.items():
-        if ours not in COMMON_NAMES:
-            raise SourceError(
-                f"fields: unknown {ours!r}, expected one of {', '.join(COMMON_NAMES)}"
-            )
-        if theirs not in names:
-            listed = ", ".join(names) or "none"
+        if ours not in names:
+            raise SourceError(f"fields: unknown {ours!r}, expected one of {', '.join(names)}")
+        if theirs not in there:
+            listed = ", ".join(there) or "none"
             raise SourceError(f"fields: {ours}: there is no field {theirs!r}, it has {listed}")
-    guessable = names if among is None else sorted(among)
+    guessable = there if among is None else sorted(among)
     simplified = {simple(name): name for name in reversed(guessable)}
     result = dict(given)
     for ours in known:
         if ours not in result:
-            match = [simplified[name] for name in COMMON_NAMES[ours] if name in simplified]
+            match = [simplified[name] for name in names[ours] if name in simplified]
             if match and match[0] not in result.values():
                 result[ours] = match[0]
     return result

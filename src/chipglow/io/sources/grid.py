@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from functools import partial
 from math import isfinite, prod
 from typing import Annotated, Any, ClassVar, Final
 
@@ -13,15 +12,14 @@ from numpy.typing import NDArray
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
-    StoredArray,
+    FileArray,
     check_samples,
     open_arrays,
 )
-from chipglow.io.sources.conventions import Placement, Units
+from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple
 from chipglow.io.sources.layout import (
     AXES,
     COORDINATES,
-    Chosen,
     axes_of,
     check_even,
     check_times,
@@ -30,7 +28,6 @@ from chipglow.io.sources.layout import (
     read_frames,
     read_list,
     unit_of,
-    unused_names,
 )
 from chipglow.io.sources.source import (
     Source,
@@ -45,33 +42,19 @@ from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
 from chipglow.text import Notes
 
-Arrays = Mapping[str, StoredArray]
-
 _KNOWN: Final = (*READABLE, "material")
-_BLOCK: Final = 64_000_000
-"""Most samples of several frames that are read together, if the file keeps them together."""
+_LARGEST_BLOCK: Final = 64_000_000
+"""Maximum samples of several frames that are read together, if the file keeps them together."""
 
 
 @dataclass(frozen=True)
 class GridSource(Source, Part):
     """Fields on a regular grid over time.
 
-    Parameters
-    ----------
-    names : mapping
-        Name that a field has in its file, by its name in a scene; also of ``material`` (0 void,
-        1 workpiece, 2 tool), ``time``, ``x`` and ``y``. Those not named are guessed.
-    interval : float, optional
-        Time between frames in s; comes before times in the file.
-    units : Units
-        Units of what is in the files; where one is not SI, it comes before what a file says.
-    placement : Placement
-        How the grid lies in the scene.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range.
+    ``names`` are those of fields in the file by their names in a scene; also of ``material``
+    (0 void, 1 workpiece, 2 tool), ``time``, ``x`` and ``y``; those not named are guessed. An
+    ``interval`` in s replaces times in the file, and ``units`` that are not SI those that a file
+    states.
     """
 
     title: ClassVar[str] = "a grid"
@@ -114,13 +97,11 @@ class GridSource(Source, Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.files, dict):
-            unknown = sorted(set(self.files) - {*READABLE, "material"})
-            if unknown:
-                raise ValueError(
-                    f"files: unknown field {unknown[0]!r}, expected one of "
-                    f"{', '.join((*READABLE, 'material'))}"
-                )
+        unknown = sorted(set(self.files) - set(_KNOWN)) if isinstance(self.files, dict) else []
+        if unknown:
+            raise ValueError(
+                f"files: unknown field {unknown[0]!r}, expected one of {', '.join(_KNOWN)}"
+            )
         if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
             raise ValueError(
                 f"axes: {self.axes!r}, expected time, y and x in any order, or y and x"
@@ -132,19 +113,17 @@ class GridSource(Source, Part):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The path or pattern, or those of the fields."""
         return tuple(self.files.values()) if isinstance(self.files, dict) else (str(self.files),)
 
     def survey(self) -> Survey:
-        """Look at what is there; see `Source.survey`."""
         with ExitStack() as stack:
-            grid = _open(self, stack)
+            grid = _Grid(self, stack)
             temperatures = grid.check_ends()
             return Survey(
                 kind=grid.kind,
                 times=grid.times,
                 extent=grid.extent,
-                found={name: layer.chosen.label for name, layer in grid.layers.items()},
+                found={name: layer.array.name for name, layer in grid.layers.items()},
                 unused=grid.unused,
                 spacing=min(grid.steps),
                 temperatures=temperatures,
@@ -152,9 +131,8 @@ class GridSource(Source, Part):
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the frames one after the other; see `Source.frames`."""
         with ExitStack() as stack:
-            grid = _open(self, stack)
+            grid = _Grid(self, stack)
             across = taps(grid.x, raster.spacing, raster.x)
             down = taps(-grid.y, raster.spacing, -raster.y)
             for index in range(start, len(grid.times)):
@@ -164,79 +142,167 @@ class GridSource(Source, Part):
 
 
 class _Layer:
-    """A field of the grid: where its numbers are and what they mean."""
+    """Field of a grid."""
 
-    def __init__(self, chosen: Chosen, axes: tuple[str, ...], unit: Unit) -> None:
-        self.chosen, self.axes, self.unit = chosen, axes, unit
-        self.array = array = chosen.array
-        self.frames = self.length("time")
+    def __init__(self, array: FileArray, axes: tuple[str, ...], unit: Unit) -> None:
+        self.array, self.axes, self.unit = array, axes, unit
+        self.shape = tuple(array.shape[axes.index(axis)] if axis in axes else 1 for axis in AXES)
+        """Number of samples along `AXES`."""
+        samples = self.shape[1] * self.shape[2]
+        for axis, length in zip(AXES[1:], self.shape[1:], strict=True):
+            if not 2 <= length <= MOST_ON_A_SIDE:
+                raise SourceError(
+                    f"{array}: has {length} samples along {axis}, expected 2 to {MOST_ON_A_SIDE}"
+                )
+        check_samples(f"{array}: a frame", samples)
+        check_samples(f"{array}: a chunk", prod(array.chunks or ()))
+        if self.shape[0] < 1:
+            raise SourceError(f"{array}: has no frame")
         self._first, self._block = 0, np.empty((0, 0, 0), np.float32)
         together = array.chunks[axes.index("time")] if array.chunks and "time" in axes else 1
-        self._together = max(1, min(together, _BLOCK // max(1, self.samples)))
-
-    def length(self, axis: str) -> int:
-        """Number of samples along an axis."""
-        return self.array.shape[self.axes.index(axis)] if axis in self.axes else 1
-
-    @property
-    def samples(self) -> int:
-        """Number of samples of a frame."""
-        return self.length("x") * self.length("y")
-
-    def check(self) -> None:
-        """Refuse a frame that is empty or too large to be read."""
-        for axis in ("x", "y"):
-            if not 2 <= self.length(axis) <= MOST_ON_A_SIDE:
-                raise SourceError(
-                    f"{self.chosen}: has {self.length(axis)} samples along {axis}, "
-                    f"expected 2 to {MOST_ON_A_SIDE}"
-                )
-        check_samples(f"{self.chosen}: a frame", self.samples)
-        check_samples(f"{self.chosen}: a chunk", prod(self.array.chunks or (1,)))
-        if self.frames < 1:
-            raise SourceError(f"{self.chosen}: has no frame")
-
-    def check_like(self, other: "_Layer") -> None:
-        """Refuse fields of different shape."""
-        own, expected = ([one.length(axis) for axis in AXES] for one in (self, other))
-        if own != expected:
-            raise SourceError(
-                f"{self.chosen}: has {own} samples along {', '.join(AXES)}, "
-                f"expected {expected} as {other.chosen}"
-            )
+        self._together = max(1, min(together, _LARGEST_BLOCK // samples))
 
     def dim(self, axis: str) -> str:
-        """Name of an axis in the file; empty if it says none."""
+        """Return the name of an axis in the file; empty if it states none."""
         if axis not in self.axes or not self.array.dims:
             return ""
         return self.array.dims[self.axes.index(axis)]
 
     def read(self, index: int) -> NDArray[np.float32]:
-        """Numbers of a frame as they are in the file, shape (y, x); NaN where there is none."""
+        """Return numbers of a frame as they are in the file, shape (y, x), NaN if missing."""
         if not self._first <= index < self._first + len(self._block):
             self._first = index - index % self._together
-            self._block = self._load(self._first, min(self._first + self._together, self.frames))
+            last = min(self._first + self._together, self.shape[0])
+            frames = read_frames(self.array, self.axes, slice(self._first, last))
+            self._block = np.asarray(frames, np.float32)
         values: NDArray[np.float32] = self._block[index - self._first]
         return values
 
-    def _load(self, first: int, last: int) -> NDArray[np.float32]:
-        return np.asarray(read_frames(self.chosen, self.axes, slice(first, last)), np.float32)
 
-
-@dataclass(frozen=True)
 class _Grid:
-    """A source that is open."""
+    """Open source."""
 
-    kind: str
-    layers: Mapping[str, _Layer]
-    material: _Layer | None
-    source: GridSource
-    times: NDArray[np.float64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    turned: tuple[bool, bool, bool]
-    unused: tuple[str, ...]
-    notes: Notes
+    def __init__(self, source: GridSource, stack: ExitStack) -> None:
+        self._source, self.notes = source, Notes()
+        self._files = {path: list(open_arrays(path, stack).values()) for path in source.inputs}
+        layers = {name: self._layer(name, array) for name, array in self._choose().items()}
+        used = {layer.array.name for layer in layers.values()} | set(source.names.values())
+        self._first = first = next(iter(layers.values()))
+        for layer in layers.values():
+            if layer.shape != first.shape:
+                raise SourceError(
+                    f"{layer.array}: has {list(layer.shape)} samples along {', '.join(AXES)}, "
+                    f"expected {list(first.shape)} as {first.array}"
+                )
+        self._material = layers.pop("material", None)
+        if not layers:
+            raise SourceError(f"{first.array}: is a material, expected a temperature too")
+        self.layers = {source.placement.in_file(name): layer for name, layer in layers.items()}
+        self.x, self.y = self._placed(self._positions("x"), self._positions("y"))
+        """Centres of the columns, ascending, and of the rows, descending, in m in the scene."""
+        self.times = self._find_times()
+        _, rows, columns = first.shape
+        self.kind = f"grid of {rows} x {columns} samples, {', '.join(self._files)}"
+        axes = {name for axis in COORDINATES for name in OTHER_NAMES[axis]}
+        self.unused = tuple(
+            array.name
+            for arrays in self._files.values()
+            for array in arrays
+            if array.name not in used and simple(array.short) not in axes
+        )
+        """Arrays that are neither field nor coordinate."""
+
+    def _layer(self, name: str, array: FileArray) -> _Layer:
+        axes = axes_of(array, self._source.axes, self.notes)
+        unit = SI
+        if name != "material":
+            own = self._source.units.of(name)
+            unit = unit_of(name, str(array), array.unit, own, self.notes)
+        return _Layer(array, axes, unit)
+
+    def _choose(self) -> dict[str, FileArray]:
+        """Return the array of every field."""
+        source = self._source
+        given = {name: label for name, label in source.names.items() if name not in COORDINATES}
+        if not isinstance(source.files, dict):
+            return find_fields(self._candidates(str(source.files)), given, _KNOWN, self.notes)
+        chosen: dict[str, FileArray] = {}
+        for name, path in source.files.items():
+            candidates = self._candidates(path)
+            own = {name: given[name]} if name in given else {}
+            if len(candidates) == 1 and not own:
+                own = {name: next(iter(candidates))}
+            chosen |= find_fields(candidates, own, (name,), self.notes)
+        return chosen
+
+    def _candidates(self, path: str) -> dict[str, FileArray]:
+        """Return the arrays of a file that may be a field, by their number of axes."""
+        arrays = self._files[path]
+        solid = any(len(array.shape) == 3 for array in arrays)
+        number = len(self._source.axes or (AXES if solid else AXES[1:]))
+        result = {
+            array.name: array
+            for array in arrays
+            if len(array.shape) == number and (number == 3 or min(array.shape) != 1)
+        }
+        if not result:
+            shapes = ", ".join(f"{array.name} {array.shape}" for array in arrays[:10])
+            raise SourceError(f"{path}: expected an array with {number} axes, it has {shapes}")
+        return result
+
+    def _coordinate(self, axis: str) -> FileArray | None:
+        count = self._first.shape[AXES.index(axis)]
+        arrays = [array for of_file in self._files.values() for array in of_file]
+        given, dim = self._source.names.get(axis), self._first.dim(axis)
+        return coordinate(axis, arrays, given, dim, count)
+
+    def _positions(self, axis: str) -> NDArray[np.float64]:
+        """Return the centres of the columns or rows in m, in the order of the file."""
+        source, array = self._source, self._coordinate(axis)
+        if source.spacing is None:
+            if array is None:
+                raise SourceError(
+                    f"{self._first.array.path}: has no coordinate {axis!r}, expected grid.spacing"
+                )
+            values = read_list(axis, array, source.units.length, self.notes)
+            return check_even(str(array), values)
+        number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5
+        if array is not None:
+            self.notes.remarks.append(
+                f"The coordinate {axis} is not used, as the spacing is given."
+            )
+        if axis == "x":
+            return source.left + source.spacing * number
+        edge = "upper" if source.top_first else "lower"
+        self.notes.assumed.append(f"Row 0 is the {edge} edge.")
+        down = source.row_spacing or source.spacing
+        return source.top - down * (number if source.top_first else number[::-1])
+
+    def _placed(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        placement = self._source.placement
+        along, up = (
+            ((x, y)[axis] - origin) * sign
+            for axis, origin, sign in zip(
+                placement.axes, placement.origin, placement.signs, strict=True
+            )
+        )
+        self._backward, self._rising = bool(along[0] > along[-1]), bool(up[0] < up[-1])
+        return along[:: -1 if self._backward else 1], up[:: -1 if self._rising else 1]
+
+    def _turned(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values of the file with rows and columns in the order of the scene."""
+        values = values.swapaxes(-1, -2) if self._source.placement.axes == (1, 0) else values
+        values = values[..., :: -1 if self._rising else 1, :: -1 if self._backward else 1]
+        return np.ascontiguousarray(values)
+
+    def _find_times(self) -> NDArray[np.float64]:
+        source = self._source
+        array = self._coordinate("time") if source.interval is None else None
+        if array is None:
+            return even_times(self._first.shape[0], source.interval, self.notes)
+        return check_times(str(array), read_list("time", array, source.units.time, self.notes))
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -258,9 +324,10 @@ class _Grid:
         )
 
     def check_ends(self) -> tuple[float, float] | None:
-        """Read the first and the last frame: what is wrong there is found before all are read.
+        """Return the smallest and the largest temperature of the first and the last frame.
 
-        And the others until one has a temperature. Gives the least and the greatest.
+        Errors in these are so found before all are read. Others are read until one has a
+        temperature.
         """
         last = len(self.times) - 1
         found: list[float] = []
@@ -274,174 +341,39 @@ class _Grid:
         return span_of(found) if "temperature" in self.layers else None
 
     def read(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Fields in SI, shape (fields, y, x), and material of a frame, as they lie in the scene."""
+        """Return fields in SI, shape (fields, y, x), and material of a frame in the scene."""
         raw = {name: layer.read(index) for name, layer in self.layers.items()}
-        void = self._void(raw)
-        if self.material is None:
-            material = np.where(void, np.uint8(Material.VOID), np.uint8(Material.WORKPIECE))
-        else:
-            material = np.where(void, np.uint8(Material.VOID), self._material(index))
+        material = np.full(self._first.shape[1:], Material.WORKPIECE, np.uint8)
+        if self._material is not None:
+            material = self._read_material(self._material, index)
+        material = np.where(self._void(raw), np.uint8(Material.VOID), material)
         values = np.stack([self._in_scene(name, raw[name]) for name in raw])
-        turn = partial(_turn, turned=self.turned)
-        return np.ascontiguousarray(turn(values)), np.ascontiguousarray(turn(material))
+        return self._turned(values), self._turned(material)
 
     def _void(self, raw: Mapping[str, NDArray[np.float32]]) -> NDArray[np.bool_]:
-        """Where the temperature, or else the first field, has no number."""
-        values = raw["temperature"] if "temperature" in raw else next(iter(raw.values()))
-        if np.isinf(values).any():
-            first = next(iter(self.layers.values()))
-            raise SourceError(f"{first.chosen}: has infinite numbers, expected finite ones or NaN")
-        void: NDArray[np.bool_] = np.isnan(values)
-        if self.source.void_value is not None:
-            void |= np.isclose(values, self.source.void_value, rtol=1e-6, atol=0.0)
+        """Return where the temperature, or else the first field, has no number."""
+        name = "temperature" if "temperature" in raw else next(iter(raw))
+        if np.isinf(raw[name]).any():
+            raise SourceError(
+                f"{self.layers[name].array}: has infinite numbers, expected finite ones or NaN"
+            )
+        void: NDArray[np.bool_] = np.isnan(raw[name])
+        if self._source.void_value is not None:
+            void |= np.isclose(raw[name], self._source.void_value, rtol=1e-6, atol=0.0)
         return void
 
-    def _material(self, index: int) -> NDArray[np.uint8]:
-        assert self.material is not None
-        found = self.material.read(index)
-        kinds = np.nan_to_num(found, nan=float(Material.VOID))
+    def _read_material(self, layer: _Layer, index: int) -> NDArray[np.uint8]:
+        kinds = np.nan_to_num(layer.read(index), nan=float(Material.VOID))
         wrong = ~np.isin(kinds, [float(kind) for kind in Material])
         if wrong.any():
             raise SourceError(
-                f"{self.material.chosen}: material is {kinds[wrong][0]:g} in frame {index}, "
+                f"{layer.array}: material is {kinds[wrong][0]:g} in frame {index}, "
                 "expected 0 (void), 1 (workpiece) or 2 (tool)"
             )
         return np.asarray(kinds, np.uint8)
 
     def _in_scene(self, name: str, raw: NDArray[np.float32]) -> NDArray[np.float32]:
-        layer, placement = self.layers[name], self.source.placement
-        values = np.asarray(placement.field(name, layer.unit.to_si(raw)), np.float32)
+        converted = self.layers[name].unit.to_si(raw)
+        values = np.asarray(self._source.placement.field(name, converted), np.float32)
         values[~np.isfinite(values)] = np.nan
         return values
-
-
-def _turn(values: NDArray[Any], turned: tuple[bool, bool, bool]) -> NDArray[Any]:
-    """Rows and columns swapped, then columns and rows in the scene's order."""
-    swapped, across, down = turned
-    values = values.swapaxes(-1, -2) if swapped else values
-    values = values[..., ::-1] if across else values
-    return values[..., ::-1, :] if down else values
-
-
-def _open(source: GridSource, stack: ExitStack) -> _Grid:
-    notes = Notes()
-    files, chosen = _choose(source, stack, notes)
-    layers: dict[str, _Layer] = {}
-    for name, one in chosen.items():
-        axes = axes_of(one, source.axes, notes)
-        unit = (
-            SI
-            if name == "material"
-            else unit_of(name, str(one), one.unit, source.units.of(name), notes)
-        )
-        layers[name] = _Layer(one, axes, unit)
-        layers[name].check()
-    first = next(iter(layers.values()))
-    for layer in layers.values():
-        layer.check_like(first)
-    material = layers.pop("material", None)
-    if not layers:
-        raise SourceError(f"{first.chosen}: is a material, expected a temperature too")
-    x, y = (_positions(source, axis, files, first, notes) for axis in ("x", "y"))
-    x, y, turned = _placed(source.placement, x, y)
-    used = {one.label for one in chosen.values()} | set(source.names.values())
-    return _Grid(
-        kind=f"grid of {first.length('y')} x {first.length('x')} samples, {', '.join(files)}",
-        layers={source.placement.in_file(name): layer for name, layer in layers.items()},
-        material=material,
-        source=source,
-        times=_times(source, files, first, notes),
-        x=x,
-        y=y,
-        turned=turned,
-        unused=unused_names((label for arrays in files.values() for label in arrays), used),
-        notes=notes,
-    )
-
-
-def _choose(
-    source: GridSource, stack: ExitStack, notes: Notes
-) -> tuple[dict[str, Arrays], dict[str, Chosen]]:
-    """Open the files and find every field: arrays by file, and fields by name."""
-    given = {name: label for name, label in source.names.items() if name not in COORDINATES}
-    if isinstance(source.files, str):
-        path = source.files
-        arrays = open_arrays(path, stack)
-        candidates = _candidates(path, arrays, source)
-        return {path: arrays}, find_fields(path, candidates, given, _KNOWN, notes)
-    files: dict[str, Arrays] = {}
-    chosen: dict[str, Chosen] = {}
-    for name, path in (source.files or {}).items():
-        files[path] = files.get(path) or open_arrays(path, stack)
-        candidates = _candidates(path, files[path], source)
-        own = {name: given[name]} if name in given else {}
-        if len(candidates) == 1 and not own:
-            own = {name: next(iter(candidates))}
-        chosen.update(find_fields(path, candidates, own, (name,), notes))
-    return files, chosen
-
-
-def _candidates(path: str, arrays: Arrays, source: GridSource) -> Arrays:
-    """Arrays that can be a field: of as many axes as there should be."""
-    flat = {label: array for label, array in arrays.items() if min(array.shape, default=0) != 1}
-    solid = {label: array for label, array in arrays.items() if len(array.shape) == 3}
-    number = len(source.axes or (AXES if solid else AXES[1:]))
-    pool = solid if number == 3 else flat
-    result = {label: array for label, array in pool.items() if len(array.shape) == number}
-    if not result:
-        shapes = ", ".join(f"{label} {array.shape}" for label, array in list(arrays.items())[:10])
-        raise SourceError(f"{path}: expected an array with {number} axes, it has {shapes}")
-    return result
-
-
-def _positions(
-    source: GridSource,
-    axis: str,
-    files: Mapping[str, Arrays],
-    layer: _Layer,
-    notes: Notes,
-) -> NDArray[np.float64]:
-    """Centres of the columns or rows in m, as they follow in the file."""
-    count = layer.length(axis)
-    number = np.arange(count, dtype=np.float64) + 0.5
-    if source.spacing is None:
-        one = coordinate(axis, files, source.names.get(axis), layer.dim(axis), count)
-        if one is None:
-            raise SourceError(
-                f"{layer.chosen.path}: has no coordinate {axis!r}, expected grid.spacing"
-            )
-        return check_even(str(one), read_list(axis, one, source.units.length, notes))
-    if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
-        notes.remarks.append(f"The coordinate {axis} is not used, as the spacing is given.")
-    if axis == "x":
-        return source.left + source.spacing * number
-    notes.assumed.append(f"Row 0 is the {'upper' if source.top_first else 'lower'} edge.")
-    down = source.row_spacing or source.spacing
-    return source.top - down * (number if source.top_first else number[::-1])
-
-
-def _times(
-    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, notes: Notes
-) -> NDArray[np.float64]:
-    one = None
-    if source.interval is None:
-        dim = layer.dim("time")
-        one = coordinate("time", files, source.names.get("time"), dim, layer.frames)
-    if one is None:
-        return even_times(layer.frames, source.interval, notes)
-    return check_times(str(one), read_list("time", one, source.units.time, notes))
-
-
-def _placed(
-    placement: Placement, x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[bool, bool, bool]]:
-    """Coordinates in the scene, x ascending and y descending, and how the fields are turned."""
-    along, up = (
-        ((x, y)[axis] - origin) * sign
-        for axis, origin, sign in zip(
-            placement.axes, placement.origin, placement.signs, strict=True
-        )
-    )
-    back, rising = bool(along[0] > along[-1]), bool(up[0] < up[-1])
-    turned = (placement.axes == (1, 0), back, rising)
-    return along[::-1] if back else along, up[::-1] if rising else up, turned

@@ -33,13 +33,7 @@ LEAST_EXPLAINED: Final = 0.7
 
 
 def find_legend(picture: Picture) -> Box | None:
-    """Where a legend is: the longest bar of one colour across and many along.
-
-    Returns
-    -------
-    tuple of int or None
-        Its edges in pixels; None if there is none.
-    """
+    """Return the longest bar of one colour across and many along; None if there is none."""
     upright = _upright_bars(picture)
     lying = ((top, left, bottom, right) for left, top, right, bottom in _upright_bars(
         picture.transpose(1, 0, 2)
@@ -81,7 +75,7 @@ def _goes_on(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> bool:
 
 
 def _along(picture: Picture, box: Box) -> tuple[NDArray[np.float64], int, int]:
-    """Colours of a row or column in the middle of a bar, where the bar begins, where it ends."""
+    """Return colours along the middle of a bar to the picture's edges, and where the bar ends."""
     left, top, right, bottom = box
     upright = bottom - top >= right - left
     strip = picture[:, left:right] if upright else picture[top:bottom].transpose(1, 0, 2)
@@ -90,7 +84,7 @@ def _along(picture: Picture, box: Box) -> tuple[NDArray[np.float64], int, int]:
 
 
 def _extended(picture: Picture, box: Box) -> Box:
-    """A bar up to where its colours do not run on: its sides may be too faint to be seen."""
+    """Extend a bar to where its colours do not run on: its sides may be too faint to be seen."""
     along, first, last = _along(picture, box)
     steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
     if steps[first : last - 1].max() > _END:
@@ -107,7 +101,7 @@ def _extended(picture: Picture, box: Box) -> Box:
 
 
 def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
-    """Fraction of a picture, beside legend, background and lines, in colours of a scale."""
+    """Return the fraction of a picture without legend and background in a scale's colours."""
     left, top, right, bottom = box
     shown = ~dark_lines(picture)
     shown[max(top - _AROUND, 0) : bottom + _AROUND, max(left - _AROUND, 0) : right + _AROUND] = (
@@ -123,26 +117,21 @@ def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
 
 
 def _path(scale: ColourScale) -> NDArray[np.float64]:
-    """Colours of a scale, those between two of them as well."""
+    """Return the colours of a scale, and those between two of them."""
     labs = scale.labs
     return labs if scale.banded else np.concatenate([labs, (labs[1:] + labs[:-1]) / 2])
 
 
 def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
-    """How much of the picture a legend explains, in tenths; then as `_length_then_narrow`."""
+    """Return how much of the picture a legend explains, in tenths; then `_length_then_narrow`."""
     scale = ColourScale.from_legend(legend_pixels(picture, box), (0.0, 1.0))
     return (round(10 * explained(picture, box, scale)), *_length_then_narrow(box))
 
 
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
-    """Colours along a legend, from its bottom or left end, shape (n, 3).
+    """Return colours along a legend, from its bottom or left end, shape (n, 3).
 
-    The median across its middle; where its ends are blurred, the colour next to them.
-
-    Raises
-    ------
-    SourceError
-        If the box is not in the picture.
+    They are medians across its middle; where its ends are blurred, the colour next to them.
     """
     left, top, right, bottom = box
     rows, columns = picture.shape[:2]
@@ -177,7 +166,7 @@ def _upright_bars(picture: Picture) -> Iterator[Box]:
 
 
 def _edges(labs: NDArray[np.float64]) -> list[tuple[int, int, int]]:
-    """Long vertical edges: the column right of each, first row, and row after the last."""
+    """Return long vertical edges: the column right of each, first row, and row after the last."""
     edge = np.linalg.norm(np.diff(labs, axis=1), axis=2) > _EDGE
     # A codec, or a colour of the bar like the one beside it, leaves gaps.
     edge = np.asarray(binary_closing(np.pad(edge, ((_GAP, _GAP), (0, 0))), np.ones((_GAP, 1))))
@@ -215,7 +204,7 @@ def _is_legend(picture: Picture, labs: NDArray[np.float64], box: Box) -> bool:
 
 
 def _middle(bar: NDArray[Any]) -> NDArray[Any]:
-    """The half of a bar that is far from its long edges."""
+    """Return the half of a bar that is far from its long edges."""
     quarter = bar.shape[1] // 4
     return bar[:, quarter : bar.shape[1] - quarter]
 

@@ -35,18 +35,18 @@ from chipglow.io.sources.overlays import (
     find_background,
     polygon_mask,
 )
-from chipglow.io.sources.picture_sampling import PictureSampling
 from chipglow.io.sources.source import Source, SourceError, Survey, naming
 from chipglow.quantities import Parameter, Part
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
+from chipglow.scene.regrid import regrid, taps
 from chipglow.text import Notes
 
 MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
-"""Fields that a movie can show, the first of those given decides on the material."""
+"""Fields that a movie can show; the first one given determines the material."""
 
 Pixel = tuple[float, float]
-"""A place in a picture: pixels right and down from its upper left corner."""
+"""Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
 _HALF: Final = 0.5
@@ -56,18 +56,12 @@ _ROUNDING: Final = 0.29
 
 @dataclass(frozen=True)
 class NamedMap:
-    """A colour map that is known by its name, see `ColourScale.named`.
-
-    Parameters
-    ----------
-    name : str
-        ``rainbow`` or a map of matplotlib.
-    bands : int
-        Number of bands; 0 for a map that runs without steps.
-    """
+    """Colour map that is known by its name, see `ColourScale.named`."""
 
     name: str
+    """``rainbow`` or a map of matplotlib."""
     bands: int = 0
+    """Number of bands; 0 for a map without steps."""
 
     def __post_init__(self) -> None:
         if not (self.bands == 0 or 2 <= self.bands <= 256):
@@ -75,42 +69,17 @@ class NamedMap:
 
 
 @dataclass(frozen=True)
-class Legend:
-    """A legend in the first picture of a movie.
-
-    Parameters
-    ----------
-    box : tuple of int, optional
-        Left, top, right and bottom edge of its colours in pixels of the whole picture; it is looked
-        for if nothing is said.
-    """
-
-    box: Box | None = None
-
-
-@dataclass(frozen=True)
 class FieldMovie:
-    """A movie of one field.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    values : tuple of float
-        Values in SI units at the ends of the scale: the first and the last colour of a map; the
-        bottom and the top, or the left and the right end, of a legend.
-    colours : NamedMap or Legend
-        What the colours mean.
-
-    Raises
-    ------
-    ValueError
-        If the values are not finite or the same.
-    """
+    """Movie of one field."""
 
     path: Path
     values: tuple[float, float]
-    colours: NamedMap | Legend = field(default_factory=Legend)
+    """Values in SI units at the first and last colour of a map, or the ends of a legend.
+
+    Those of a legend are at its bottom and top, or left and right.
+    """
+    colours: NamedMap | Box | None = None
+    """Map of the colours, or the edges of a legend in the first picture, which is found if None."""
 
     def __post_init__(self) -> None:
         first, last = self.values
@@ -120,23 +89,11 @@ class FieldMovie:
 
 @dataclass(frozen=True)
 class MovieSource(Source, Part):
-    """Fields shown by movies, a movie a field.
+    """Fields shown by movies, one movie for each field, by names of `MOVIE_FIELDS`.
 
-    Parameters
-    ----------
-    movies : mapping
-        Movies by names of `MOVIE_FIELDS`. They have the same size and number of pictures.
-    metre_per_pixel : float
-        Side of a pixel in m; see `metre_per_pixel`.
-    frame_interval : float, optional
-        Time from picture to picture in s; the movie's own playing time if nothing is said.
-    placement : Placement
-        How the picture lies in the scene: ``x`` is to the right, ``y`` is up.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its range.
+    The movies have the same size and number of pictures. ``metre_per_pixel`` is the side of a
+    pixel in m, ``frame_interval`` the time from picture to picture in s, by default that of
+    playing. In the ``placement`` ``x`` is to the right in the picture and ``y`` up.
     """
 
     movies: Mapping[str, FieldMovie]
@@ -207,11 +164,9 @@ class MovieSource(Source, Part):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The movies."""
         return tuple(str(movie.path) for movie in self.movies.values())
 
     def survey(self) -> Survey:
-        """Look at what is there: sizes, times, legends, the background, what colours leave open."""
         indices, readers, assumed = self._opened
         index = indices[self._names[0]]
         times, clock = self._times(index)
@@ -225,7 +180,7 @@ class MovieSource(Source, Part):
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the pictures: means of values, not of colours.
+        """Sample the pictures: means of values, not of colours; see `Source.frames`.
 
         A tool that is known by its colour has no values.
         """
@@ -234,7 +189,9 @@ class MovieSource(Source, Part):
         times, _ = self._times(index)
         if start >= len(times):
             return
-        sampling = PictureSampling(self._pixels(index), raster)
+        pixels = self._pixels(index)
+        across = taps(pixels.x, raster.spacing, raster.x)
+        down = taps(-pixels.y, raster.spacing, -raster.y)
         shown = [
             pictures(self.movies[name].path, indices[name], start * self.every, self.every)
             for name in self._names
@@ -244,19 +201,24 @@ class MovieSource(Source, Part):
                 name: self._read(name, readers[name], picture, number * self.every)
                 for name, picture in zip(self._names, together, strict=True)
             }
-            yield self._sampled(float(times[number]), read, sampling)
+            values, material = regrid(*self._fields(read), across, down)
+            *means, distance, filled = values
+            quality = np.round(np.nan_to_num(distance)).astype(np.uint8)
+            quality[filled > _HALF] = FILLED
+            fields = dict(zip(self._names, means, strict=True))
+            yield SampledFrame(float(times[number]), fields, material, quality)
 
     def uncertainty(self) -> dict[str, ColourUncertainty]:
-        """What the colours leave unknown of each field: in the first, middle and last picture.
+        """Return the uncertainty of each field by its colours in the first, middle and last one.
 
-        In a movie that cannot be searched, in three of the first 101.
+        In a movie that cannot be searched it is that of three of the first 101.
         """
         indices, readers, _ = self._opened
         return self._uncertainty(indices, readers)
 
     @cached_property
     def _opened(self) -> tuple[dict[str, MovieIndex], dict[str, FieldReader], tuple[str, ...]]:
-        """Indices of the movies, readers of their pictures, and what these assume."""
+        """Indices of the movies, readers of their pictures, and their assumptions."""
         indices = self._indices()
         return indices, *self._readers(indices)
 
@@ -265,7 +227,7 @@ class MovieSource(Source, Part):
         return tuple(name for name in MOVIE_FIELDS if name in self.movies)
 
     def _indices(self) -> dict[str, MovieIndex]:
-        """Indices of the movies, which must agree."""
+        """Index the movies, which must agree."""
         indices = {name: index_movie(self.movies[name].path) for name in self._names}
         first = indices[self._names[0]]
         for name, other in indices.items():
@@ -289,7 +251,7 @@ class MovieSource(Source, Part):
         return index.times[:: self.every], (said,)
 
     def _pixels(self, index: MovieIndex) -> Raster:
-        """Where the pixels of the cropped and turned picture are in the scene."""
+        """Return the pixels of the cropped and turned picture in the scene."""
         left, top, right, bottom = self._crop(index)
         side = self.metre_per_pixel
         spans = (
@@ -367,7 +329,7 @@ class MovieSource(Source, Part):
         return found, tuple(said)
 
     def _read(self, name: str, reader: FieldReader, picture: Picture, number: int) -> FieldPicture:
-        """Read a picture, which may be all void but not all lines."""
+        """Read a picture; it may be all void but not all lines."""
         read = reader.read(self._cropped(picture))
         workpiece = read.material == Material.WORKPIECE
         if workpiece.any() and not np.isfinite(read.values[workpiece]).any():
@@ -376,56 +338,24 @@ class MovieSource(Source, Part):
             )
         return read
 
-    def _sampled(
-        self, time: float, read: dict[str, FieldPicture], sampling: PictureSampling
-    ) -> SampledFrame:
-        first = read[self._names[0]]
-        material = sampling.material(self._turned(first.material))
-        worst = np.zeros(first.material.shape, np.uint8)
-        fields = {}
-        for name, picture in read.items():
-            values, quality = _completed(picture, first.material)
-            worst = np.maximum(worst, quality)
-            fields[name] = self._sampled_field(values, first.material, material, sampling)
-        return SampledFrame(
-            time, fields, material, self._sampled_quality(worst, first.material, sampling)
-        )
-
-    def _sampled_field(
-        self,
-        values: NDArray[np.float32],
-        pixels: NDArray[np.uint8],
-        material: NDArray[np.uint8],
-        sampling: PictureSampling,
-    ) -> NDArray[np.float32]:
-        """Means over the pixels of each sample's own material."""
-        result = np.full(material.shape, np.nan, np.float32)
-        turned = self._turned(values)
-        for kind in (Material.WORKPIECE, Material.TOOL):
-            chosen = material == kind
-            if chosen.any():
-                valid = self._turned((pixels == kind) & np.isfinite(values))
-                result[chosen] = sampling.mean(turned, valid)[chosen]
-        return result
-
-    def _sampled_quality(
-        self, quality: NDArray[np.uint8], material: NDArray[np.uint8], sampling: PictureSampling
-    ) -> NDArray[np.uint8]:
-        """Mean distance from the scale; FILLED where most is filled."""
-        shown = self._turned(material != Material.VOID)
-        filled = self._turned(quality == FILLED)
-        distance = sampling.mean(self._turned(quality.astype(np.float32)), shown & ~filled)
-        result = np.round(np.nan_to_num(distance)).astype(np.uint8)
-        fractions = sampling.fraction(filled & shown), sampling.fraction(shown)
-        result[(fractions[0] > _HALF * fractions[1])] = FILLED
-        return result
+    def _fields(
+        self, read: Mapping[str, FieldPicture]
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Return values of pictures, distances from the scale, what is filled; and the material."""
+        material = read[self._names[0]].material
+        completed = [_completed(picture, material) for picture in read.values()]
+        quality = np.max([of for _, of in completed], axis=0)
+        filled = quality == FILLED
+        distance = np.where(filled, np.nan, quality)
+        values = np.stack([*(of for of, _ in completed), distance, filled]).astype(np.float32)
+        return self._turned(values), self._turned(material)
 
     def _turned(self, values: NDArray[Any]) -> NDArray[Any]:
-        """A picture as it lies in the scene."""
+        """Return pictures as they lie in the scene."""
         if self.placement.axes == (1, 0):
-            values = values[::-1].T[::-1]
+            values = values[..., ::-1, :].swapaxes(-1, -2)[..., ::-1, :]
         across, up = (int(sign) for sign in self.placement.signs)
-        return values[::up, ::across]
+        return np.ascontiguousarray(values[..., ::up, ::across])
 
     def _uncertainty(
         self, indices: Mapping[str, MovieIndex], readers: Mapping[str, FieldReader]
@@ -448,26 +378,19 @@ class MovieSource(Source, Part):
         return result
 
     def _of_legend(self, name: str, reader: FieldReader) -> float:
-        """Because a legend's ends are known to a pixel where it was found, to its rounding else."""
+        """Return the uncertainty of a legend's ends: a pixel if it was found, else its rounding."""
         if reader.legend is None:
             return 0.0
         movie = self.movies[name]
-        given = isinstance(movie.colours, Legend) and movie.colours.box is not None
         left, top, right, bottom = reader.legend
         pixel = abs(movie.values[1] - movie.values[0]) / max(right - left, bottom - top)
-        return pixel * (_ROUNDING if given else 1.0)
+        return pixel * (_ROUNDING if movie.colours else 1.0)
 
 
 def metre_per_pixel(
     first: tuple[float, float], second: tuple[float, float], length: float
 ) -> float:
-    """Side of a pixel in m, from two points in pixels and the length between them in m.
-
-    Raises
-    ------
-    ValueError
-        If the points are the same, or the length is not over 0.
-    """
+    """Return the side of a pixel in m from two points in pixels and their distance in m."""
     pixels = hypot(second[0] - first[0], second[1] - first[1])
     if not (isfinite(pixels) and pixels > 0):
         raise ValueError(f"scale: points {first!r}, {second!r}, expected two different points")
@@ -477,7 +400,7 @@ def metre_per_pixel(
 
 
 def _sample(index: MovieIndex) -> tuple[int, ...]:
-    """The first, the middle and the last picture; where each needs all before it, early ones."""
+    """Return the first, middle and last picture; early ones where each needs all before it."""
     last = index.count - 1 if index.marks else min(index.count - 1, _EARLY)
     return tuple(sorted({0, last // 2, last}))
 
@@ -485,42 +408,38 @@ def _sample(index: MovieIndex) -> tuple[int, ...]:
 def _scale(
     movie: FieldMovie, picture: Picture
 ) -> tuple[ColourScale, tuple[Box, ...], tuple[str, ...]]:
-    """Scale of a movie, where its legend is, and what was assumed."""
+    """Return the scale of a movie, the place of its legend, and the assumptions."""
     if isinstance(movie.colours, NamedMap):
         name, bands = movie.colours.name, movie.colours.bands
         return ColourScale.named(name, movie.values, bands), (), ()
-    box = movie.colours.box or find_legend(picture)
-    if box is not None and movie.colours.box is None and is_cut(picture, box):
-        raise SourceError(
-            f"legend: an end of the one found at {box} cannot be told from what is beside it, "
-            "expected the box of the legend, or a named map"
-        )
+    box = movie.colours or find_legend(picture)
     if box is None:
         raise SourceError(
             "no legend was found in the first picture, expected the box of one, or a named map"
         )
+    if not movie.colours and is_cut(picture, box):
+        raise SourceError(
+            f"legend: an end of the one found at {box} cannot be told from what is beside it, "
+            "expected the box of the legend, or a named map"
+        )
     scale = ColourScale.from_legend(legend_pixels(picture, box), movie.values)
-    _check_legend(picture, box, scale)
-    kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
-    found = "" if movie.colours.box else f"Legend found at {box} (left, top, right, bottom). "
-    first, last = movie.values
-    ends = f"{first:g} at its lower or left end, {last:g} at the other"
-    return scale, (box,), (f"{found}Legend of {kind}, {ends}.",)
-
-
-def _check_legend(picture: Picture, box: Box, scale: ColourScale) -> None:
     fraction = explained(picture, box, scale)
     if fraction < LEAST_EXPLAINED:
         raise SourceError(
             f"legend: the picture has the colours of {box} in {fraction:.0%} of what it shows, "
             f"expected {LEAST_EXPLAINED:.0%} or more; give the box of the legend, or a named map"
         )
+    kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
+    found = "" if movie.colours else f"Legend found at {box} (left, top, right, bottom). "
+    first, last = movie.values
+    ends = f"{first:g} at its lower or left end, {last:g} at the other"
+    return scale, (box,), (f"{found}Legend of {kind}, {ends}.",)
 
 
 def _completed(
     picture: FieldPicture, material: NDArray[np.uint8]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Values and quality, filled where another movie shows material and this one does not."""
+    """Return values and quality, filled where another movie shows material and this one none."""
     values, quality = picture.values.copy(), picture.quality.copy()
     lacking = (material == Material.WORKPIECE) & ~np.isfinite(values)
     fill(values, np.isfinite(values) & (picture.material == Material.WORKPIECE), lacking)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from os import SEEK_END
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,76 +37,32 @@ _GIF_TAIL: Final = 64
 
 @dataclass(frozen=True)
 class MovieIndex:
-    """What a movie says of itself, and how many pictures it has.
-
-    Parameters
-    ----------
-    codec : str
-        Name of the codec and of its pixels: ``mjpeg, yuvj444p``.
-    rows, columns : int
-        Size of the pictures.
-    count : int
-        Number of pictures.
-    times : ndarray or None
-        When they are shown, in s from the first; None if the movie does not say.
-    marks : tuple of int
-        Their presentation times in the movie's own unit, ascending; empty if it cannot be searched.
-    square : bool
-        Whether the pixels are said to be square.
-    """
+    """Properties of a movie."""
 
     codec: str
+    """Name of the codec and of its pixels: ``mjpeg, yuvj444p``."""
     rows: int
     columns: int
     count: int
+    """Number of pictures."""
     times: NDArray[np.float64] | None
+    """Times of the pictures in s from the first; None if the movie contains none."""
     marks: tuple[int, ...]
+    """Their times in the movie's own unit, ascending; empty if it cannot be searched."""
     square: bool
-
-
-class _Packet(NamedTuple):
-    mark: int | None
-    key: bool
-    discarded: bool
-    corrupt: bool
+    """Whether the movie states square pixels."""
 
 
 def index_movie(path: Path) -> MovieIndex:
-    """Count the pictures of a movie without decoding them.
-
-    Raises
-    ------
-    SourceError
-        If it is no movie, has no pictures, is too large, or ends before its end.
-    OSError
-        If the file is missing or not accessible.
-    """
+    """Count the pictures of a movie without decoding them; refuse one that is cut short."""
     state = path.stat()
     return _index(path, state.st_size, state.st_mtime_ns)
 
 
 def pictures(path: Path, index: MovieIndex, start: int = 0, every: int = 1) -> Iterator[Picture]:
-    """Decode pictures one at a time.
-
-    Parameters
-    ----------
-    path : Path
-        The movie.
-    index : MovieIndex
-        What `index_movie` found.
-    start : int
-        Number of the first picture; it is searched if the movie allows.
-    every : int
-        Distance from each picture to the next.
-
-    Raises
-    ------
-    SourceError
-        If a picture is damaged or missing.
-    """
-    searched = start > 0 and bool(index.marks)
-    number = start if searched and _can_search(path, index, start) else 0
-    searched = number > 0
+    """Decode pictures one at a time, from a number on and with a distance between them."""
+    searched = start > 0 and bool(index.marks) and _can_search(path, index, start)
+    number = start if searched else 0
     with _opened(path) as (container, stream):
         interpolation = _interpolation()
         if searched:
@@ -129,60 +85,57 @@ def pictures(path: Path, index: MovieIndex, start: int = 0, every: int = 1) -> I
 
 @lru_cache(maxsize=16)
 def _index(path: Path, size: int, changed: int) -> MovieIndex:
-    """`index_movie`; size and time of change tell one state of the file from another."""
+    """Index a movie; size and time of change distinguish states of the file."""
     if size == 0:
         raise SourceError(f"{path}: the file is empty, expected a movie")
     with _opened(path) as (container, stream):
         packets = [
-            _Packet(packet.pts, packet.is_keyframe, packet.is_discard, packet.is_corrupt)
+            packet
             for packet in container.demux(stream)
             if packet.dts is not None or packet.size > 0
         ]
-        shown = [packet.mark for packet in packets if not packet.discarded]
+        shown = [packet.pts for packet in packets if not packet.is_discard]
+        complete = all(packet.is_keyframe for packet in packets)
+        corrupt = bool(packets) and packets[-1].is_corrupt
         kind = container.format.name.split(",")[0]
-        expected, rate = stream.frames, stream.average_rate
-        said = container.duration if len(container.streams) == 1 else None
-        unit = stream.time_base
+        expected, rate, unit = stream.frames, stream.average_rate, stream.time_base
+        duration = container.duration if len(container.streams) == 1 else None
         codec = f"{stream.codec_context.name}, {stream.codec_context.pix_fmt}"
         shape = (stream.codec_context.height, stream.codec_context.width)
         square = stream.sample_aspect_ratio in (None, 0, 1)
     if not shown:
         raise SourceError(f"{path}: there is no picture in it, expected 1 or more")
-    if len(packets) < expected or packets[-1].corrupt:
+    if len(packets) < expected or corrupt:
         raise SourceError(
             f"{path}: it ends in picture {len(packets)} of {max(expected, len(packets))}: "
             "truncated? expected a whole movie"
         )
-    marks = _presentation(shown)
+    known = sorted({mark for mark in shown if mark is not None})
+    marks = tuple(known) if len(known) == len(shown) else ()
     times = None
     if marks and unit:
         times = (np.array(marks, np.float64) - marks[0]) * float(unit)
     elif rate:
         times = np.arange(len(shown)) / float(rate)
-    _check_end(path, kind, times, said)
-    built_on_others = kind == "avi" and not all(packet.key for packet in packets)
-    if kind in _WHOLE or built_on_others:
+    _check_end(path, kind, times, duration)
+    if kind in _WHOLE or (kind == "avi" and not complete):
         marks = ()
     return MovieIndex(codec, *shape, len(shown), times, marks, square)
 
 
-def _check_end(path: Path, kind: str, times: NDArray[np.float64] | None, said: int | None) -> None:
-    """Refuse what ends between two pictures, in the formats that do not count them."""
+def _check_end(
+    path: Path, kind: str, times: NDArray[np.float64] | None, duration: int | None
+) -> None:
+    """Refuse a file that ends between two pictures, in the formats that do not count them."""
     short = False
-    if kind == "matroska" and said and times is not None and len(times) > 1:
-        short = said * 1e-6 > times[-1] + 1.5 * times[-1] / (len(times) - 1)
+    if kind == "matroska" and duration and times is not None and len(times) > 1:
+        short = duration * 1e-6 > times[-1] + 1.5 * times[-1] / (len(times) - 1)
     if kind == "gif":
         with path.open("rb") as file:
             file.seek(-min(_GIF_TAIL, path.stat().st_size), SEEK_END)
             short = not file.read().rstrip(b"\0\r\n ").endswith(b";")
     if short:
         raise SourceError(f"{path}: it ends before its end: truncated? expected a whole movie")
-
-
-def _presentation(marks: list[int | None]) -> tuple[int, ...]:
-    """Presentation times, ascending; none if one is missing or two are the same."""
-    known = sorted({mark for mark in marks if mark is not None})
-    return tuple(known) if len(known) == len(marks) else ()
 
 
 def _can_search(path: Path, index: MovieIndex, start: int) -> bool:
@@ -196,12 +149,12 @@ def _can_search(path: Path, index: MovieIndex, start: int) -> bool:
 
 
 def _mark(index: MovieIndex, frame: Any) -> int:
-    """Number of a picture by its presentation time."""
+    """Return the number of a picture by its presentation time."""
     return bisect_left(index.marks, frame.pts or 0, hi=index.count - 1)
 
 
 def _interpolation() -> Any:
-    """How colours of half the resolution are enlarged.
+    """Return how colours of half the resolution are enlarged.
 
     FFmpeg's default repeats them, whatever interpolation is asked for, unless it is told to
     compute them in full; PyAV 12 cannot tell it.
@@ -220,35 +173,32 @@ def _check(path: Path, index: MovieIndex, frame: Any, number: int) -> None:
     if (frame.height, frame.width) != (index.rows, index.columns):
         raise SourceError(
             f"{path}: picture {number + 1} has {frame.width} x {frame.height} pixels, expected "
-            f"{index.columns} x {index.rows} as the movie says"
+            f"{index.columns} x {index.rows} as the movie states"
         )
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
-    """Open a movie; what FFmpeg says against it becomes a SourceError."""
+    """Open a movie; errors of FFmpeg become a `SourceError`."""
     av = required("av", path, "movie", "PyAV")
     try:
         with av.open(f"file:{path}", options=_OPTIONS, metadata_errors="replace") as container:
             if not container.streams.video:
                 raise SourceError(f"{path}: there are no pictures in it, expected a movie")
             stream = container.streams.video[0]
-            _check_size(path, stream)
-            stream.codec_context.options = {"max_pixels": str(_MOST_PIXELS)}
+            context = stream.codec_context
+            if context is None:
+                raise SourceError(f"{path}: FFmpeg has no decoder for its codec")
+            rows, columns = context.height or 0, context.width or 0
+            if not 0 < rows * columns <= _MOST_PIXELS:
+                raise SourceError(
+                    f"{path}: its pictures have {columns} x {rows} pixels, expected 1 to "
+                    f"{_MOST_PIXELS}"
+                )
+            context.options = {"max_pixels": str(_MOST_PIXELS)}
             yield container, stream
     except av.error.FFmpegError as error:
         raise SourceError(
             f"{path}: cannot be read as a movie: {error.strerror}, expected AVI, MP4, GIF, MKV or "
             "another format of FFmpeg"
         ) from error
-
-
-def _check_size(path: Path, stream: Any) -> None:
-    context = stream.codec_context
-    if context is None:
-        raise SourceError(f"{path}: FFmpeg has no decoder for its codec")
-    rows, columns = context.height or 0, context.width or 0
-    if not 0 < rows * columns <= _MOST_PIXELS:
-        raise SourceError(
-            f"{path}: its pictures have {columns} x {rows} pixels, expected 1 to {_MOST_PIXELS}"
-        )

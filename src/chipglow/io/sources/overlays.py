@@ -38,63 +38,37 @@ _COARSE: Final = 16
 
 @dataclass(frozen=True)
 class FieldPicture:
-    """One picture of a field, read.
-
-    Parameters
-    ----------
-    values : ndarray
-        Values in SI units, shape (y, x), float32; NaN where `known` is false.
-    material : ndarray
-        `chipglow.scene.Material` of each pixel, shape (y, x), uint8.
-    quality : ndarray
-        See `chipglow.scene.QUALITY`, shape (y, x), uint8.
-    seen : ndarray
-        Where the value was read from the pixel's own colour, shape (y, x), bool.
-    distance : ndarray
-        Distance from the scale in CIE L*a*b*, shape (y, x), float32.
-    """
+    """Picture of a field, read; arrays of shape (y, x)."""
 
     values: NDArray[np.float32]
+    """Values in SI units; NaN where they are unknown."""
     material: NDArray[np.uint8]
+    """`chipglow.scene.Material` of each pixel."""
     quality: NDArray[np.uint8]
+    """See `chipglow.scene.QUALITY`."""
     seen: NDArray[np.bool_]
+    """Whether the value is that of the pixel's own colour."""
     distance: NDArray[np.float32]
+    """Distance from the scale in CIE L*a*b*."""
 
 
 @dataclass(frozen=True, eq=False)
 class FieldReader:
-    """Reads pictures of a field.
-
-    Parameters
-    ----------
-    scale : ColourScale
-        What the colours mean.
-    background : sequence of Colour
-        Colours that show nothing.
-    tool_colour : Colour or None
-        The colour of a tool that shows no values.
-    tool : ndarray
-        Where the tool stands, shape (y, x), bool.
-    covered : ndarray
-        Where something else is drawn, shape (y, x), bool.
-    limit : float
-        Distance from the scale in CIE L*a*b* beyond which a colour is a line or text.
-    legend : Box, optional
-        Where the scale was read.
-
-    Raises
-    ------
-    SourceError
-        If a colour of background or tool is one of the scale.
-    """
+    """Reader of pictures of a field."""
 
     scale: ColourScale
     background: Sequence[Colour]
+    """Colours that show nothing."""
     tool_colour: Colour | None
+    """Colour of a tool that shows no values."""
     tool: NDArray[np.bool_]
+    """Position of the tool, shape (y, x)."""
     covered: NDArray[np.bool_]
+    """Where something else is drawn, shape (y, x)."""
     limit: float
+    """Distance from the scale in CIE L*a*b* beyond which a colour is a line or text."""
     legend: Box | None = None
+    """Where the scale was read."""
 
     def __post_init__(self) -> None:
         for name, colours in (("background", self.background), ("tool_colour", self._tools)):
@@ -107,10 +81,10 @@ class FieldReader:
                     )
 
     def read(self, picture: Picture) -> FieldPicture:
-        """Values, material and quality of a picture.
+        """Return values, material and quality of a picture.
 
-        What is drawn over the field takes the material and the value of the nearest pixel that
-        shows them; in the tool, of the nearest one in the tool.
+        Pixels of what is drawn over the field take the material and the value of the nearest pixel
+        that shows them; in the tool, of the nearest one in the tool.
         """
         values, distance = self.scale.invert(picture)
         void, tool = self._marked(picture, distance)
@@ -132,7 +106,7 @@ class FieldReader:
         return FieldPicture(values, material, quality, seen, distance)
 
     def error_of_filling(self, read: FieldPicture) -> float:
-        """How far values under lines are off, as a root mean square over all that is shown.
+        """Return the error of values under lines, a root mean square over all that is shown.
 
         It is tried on pixels that show values, as if the lines were drawn elsewhere.
         """
@@ -167,7 +141,7 @@ class FieldReader:
     def _marked(
         self, picture: Picture, distance: NDArray[np.float32]
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Pixels with the colour of the background, and of the tool; lines of it are neither."""
+        """Return pixels of the background and of the tool; lines in their colours are neither."""
         if self._marks is None:
             nothing = np.zeros(distance.shape, np.bool_)
             return nothing, nothing
@@ -178,7 +152,7 @@ class FieldReader:
 
 
 def dark_lines(picture: Picture) -> NDArray[np.bool_]:
-    """Pixels of dark lines up to 2 wide, if they are so many that a mesh is drawn; else none.
+    """Return pixels of dark lines up to 2 wide, if they are so many that a mesh is drawn.
 
     The colours of black lines may be of the scale, and a codec mixes them with those beside them.
     """
@@ -191,13 +165,7 @@ def dark_lines(picture: Picture) -> NDArray[np.bool_]:
 def find_background(
     picture: Picture, scale: ColourScale
 ) -> tuple[tuple[Colour, ...], tuple[Colour, ...]]:
-    """Colours of the background: those that a part of the border has, and the scale has not.
-
-    Returns
-    -------
-    found, refused : tuple of Colour
-        Colours that show nothing; and greys that may show nothing, but are of the scale.
-    """
+    """Return colours of the border that are not of the scale, and greys of both."""
     found: list[Colour] = []
     refused: list[Colour] = []
     for colour in plain_colours(picture):
@@ -209,7 +177,7 @@ def find_background(
 
 
 def plain_colours(picture: Picture) -> tuple[Colour, ...]:
-    """Colours that cover a part of the border of a picture, not as lines, the most common first."""
+    """Return colours that cover a part of the border, not as lines, the most common first."""
     border = _border(picture)
     rest = border
     found: list[Colour] = []
@@ -237,7 +205,7 @@ def _is_plain(pixels: NDArray[np.uint8], colour: Colour) -> bool:
 
 
 def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:
-    """Pixels within boxes, with a margin around them."""
+    """Return the pixels within boxes, with a margin around them."""
     mask = np.zeros(shape, np.bool_)
     for left, top, right, bottom in boxes:
         rows = slice(max(top - margin, 0), max(bottom + margin, 0))
@@ -248,7 +216,7 @@ def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> N
 def polygon_mask(
     shape: tuple[int, int], corners: Sequence[tuple[float, float]]
 ) -> NDArray[np.bool_]:
-    """Pixels whose middle is within a polygon; two corners are opposite ones of a box."""
+    """Return pixels whose centre is within a polygon; two corners are opposite ones of a box."""
     if not corners:
         return np.zeros(shape, np.bool_)
     if len(corners) == 2:
@@ -263,24 +231,23 @@ def _border(picture: NDArray[Any]) -> NDArray[Any]:
 
 
 def _like(picture: Picture, colour: Colour) -> NDArray[np.bool_]:
-    """Pixels of a colour."""
     apart = lab(picture / 255.0) - lab(np.array(colour) / 255.0)
     return np.asarray(np.linalg.norm(apart, axis=-1) < MARK_TOLERANCE)
 
 
 def _place(scale: ColourScale, colour: Colour) -> tuple[float, float]:
-    """Value of the nearest place of a scale, and its distance."""
+    """Return the value of the nearest place of a scale, and its distance."""
     value, apart = scale.invert(np.array([[colour]], np.uint8))
     return float(value[0, 0]), float(apart[0, 0])
 
 
 def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """With the pixels around: what is drawn over a field shades into it."""
+    """Add the pixels around: what is drawn over a field shades into it."""
     return np.asarray(maximum_filter(mask.view(np.uint8), 3)).view(np.bool_)
 
 
 def _without_lines(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Without what is less than 3 pixels wide."""
+    """Remove what is less than 3 pixels wide."""
     wide = minimum_filter(mask.view(np.uint8), 3)
     # At the border of the picture the mirrored pixels would let it grow.
     return np.asarray(maximum_filter(wide, 3)).view(np.bool_) & mask

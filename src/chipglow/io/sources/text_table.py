@@ -1,10 +1,11 @@
 """How a table in text is written: what is between its numbers, and whether it is whole."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
+
+import pandas as pd
 
 from chipglow.io.sources.source import SourceError
 
@@ -13,137 +14,107 @@ _LONGEST_LINE: Final = 4_000_000
 _MOST_COMMENTS: Final = 1000
 _LAST_LINES: Final = 100
 _FEWEST_ALIKE: Final = 10
-_FORM: Final = re.compile(r"[-+]?\d+(?:[.,](\d*))?(?:[eE][-+]?(\d*))?")
 _NUMBER: Final = r"[-+]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][-+]?\d++)?|nan"
 _NUMBERS: Final = re.compile(rf"(?:{_NUMBER})(?:[;,\s]\s*+(?:{_NUMBER}))*+[;,\s]*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """How a table in text is written.
+    """Table in text."""
 
-    Parameters
-    ----------
-    first : str
-        Its first line that is no comment.
-    options : mapping
-        What `pandas.read_csv` must know: how numbers are separated and written.
-    """
-
+    path: Path
     first: str
-    options: Mapping[str, Any]
+    """Its first line that is no comment."""
+    separator: str
+    decimal: str
 
     @property
     def cells(self) -> list[str]:
         """Cells of the first line, without quotes."""
-        separator = self.options["sep"]
-        return [cell.strip().strip("\"'") for cell in _split(self.first, separator)]
+        return [cell.strip().strip("\"'") for cell in self._split(self.first)]
 
     @classmethod
     def look_at(cls, path: Path, skipped: int = 0) -> "TextTable":
-        """Find out how a table is written, from its first lines.
-
-        Parameters
-        ----------
-        path : Path
-            The file.
-        skipped : int
-            Number of lines before the table.
-
-        Raises
-        ------
-        SourceError
-            If it is empty, no text, too large or has a line that is too long.
-        """
-        if path.stat().st_size > _LARGEST_TABLE:
-            raise SourceError(
-                f"{path}: has {path.stat().st_size} bytes, expected up to {_LARGEST_TABLE}"
-            )
+        """Find out how a table behind some lines is written; refuse one that is cut short."""
+        size = path.stat().st_size
+        if size > _LARGEST_TABLE:
+            raise SourceError(f"{path}: has {size} bytes, expected up to {_LARGEST_TABLE}")
         first, second = _two_lines(path, skipped)
         separator = next((mark for mark in ";\t," if mark in first), r"\s+")
         text = second or first
         decimal = "," if separator != "," and "," in text and "." not in text else "."
-        lines, whole = _last_lines(path)
-        cells = [_split(line, separator) for line in lines]
-        last, expected = len(cells[-1]), len(_split(first, separator))
-        if last != expected:
-            raise SourceError(
-                f"{path}: its last line has {last} cells, expected {expected}: it is cut short"
+        table = cls(path, first, separator, decimal)
+        table._check_end()
+        return table
+
+    def read(self, **options: Any) -> pd.DataFrame:
+        """Read the table by `pandas.read_csv` with more of its options."""
+        with self.path.open(encoding="utf-8-sig") as stream:
+            return pd.read_csv(
+                stream,
+                sep=self.separator,
+                decimal=self.decimal,
+                comment="#",
+                skipinitialspace=True,
+                **options,
             )
-        others = [row[-1] for row in cells[:-1] if len(row) == expected]
-        if not whole and _is_part(cells[-1][-1], others):
+
+    def line_of(self, row: int) -> int:
+        """Return the number of the line of a row, 0 being that after the names of columns."""
+        with self.path.open(encoding="utf-8-sig") as stream:
+            known = [number for number, line in enumerate(stream, 1) if _without_comment(line)]
+        return known[row + 1]
+
+    def _split(self, line: str) -> list[str]:
+        return line.split() if self.separator == r"\s+" else line.split(self.separator)
+
+    def _check_end(self) -> None:
+        """Refuse a last line that lacks cells, or lacks decimals and the end of the line."""
+        size = self.path.stat().st_size
+        with self.path.open("rb") as stream:
+            stream.seek(max(0, size - _LONGEST_LINE))
+            text = stream.read().decode("utf-8", "replace")
+        lines = text.split("\n")[size > _LONGEST_LINE :]
+        known = [line for line in map(_without_comment, lines) if line][-_LAST_LINES:]
+        *others, last = map(self._split, known or [""])
+        expected = len(self._split(self.first))
+        if len(last) != expected:
             raise SourceError(
-                f"{path}: ends with {cells[-1][-1].strip()!r} and no end of line, expected a "
-                f"number such as {others[-1].strip()!r}: it is cut short, or lacks its end of line"
+                f"{self.path}: its last line has {len(last)} cells, expected {expected}: it is cut "
+                "short"
             )
-        options = {"sep": separator, "decimal": decimal, "comment": "#", "skipinitialspace": True}
-        return cls(first, options)
+        numbers = [row[-1].strip() for row in others if len(row) == expected]
+        decimals = [self._decimals(cell) for cell in numbers if _NUMBERS.fullmatch(cell)]
+        alike = len(set(decimals)) == 1 and len(decimals) >= _FEWEST_ALIKE
+        whole = text.endswith(("\n", "\r"))
+        if alike and not whole and self._decimals(last[-1].strip()) < decimals[0]:
+            raise SourceError(
+                f"{self.path}: ends with {last[-1].strip()!r} and no end of line, expected a "
+                f"number such as {numbers[-1]!r}: it is cut short, or lacks its end of line"
+            )
+
+    def _decimals(self, number: str) -> int:
+        return len(number.partition(self.decimal)[2])
 
 
-def line_of(path: Path, row: int) -> int:
-    """Number of the line that holds a row of a table, 0 being that after the names of columns."""
-    seen = -1
-    with path.open(encoding="utf-8-sig") as stream:
-        for number, line in enumerate(stream, start=1):
-            seen += bool(line.split("#")[0].strip())
-            if seen > row:
-                return number
-    raise ValueError(f"row: {row} of {path}, expected up to {seen - 1}")
-
-
-def _split(line: str, separator: str) -> list[str]:
-    return line.split() if separator == r"\s+" else line.split(separator)
-
-
-def _last_lines(path: Path) -> tuple[list[str], bool]:
-    """The last lines that are no comments, and whether the file ends with the end of a line.
-
-    An empty one if the last is too long to be looked at.
-    """
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        stream.seek(max(0, size - _LONGEST_LINE))
-        text = stream.read().decode("utf-8-sig" if size <= _LONGEST_LINE else "utf-8", "replace")
-    lines = text.split("\n")
-    known = [line.split("#")[0].strip() for line in (lines if size <= _LONGEST_LINE else lines[1:])]
-    return [line for line in known if line][-_LAST_LINES:] or [""], text.endswith(("\n", "\r"))
-
-
-def _is_part(number: str, others: list[str]) -> bool:
-    """Whether a number may have lost digits that all the others have."""
-    decimals, exponent = _form(number)
-    forms = [form for form in map(_form, others) if form != (-1, -1)]
-    if not forms:
-        return False
-    same = len({exponent for _, exponent in forms}) == 1
-    if same and exponent < forms[-1][1]:
-        return True
-    alike = len({decimals for decimals, _ in forms}) == 1 and len(forms) >= _FEWEST_ALIKE
-    return same and alike and decimals < forms[-1][0] and exponent <= 0
-
-
-def _form(number: str) -> tuple[int, int]:
-    """How many decimals and digits of an exponent a number has; -1 each for what is none."""
-    found = _FORM.fullmatch(number.strip())
-    if found is None:
-        return -1, -1
-    return len(found[1] or ""), len(found[2]) if found[2] is not None else 0
+def _without_comment(line: str) -> str:
+    return line.split("#")[0].strip()
 
 
 def lines_of_text(path: Path) -> int:
-    """Number of lines before the first one that holds nothing but numbers; 0 if there is none."""
+    """Return the number of lines before the first one of numbers alone; 0 if there is none."""
     with path.open(encoding="utf-8-sig") as stream:
         for number in range(_MOST_COMMENTS):
             line = stream.readline(_LONGEST_LINE)
             if not line:
                 return 0
-            if _NUMBERS.fullmatch(line.split("#")[0].strip()):
+            if _NUMBERS.fullmatch(_without_comment(line)):
                 return number
     return 0
 
 
 def _two_lines(path: Path, skipped: int) -> tuple[str, str]:
-    """The first two lines that are no comments, of those behind the skipped ones."""
+    """Return the first two lines that are no comments, of those behind the skipped ones."""
     lines: list[str] = []
     with path.open(encoding="utf-8-sig") as stream:
         for _ in range(skipped):
@@ -152,8 +123,8 @@ def _two_lines(path: Path, skipped: int) -> tuple[str, str]:
             line = stream.readline(_LONGEST_LINE)
             if len(line) == _LONGEST_LINE:
                 raise SourceError(f"{path}: a line has over {_LONGEST_LINE} letters")
-            if line.split("#")[0].strip():
-                lines.append(line.split("#")[0].strip())
+            if known := _without_comment(line):
+                lines.append(known)
             if not line or len(lines) == 2:
                 break
     if not lines:

@@ -3,8 +3,7 @@
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import isfinite
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,8 @@ from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.band_ridge import ThermalImage
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities.units import ANGLE, LENGTH, POSITION
 from chipglow.scene import Tool
 from chipglow.uncertainty import Cause, Component
 
@@ -35,25 +35,20 @@ def tool_of(measurement: Measurement, given: Tool | None = None) -> Tool:
 
 
 @dataclass(frozen=True)
-class ToolUncertainty:
+class ToolUncertainty(Part):
     """Standard uncertainties of the place of a tool, independent of each other."""
 
-    along: float
-    """Of the tip along the rake face in m."""
-    across: float
-    """Of the rake face across itself in m, where `pivot` is."""
-    angle: float = 0.0
-    """Of the rake angle in rad."""
-    pivot: float = 0.0
-    """Distance in m up the straight face at which its place and its angle are independent."""
-
-    def __post_init__(self) -> None:
-        for name in ("along", "across", "angle"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0):
-                raise ValueError(f"tool uncertainty: {name} is {value!r}, expected 0 or more")
-        if not isfinite(self.pivot):
-            raise ValueError(f"tool uncertainty: pivot is {self.pivot!r} m, expected a finite one")
+    along: Annotated[float, Parameter("Of the tip along the rake face.", LENGTH, least=0.0)]
+    across: Annotated[
+        float, Parameter("Of the rake face across itself, at `pivot`.", LENGTH, least=0.0)
+    ]
+    angle: Annotated[float, Parameter("Of the rake angle.", ANGLE, least=0.0)] = 0.0
+    pivot: Annotated[
+        float,
+        Parameter(
+            "Distance up the straight face at which place and angle are independent.", POSITION
+        ),
+    ] = 0.0
 
     def displacements(self, tool: Tool, points: Array) -> Array:
         """Return the moves of points fixed to the tool by each standard uncertainty, in m."""

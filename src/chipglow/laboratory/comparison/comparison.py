@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import degrees, isfinite, radians, sqrt
-from typing import Final, NamedTuple
+from math import degrees, radians, sqrt
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,7 +23,8 @@ from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
 from chipglow.laboratory.chip.frames import frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
+from chipglow.quantities.units import LENGTH, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Tool, sample
 from chipglow.text import Notes
 from chipglow.uncertainty import Component, Estimate, draw
@@ -201,25 +202,32 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class StatedUncertainties:
-    """Uncertainties that the files do not state."""
+class StatedUncertainties(Part):
+    """Standard uncertainties that the files do not state."""
 
-    temperature: float = 0.0
-    """Standard uncertainty of the measured radiance temperature in K, common to all values."""
-    emissivity: float = 0.0
-    """Relative standard uncertainty of the emissivities that the simulations assume."""
-    position: float | None = None
-    """Standard uncertainty of the position of each measured value in m. By default that of a pixel;
-    for squares at the rake face only where `tool` is not stated.
-    """
-    tool: ToolUncertainty | None = None
-    """Uncertainty of the tool's place in the measured image, common to all values."""
-
-    def __post_init__(self) -> None:
-        for name in ("temperature", "emissivity", "position"):
-            value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value >= 0):
-                raise ValueError(f"uncertainty: {name} is {value!r}, expected 0 or more")
+    temperature: Annotated[
+        float,
+        Parameter(
+            "Of the measured radiance temperature, common to all values.",
+            TEMPERATURE_DIFFERENCE,
+            least=0.0,
+        ),
+    ] = 0.0
+    emissivity: Annotated[
+        float, Parameter("Of the emissivities that the simulations assume, relative.", least=0.0)
+    ] = 0.0
+    position: Annotated[
+        float | None,
+        Parameter(
+            "Of the position of each measured value, by default that of a pixel; for squares at "
+            "the rake face only where `tool` is not stated.",
+            LENGTH,
+            least=0.0,
+        ),
+    ] = None
+    tool: Annotated[
+        ToolUncertainty | None, Parameter("Of the tool's place, common to all measured values.")
+    ] = None
 
 
 def compare(

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot, inf, isfinite, nan, sqrt
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ from chipglow.laboratory.emissivity.observations import (
     used_pixels,
     with_drift,
 )
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
+from chipglow.quantities.units import KELVINS, TEMPERATURE_DIFFERENCE
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
 from chipglow.uncertainty import Estimate, propagate
@@ -45,59 +46,49 @@ _CLEARLY: Final = 5.0
 
 
 @dataclass(frozen=True)
-class Heating:
-    """Temperatures of a heated object and its surroundings, with uncertainties, in K.
+class Heating(Part):
+    """Temperatures of a heated object and of the surroundings that it reflects."""
 
-    Parameters
-    ----------
-    reference : float
-        True temperature of the object, such as that of a thermocouple.
-    reflected : float
-        Temperature of the surroundings that it reflects; the paper's 293 K by default.
-    reference_uncertainty, reflected_uncertainty : float
-        Standard uncertainties.
-    camera_uncertainty : float, optional
-        Standard uncertainty of the radiance temperature by the camera's calibration, common to
-        all pixels; by default as the measurement states.
-    drift : float, optional
-        Relative standard uncertainty of the radiance from one recording to the next, by default
-        as several recordings show; of one it is unknown and not in the uncertainty.
-
-    Raises
-    ------
-    ValueError
-        If a temperature is not over 0 K, the reference is not over what is reflected, or an
-        uncertainty is negative.
-    """
-
-    reference: float
-    reflected: float = LABORATORY
-    reference_uncertainty: float = 0.0
-    reflected_uncertainty: float = 0.0
-    camera_uncertainty: float | None = None
-    drift: float | None = None
+    reference: Annotated[
+        float, Parameter("True temperature of the object, as of a thermocouple.", KELVINS, over=0.0)
+    ]
+    reflected: Annotated[
+        float, Parameter("Temperature of the surroundings.", KELVINS, over=0.0)
+    ] = LABORATORY
+    reference_uncertainty: Annotated[
+        float, Parameter("Standard uncertainty of `reference`.", TEMPERATURE_DIFFERENCE, least=0.0)
+    ] = 0.0
+    reflected_uncertainty: Annotated[
+        float, Parameter("Standard uncertainty of `reflected`.", TEMPERATURE_DIFFERENCE, least=0.0)
+    ] = 0.0
+    camera_uncertainty: Annotated[
+        float | None,
+        Parameter(
+            "Standard uncertainty of the radiance temperature by the camera's calibration, common "
+            "to all pixels; by default as the measurement states.",
+            TEMPERATURE_DIFFERENCE,
+            least=0.0,
+        ),
+    ] = None
+    drift: Annotated[
+        float | None,
+        Parameter(
+            "Relative standard uncertainty of the radiance from one recording to the next, by "
+            "default as several recordings show; of one it is not in the uncertainty.",
+            least=0.0,
+            under=1.0,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
-        for name in ("reference", "reflected"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise ValueError(f"{name}: is {value!r} K, expected over 0 K")
-        if self.reference <= self.reflected:
-            raise ValueError(
-                f"reference: {_celsius(self.reference)} is not hotter than what is reflected, "
-                f"{_celsius(self.reflected)}, expected a heated object"
-            )
-        for name in ("reference_uncertainty", "reflected_uncertainty", "camera_uncertainty"):
-            value = getattr(self, name)
-            if value is not None and not 0 <= value < inf:
-                raise ValueError(f"{name}: is {value!r} K, expected 0 K or more")
-        if self.drift is not None and not 0 <= self.drift < 1:
-            raise ValueError(f"drift: is {self.drift!r}, expected 0 to 1")
+        super().__post_init__()
         spread = hypot(self.reference_uncertainty, self.reflected_uncertainty)
-        if self.reference - self.reflected < _CLEARLY * spread:
+        hotter = self.reference - self.reflected
+        if hotter <= 0 or hotter < _CLEARLY * spread:
             raise ValueError(
-                f"reference: {_celsius(self.reference)} is over what is reflected by less than "
-                f"{_CLEARLY:g} standard uncertainties of {spread:.3g} K, expected a hotter object"
+                f"reference: {_celsius(self.reference)} must be over what is reflected, "
+                f"{_celsius(self.reflected)}, by {_CLEARLY:g} standard uncertainties of "
+                f"{spread:.3g} K or more"
             )
 
 

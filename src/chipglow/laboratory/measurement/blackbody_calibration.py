@@ -31,26 +31,24 @@ class BlackbodyCalibration:
         return preferred(self.fits)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point of each fit; one row each."""
+        """Return every point of each fit; one row each."""
         return pd.concat([_points(name, fit) for name, fit in self.fits.items()], ignore_index=True)
 
     def parameter_frame(self) -> pd.DataFrame:
-        """Every parameter of each fit; one row each."""
-        return pd.concat(
-            [
-                pd.DataFrame(
-                    {
-                        "model": name,
-                        "parameter": fit.calibration.NAMES,
-                        "value": fit.calibration.parameters,
-                        "standard_uncertainty": np.sqrt(np.diag(fit.calibration.covariance)),
-                        "unit": fit.calibration.UNITS,
-                    }
-                )
-                for name, fit in self.fits.items()
-            ],
-            ignore_index=True,
-        )
+        """Return every parameter of each fit; one row each."""
+        frames = [
+            pd.DataFrame(
+                {
+                    "model": name,
+                    "parameter": fit.calibration.NAMES,
+                    "value": fit.calibration.parameters,
+                    "standard_uncertainty": np.sqrt(np.diag(fit.calibration.covariance)),
+                    "unit": fit.calibration.UNITS,
+                }
+            )
+            for name, fit in self.fits.items()
+        ]
+        return pd.concat(frames, ignore_index=True)
 
 
 def calibrate_blackbodies(
@@ -79,12 +77,9 @@ def calibrate_blackbodies(
         raise ValueError(
             f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
         )
-    ideal = Blackbody()
-    blackbody = Blackbody(
-        ideal.emissivity if emissivity is None else emissivity,
-        emissivity_uncertainty,
-        ideal.surroundings if surroundings is None else surroundings,
-    )
+    given = {"emissivity": emissivity, "surroundings": surroundings}
+    known = {name: value for name, value in given.items() if value is not None}
+    blackbody = Blackbody(emissivity_uncertainty=emissivity_uncertainty, **known)
     try:
         fits = fit_models(
             table["temperature"],

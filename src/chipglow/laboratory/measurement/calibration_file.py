@@ -112,7 +112,7 @@ class CalibrationDescription(Part):
         self.build()
 
     def build(self) -> FittedCalibration:
-        """The calibration."""
+        """Return the calibration."""
         kind = MODELS[self.model]
         if set(self.parameters) != set(kind.NAMES):
             raise ValueError(
@@ -154,14 +154,14 @@ def load_calibration(path: str | Path) -> FittedCalibration:
 
 
 def write_calibration(fit: CalibrationFit[FittedCalibration], path: str | Path) -> None:
-    """Write a calibration to a YAML file, which `load_calibration` reads."""
+    """Write a calibration to a YAML file for `load_calibration`."""
     text = calibration_text(CalibrationDescription.of(fit))
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def calibration_text(description: CalibrationDescription) -> str:
-    """A calibration as YAML, every field with a comment; `load_calibration` reads it."""
+    """Return a calibration as YAML, every field with a comment."""
     return commented_yaml(_HEADER, description)
 
 

@@ -29,11 +29,11 @@ from chipglow.laboratory.measurement.radiometric_calibration import (
 from chipglow.text import DescriptionError
 
 _MOST_SATURATED: Final = 0.05
-"""Fraction of frames of a flat-field source that may be saturated, as bad pixels are."""
+"""Fraction of a flat-field source's frames that may be saturated, as bad pixels are."""
 
 
 def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
-    """Read a measurement, or make one of a camera's file.
+    """Read a measurement, or convert a camera's file to one.
 
     Parameters
     ----------
@@ -41,13 +41,12 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         A measurement's NetCDF file; a camera's file; or a YAML file (.yaml, .yml) that describes a
         camera's file.
     settings : iterable of str
-        Fields of the description of a camera's file: ``band=3.8-5.1 um``. They come before those
-        of a YAML file.
+        Fields of the description, such as ``band=3.8-5.1 um``, which override a YAML file.
 
     Raises
     ------
     ValueError
-        If it is not a measurement, or cannot become one; the message names the file.
+        If it is not a measurement, or cannot become one.
     OSError
         If a file cannot be read.
     """
@@ -75,7 +74,7 @@ def load_recording(description: MeasurementDescription) -> Recording:
 
 
 def _further(description: MeasurementDescription) -> Iterator[str]:
-    """What a measurement needs besides, and the description of a file of numbers lacks."""
+    """Yield what the description of a file of numbers lacks for a measurement."""
     if description.pitch is None:
         yield "pitch: is missing, expected the distance between pixels such as 6 um"
     if description.calibration is None and description.band is None:
@@ -119,10 +118,9 @@ def uniform_counts(
     settings: Iterable[str] = (),
     read: "FlatFieldReader | None" = None,
 ) -> float:
-    """Mean counts of a recording of a flat-field source, such as a blackbody.
+    """Return the mean counts of a recording of a flat-field source, such as a blackbody.
 
-    Its pixels are corrected as those of a measurement with the same description: the counts are
-    those that a calibration for such measurements needs.
+    Its pixels are corrected as those of a measurement with the same description.
     """
     description = load_description(source, settings)
     recording = load_recording(description)
@@ -162,7 +160,7 @@ def pixel_correction(
 def _flat_fields(
     description: MeasurementDescription, recording: Recording, read: "FlatFieldReader"
 ) -> "FlatFields | None":
-    """Frames of the flat-field sources that a description names, if any."""
+    """Read the frames of the flat-field sources that a description names, if any."""
     section = description.flat_field
     if section.low is None:
         if section.high is not None or description.bad_pixels == "find":
@@ -219,7 +217,7 @@ def _uniform(description: MeasurementDescription, file: str) -> Recording:
 
 
 def _unsuitable(uniform: Recording, recording: Recording) -> str | None:
-    """Why frames of a flat-field source are of no use for a recording."""
+    """Return the reason why frames of a flat-field source are of no use for a recording."""
     if uniform.quantity != recording.quantity:
         return f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
     theirs, ours = uniform.integration_time, recording.integration_time

@@ -8,11 +8,11 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, ValidationInfo
+from pydantic import AfterValidator, ValidationInfo
 
 from chipglow.camera import Recording
 from chipglow.io.column_file import read_bad_pixels, read_response
-from chipglow.laboratory.measurement.radiometric_calibration import ImagePosition
+from chipglow.laboratory.measurement.radiometric_calibration import ImagePosition, Mirror, Pixels
 from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
 from chipglow.quantities.units import (
     LENGTH,
@@ -26,21 +26,8 @@ from chipglow.text import commented_yaml, described_by
 _FRAMES: Final = re.compile(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?")
 
 
-def _two_numbers(value: object) -> object:
-    """A text such as 36.5,41.6 as its numbers; all else as it is."""
-    if not isinstance(value, str):
-        return value
-    try:
-        return tuple(float(part) for part in value.split(","))
-    except ValueError:
-        raise ValueError(f"{value!r}, expected two numbers such as 36.5,41.6") from None
-
-
-Pixels = Annotated[tuple[float, float], BeforeValidator(_two_numbers)]
-
-
 def _limits_or_file(text: str, info: ValidationInfo) -> str:
-    """A band's limits as they are, or the path of a response beside the description."""
+    """Check a band's limits, or complete the path of a response beside the description."""
     if text.lower().endswith(".csv"):
         return beside_the_study(text, info)
     WAVELENGTHS.parse_range(text)
@@ -56,7 +43,7 @@ MaskText = Annotated[str, AfterValidator(_mask_or_file)]
 
 
 def band_of(text: str) -> Band:
-    """A camera's band, by its limits such as ``3.8-5.1 um`` or by the .csv file of its response."""
+    """Return a band by its limits such as ``3.8-5.1 um`` or the .csv file of its response."""
     if text.lower().endswith(".csv"):
         response = read_response(text)
         return Band(*response.limits, response)
@@ -82,7 +69,7 @@ class ObjectSection(Part):
     ] = None
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
-        """Object parameters: as recorded, overridden by this section."""
+        """Override recorded object parameters by this section."""
         values = ((name, getattr(self, name)) for name in self.declared())
         said: dict[str, float] = {name: value for name, value in values if value is not None}
         return replace(recorded or ObjectParameters(), **said) if said else recorded
@@ -175,25 +162,9 @@ class MeasurementDescription(Part):
             most=1.0,
         ),
     ] = None
-    quarter_turns: Annotated[
-        int,
-        Parameter("Quarter turns counter-clockwise that put the image upright.", least=0, most=3),
-    ] = 0
-    mirror: Annotated[
-        Literal["none", "horizontal", "vertical"],
-        Parameter(
-            "After turning: exchange left and right (horizontal) or top and bottom (vertical).",
-            allowed="none, horizontal, vertical",
-        ),
-    ] = "none"
-    tip: Annotated[
-        Pixels | None,
-        Parameter(
-            "The tip of the tool, the origin of coordinates, in pixels right and down from the "
-            "upper left corner of the image so turned; none: the lower left corner is the origin.",
-            allowed="none, [120.5, 88], or 120.5,88",
-        ),
-    ] = None
+    quarter_turns: Annotated[int, ImagePosition.parameter("quarter_turns")] = 0
+    mirror: Annotated[Mirror, ImagePosition.parameter("mirror")] = "none"
+    tip: Annotated[Pixels | None, ImagePosition.parameter("tip")] = None
     integration_time: Annotated[
         float | None, Parameter("Integration time; none: as the file says.", TIME)
     ] = None
@@ -235,7 +206,7 @@ class MeasurementDescription(Part):
     )
 
     def chosen_frames(self) -> slice | None:
-        """The frames to take."""
+        """Return the frames to take."""
         if self.frames is None:
             return None
         match = _FRAMES.fullmatch(self.frames)
@@ -244,18 +215,14 @@ class MeasurementDescription(Part):
         return slice(*(int(number) if number else None for number in match.groups()))
 
     def position(self) -> ImagePosition:
-        """How the image lies in the coordinates of the cut."""
+        """Return the position of the image in the coordinates of the cut."""
         return ImagePosition(self.quarter_turns, self.mirror, self.tip)
 
-    def known_band(self) -> Band | None:
-        """The band, if it is given."""
-        return None if self.band is None else band_of(self.band)
-
     def applied_to(self, recording: Recording) -> Recording:
-        """The recording, overridden by this description."""
+        """Override a recording by this description."""
         said: dict[str, Any] = {
             "camera": self.camera,
-            "band": self.known_band(),
+            "band": None if self.band is None else band_of(self.band),
             "pitch": self.pitch,
             "fill_factor": self.fill_factor,
             "integration_time": self.integration_time,
@@ -268,19 +235,19 @@ class MeasurementDescription(Part):
         )
 
     def listed_bad_pixels(self, shape: tuple[int, int]) -> NDArray[np.bool_] | None:
-        """The bad pixels of the table, if there is one, for an image of these rows and columns."""
+        """Return the bad pixels of the table, if there is one, for an image of this shape."""
         if self.bad_pixels in (None, "find"):
             return None
         return read_bad_pixels(Path(str(self.bad_pixels)), shape)
 
 
 def load_description(source: str | Path, settings: Iterable[str] = ()) -> MeasurementDescription:
-    """Read the description of a camera's file from a YAML file, or make one of the file."""
+    """Read the description of a camera's file from YAML, or make one of the file itself."""
     return described_by(MeasurementDescription, Path(source), "file", settings)
 
 
 def measurement_text(description: MeasurementDescription) -> str:
-    """A description of a camera's file as YAML, every field with a comment."""
+    """Return a description of a camera's file as YAML, every field with a comment."""
     return commented_yaml(_HEADER, description)
 
 

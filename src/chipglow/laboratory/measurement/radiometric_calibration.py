@@ -1,11 +1,12 @@
-"""From what a camera wrote to a measurement."""
+"""Radiometric calibration of a camera's recording."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator
 
 from chipglow.camera import (
     Calibration,
@@ -16,13 +17,12 @@ from chipglow.camera import (
     Recording,
     replace_bad_pixels,
 )
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
 Mirror: TypeAlias = Literal["none", "horizontal", "vertical"]
-MIRRORS: Final = ("none", "horizontal", "vertical")
 
 _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
@@ -30,29 +30,45 @@ _PIXELS_AT_ONCE: Final = 1 << 22
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
 
 
+def _two_numbers(value: object) -> object:
+    """Return a text such as 36.5,41.6 as its numbers; all else as it is."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return tuple(float(part) for part in value.split(","))
+    except ValueError:
+        raise ValueError(f"{value!r}, expected two numbers such as 36.5,41.6") from None
+
+
+Pixels = Annotated[tuple[float, float], BeforeValidator(_two_numbers)]
+
+
 @dataclass(frozen=True)
-class ImagePosition:
-    """How a camera's image lies in the coordinates of the cut."""
+class ImagePosition(Part):
+    """Position of a camera's image in the coordinates of the cut."""
 
-    quarter_turns: int = 0
-    """How often the image is turned by 90° counter-clockwise."""
-    mirror: Mirror = "none"
-    """After turning: ``horizontal`` exchanges left and right, ``vertical`` top and bottom."""
-    tip: tuple[float, float] | None = None
-    """Where the tip of the tool, the origin of coordinates, is in the image so turned: pixels
-    right of its left edge and down from its upper edge. The lower left corner by default.
-    """
-
-    def __post_init__(self) -> None:
-        if self.quarter_turns not in (0, 1, 2, 3):
-            raise ValueError(f"quarter_turns: is {self.quarter_turns!r}, expected 0, 1, 2 or 3")
-        if self.mirror not in MIRRORS:
-            raise ValueError(f"mirror: is {self.mirror!r}, expected {', '.join(MIRRORS)}")
-        if self.tip is not None and not np.isfinite(self.tip).all():
-            raise ValueError(f"tip: is {self.tip!r}, expected two finite numbers of pixels")
+    quarter_turns: Annotated[
+        int,
+        Parameter("Quarter turns counter-clockwise that put the image upright.", least=0, most=3),
+    ] = 0
+    mirror: Annotated[
+        Mirror,
+        Parameter(
+            "After turning: exchange left and right (horizontal) or top and bottom (vertical).",
+            allowed="none, horizontal, vertical",
+        ),
+    ] = "none"
+    tip: Annotated[
+        Pixels | None,
+        Parameter(
+            "The tip of the tool, the origin of coordinates, in pixels right and down from the "
+            "upper left corner of the image so turned; none: the lower left corner is the origin.",
+            allowed="none, [120.5, 88], or 120.5,88",
+        ),
+    ] = None
 
     def place(self, frames: NDArray[Any]) -> NDArray[Any]:
-        """Frames of shape (time, y, x) as they lie in the coordinates of the cut."""
+        """Turn frames of shape (time, y, x) into the coordinates of the cut."""
         turned = np.rot90(frames, self.quarter_turns, axes=(1, 2))
         if self.mirror == "horizontal":
             turned = turned[:, :, ::-1]
@@ -61,7 +77,7 @@ class ImagePosition:
         return np.ascontiguousarray(turned)
 
     def raster(self, shape: tuple[int, int], pitch: float) -> Raster:
-        """Grid of the pixels of placed frames, for their rows and columns and pitch in m."""
+        """Return the grid of the pixels of placed frames with a pitch in m."""
         right, down = (0.0, float(shape[0])) if self.tip is None else self.tip
         return Raster(-right * pitch, down * pitch, pitch, *shape)
 
@@ -74,11 +90,10 @@ def calibrate_recording(
     lower_limit: float | None = None,
     position: ImagePosition | None = None,
 ) -> Measurement:
-    """Make a measurement of what a camera wrote.
+    """Convert a camera's recording to a measurement.
 
-    Counts become radiance by the calibration, which needs no object parameters. Radiance is taken
-    as the camera received it. Temperatures become the radiance that the camera received: what it
-    was set to for the object is taken back (`ObjectParameters.apparent_radiance`).
+    Counts become radiance by the calibration. Temperatures become the radiance that the camera
+    received: its object parameters are taken back (`ObjectParameters.apparent_radiance`).
     """
     position = position or ImagePosition()
     _check_known(recording, calibration)
@@ -112,21 +127,15 @@ def calibrate_recording(
 def _check_known(recording: Recording, calibration: Calibration | None) -> None:
     """Raise ValueError that names all that is missing for a measurement."""
     missing = []
-    counts = recording.quantity == "counts" and recording.conversion is None
-    if calibration is None and counts:
+    if calibration is None and recording.quantity == "counts" and recording.conversion is None:
         missing.append(
-            "calibration: is missing, the recording holds counts and no conversion of its maker, "
-            "expected a calibration"
+            "calibration: is missing, the recording holds counts and no conversion of its maker"
         )
     elif calibration is None and recording.band is None:
-        missing.append(
-            "band: is missing, the file does not say it, expected the camera's band such as "
-            "3.8-5.1 um"
-        )
+        missing.append("band: is missing, expected the camera's band such as 3.8-5.1 um")
     if recording.pitch is None:
         missing.append(
-            "pitch: is missing, the file does not say it, expected the distance between pixels "
-            "on the object such as 6 um"
+            "pitch: is missing, expected the distance between pixels on the object such as 6 um"
         )
     if missing:
         raise ValueError("; ".join(missing))
@@ -179,7 +188,7 @@ def _band_text(band: Band) -> str:
 
 
 def _parts(recording: Recording) -> Iterator[Recording]:
-    """Some frames after the other: the numbers in between take several times the memory."""
+    """Yield some frames after the other, as the arrays in between take several times the memory."""
     step = max(_PIXELS_AT_ONCE // recording.signal[0].size, 1)
     for start in range(0, len(recording.times), step):
         some = slice(start, start + step)
@@ -193,11 +202,17 @@ def _develop_frames(
     non_uniformity: NonUniformity | None,
     bad_pixels: NDArray[np.bool_] | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Radiance in 32 bits, which hold more than counts do, and flags, of shape (time, y, x)."""
+    """Return radiance in 32 bits, which hold more than counts do, and flags, (time, y, x)."""
     signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
-    radiance = _radiance(recording, calibration, band, signal)
-    if calibration is not None and calibration.highest < np.inf:
-        flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
+    if calibration is not None:
+        radiance = calibration.radiance(signal)
+        if calibration.highest < np.inf:
+            flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
+    elif recording.quantity == "radiance":
+        radiance = signal
+    else:
+        settings = recording.object_parameters or ObjectParameters()
+        radiance = settings.apparent_radiance(signal, band)
     return radiance.astype(np.float32), flags
 
 
@@ -206,7 +221,7 @@ def repaired_signal(
     non_uniformity: NonUniformity | None = None,
     bad_pixels: NDArray[np.bool_] | None = None,
 ) -> tuple[Array, NDArray[np.uint8]]:
-    """A recording's signal with its pixels corrected."""
+    """Return a recording's signal with its pixels corrected, and flags."""
     raw = recording.signal
     signal = raw.astype(np.float64)
     over = np.zeros(raw.shape, np.bool_)
@@ -230,7 +245,7 @@ def repaired_signal(
 def _over(
     over: NDArray[np.bool_], bad: NDArray[np.bool_], replaced: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """A replaced pixel is saturated if a neighbour is: its median cannot be trusted."""
+    """Mark a replaced pixel as saturated if a neighbour is: its median cannot be trusted."""
     trusted = over & ~bad
     result = trusted.copy()
     for y, x in np.argwhere(replaced):
@@ -239,31 +254,21 @@ def _over(
     return result
 
 
-def _radiance(
-    recording: Recording,
-    calibration: Calibration | None,
-    band: Band,
-    signal: Array,
-) -> Array:
-    if calibration is not None:
-        return calibration.radiance(signal)
-    if recording.quantity == "radiance":
-        return signal
-    settings = recording.object_parameters or ObjectParameters()
-    return settings.apparent_radiance(signal, band)
-
-
 def _attributes(
     recording: Recording,
     calibration: Calibration | None,
     position: ImagePosition,
 ) -> dict[str, float | str]:
+    def known(name: str) -> Any:
+        value = getattr(recording, name)
+        return getattr(calibration, name, None) if value is None else value
+
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
         "quantity": recording.quantity,
         "fill_factor": recording.fill_factor,
-        "integration_time": _known(recording, calibration, "integration_time"),
-        "range": _known(recording, calibration, "range_name"),
+        "integration_time": known("integration_time"),
+        "range": known("range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
         **_notes(recording, calibration, position).attrs(),
@@ -271,14 +276,8 @@ def _attributes(
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
 
-def _known(recording: Recording, calibration: Calibration | None, name: str) -> Any:
-    """Value of the file or, without one, of the calibration."""
-    said = getattr(recording, name)
-    return getattr(calibration, name, None) if said is None else said
-
-
 def _object_text(recording: Recording) -> str | None:
-    """What the camera was set to for the object, and what became of it."""
+    """Describe the object parameters of the camera and their use."""
     settings = recording.object_parameters
     if settings is None:
         return None
@@ -295,44 +294,32 @@ def _object_text(recording: Recording) -> str | None:
     )
 
 
-def _notes(
-    recording: Recording,
-    calibration: Calibration | None,
-    position: ImagePosition,
-) -> Notes:
+def _notes(recording: Recording, calibration: Calibration | None, position: ImagePosition) -> Notes:
+    quantity, name = recording.quantity, getattr(calibration, "range_name", None)
+    time = getattr(calibration, "integration_time", None)
+    assumed = {
+        "The temperatures are radiance temperatures, as with an emissivity of 1: the file says "
+        "nothing of the object.": quantity == "temperature" and recording.object_parameters is None,
+        "The radiance is what the camera received, with nothing corrected for.": (
+            quantity == "radiance"
+        ),
+        "The integration time is the calibration's: the file does not say it.": (
+            recording.integration_time is None and time is not None
+        ),
+        f"The range is the calibration's, {name}: the file does not say it.": (
+            recording.range_name is None and name is not None
+        ),
+        "No pixel is saturated: neither the file nor the description says from where on.": (
+            recording.saturation is None
+        ),
+        "The origin of coordinates is the image's lower left corner: no tip was given.": (
+            position.tip is None
+        ),
+    }
+    stated = [text for text, applies in assumed.items() if applies]
     about_calibration = Notes(warnings=list(calibration.warnings if calibration else ()))
-    return (
-        recording.notes
-        + Notes(list(_assumed(recording, calibration, position)))
-        + about_calibration.about("Calibration")
-        + Notes(warnings=list(_warnings(recording, calibration)))
-    )
-
-
-def _assumed(
-    recording: Recording, calibration: Calibration | None, position: ImagePosition
-) -> Iterator[str]:
-    settings = recording.object_parameters
-    if recording.quantity == "temperature" and settings is None:
-        yield (
-            "The temperatures are radiance temperatures, as with an emissivity of 1: the file says "
-            "nothing of the object."
-        )
-    if recording.quantity == "radiance":
-        yield "The radiance is what the camera received, with nothing corrected for."
-    if calibration is not None:
-        times = recording.integration_time, calibration.integration_time
-        if times[0] is None and times[1] is not None:
-            yield "The integration time is the calibration's: the file does not say it."
-        if recording.range_name is None and calibration.range_name is not None:
-            yield (
-                f"The range is the calibration's, {calibration.range_name}: the file does not say "
-                "it."
-            )
-    if recording.saturation is None:
-        yield "No pixel is saturated: neither the file nor the description says from where on."
-    if position.tip is None:
-        yield "The origin of coordinates is the image's lower left corner: no tip was given."
+    warnings = Notes(warnings=list(_warnings(recording, calibration)))
+    return recording.notes + Notes(stated) + about_calibration.about("Calibration") + warnings
 
 
 def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator[str]:
@@ -350,5 +337,5 @@ def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator
 
 
 def flag_fractions(measurement: Measurement) -> dict[Flag, float]:
-    """Fraction of the pixels of all frames that has each flag."""
+    """Return the fraction of the pixels of all frames that has each flag."""
     return {flag: float(np.mean(measurement.flags & flag != 0)) for flag in Flag}

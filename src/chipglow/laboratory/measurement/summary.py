@@ -13,7 +13,7 @@ from chipglow.quantities import Array
 
 @dataclass(frozen=True)
 class MeasurementSummary:
-    """A measurement in numbers."""
+    """Statistics of a measurement."""
 
     index: int
     usable: float
@@ -22,17 +22,13 @@ class MeasurementSummary:
     """Fraction of the pixels of all frames that has each flag."""
     now: tuple[float, float, float] | None
     overall: tuple[float, float, float] | None
-    """Least, median and largest radiance temperature in K of that frame and of all; None if no
-    pixel has one.
-    """
+    """Least, median and largest radiance temperature in K of that frame and of all, if any."""
     uncertainty: tuple[float, float] | None
-    """Least and largest standard uncertainty of the radiance temperature in K from the
-    calibration, over all usable pixels; None if it is not known.
-    """
+    """Least and largest standard uncertainty in K by the calibration, if known."""
 
 
 def measurement_summary(measurement: Measurement, time: float | None = None) -> MeasurementSummary:
-    """Look at a measurement."""
+    """Summarise a measurement and its frame nearest to a time in s."""
     index = shown_frame(measurement.times, time, "measurement")
     kelvins = measurement.radiance_temperature()
     return MeasurementSummary(

@@ -1,9 +1,8 @@
 """The point spread function of a camera, from images of a knife edge."""
 
-from chipglow.laboratory.psf.edge_file import load_apertures, load_edge
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
-from chipglow.laboratory.psf.file import write_psf
+from chipglow.laboratory.psf.file import load_apertures, load_edge, write_psf
 from chipglow.laboratory.psf.kernel import psf_kernel
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.laboratory.psf.psf_fit import ModelFit

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from chipglow.camera import Flag, Measurement, Recording
-from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, Straightness, find_edge
+from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.laboratory.psf.psf_models import GaussianModel
 from chipglow.quantities import Array
@@ -63,7 +63,7 @@ class EdgeImage:
 def edge_image(
     measurement: Measurement, name: str, region: tuple[slice, slice] | None = None
 ) -> EdgeImage:
-    """The mean of a measurement's frames as an image of an edge.
+    """Return the mean of a measurement's frames as an image of an edge.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def counts_image(
     name: str,
     region: tuple[slice, slice] | None = None,
 ) -> EdgeImage:
-    """The mean of frames of counts, a straight line over radiance, as an image of an edge."""
+    """Return the mean of frames of counts, linear in radiance, as an image of an edge."""
     if recording.pitch is None:
         raise ValueError(
             "pitch: is missing, the file does not say it, expected the distance between pixels "
@@ -142,7 +142,7 @@ def _mean_image(
     name: str,
     region: tuple[slice, slice] | None,
 ) -> EdgeImage:
-    """Mean and flags of a region of frames."""
+    """Return the mean and flags of a region of frames."""
     part = region or np.s_[:, :]
     found = np.bitwise_or.reduce(flags, axis=0)[part]
     radiance = np.asarray(frames.mean(axis=0)[part], np.float64)
@@ -186,14 +186,15 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     x, y = image.x - image.x.mean(), image.y - image.y.mean()
     try:
         # Where an edge is can be seen on clipped pixels too.
-        line, straightness = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
+        line, bend = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
         pixels = _pixels_of(image, x, y, line)
         quick = _quick_fit(pixels)
-        warnings = _bent(straightness, image)
+        warnings = _bent(bend, image)
         limits, clipped = _limits(image, x, y, line)
         warnings += clipped
         if clipped:
-            pixels = _within_limits(pixels, line, limits)
+            distance = line.distance(pixels.x, pixels.y)
+            pixels = _chosen(pixels, (distance > limits[0]) & (distance < limits[1]))
             quick = _quick_fit(pixels)
         else:
             _check_edge(pixels, quick)
@@ -222,7 +223,7 @@ def _pixels_of(image: EdgeImage, x: Array, y: Array, line: EdgeLine) -> EdgePixe
 
 
 def _quick_fit(pixels: EdgePixels) -> ModelFit:
-    """A Gaussian fitted to the pixels."""
+    """Return a Gaussian fitted to the pixels."""
     return fit_model(GaussianModel(), [pixels], tolerance=_ROUGHLY)
 
 
@@ -245,7 +246,7 @@ def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
 
 
 def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
-    """Pixels at a limit that no flag marks: many of just the largest value, among noisy ones."""
+    """Return pixels at a limit that no flag marks: many with just the largest value."""
     values, counts = np.unique(image.radiance[image.usable], return_counts=True)
     if values.size < 3:
         return np.zeros_like(image.dead)
@@ -256,7 +257,7 @@ def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
 def _limits(
     image: EdgeImage, x: Array, y: Array, line: EdgeLine
 ) -> tuple[tuple[float, float], list[str]]:
-    """Distances between which nothing is clipped, and warnings."""
+    """Return the distances between which nothing is clipped, and warnings."""
     across, down = np.meshgrid(x, y)
     distance = line.distance(across, down)
     low, high, said = -np.inf, np.inf, []
@@ -272,7 +273,7 @@ def _limits(
 
 
 def _first_clipped(distance: Array, clipped: NDArray[np.bool_], pitch: float) -> float:
-    """Distance beyond which more than single pixels are clipped, minus a pitch."""
+    """Return the distance beyond which more than single pixels are clipped, minus a pitch."""
     first = float(distance.min())
     index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
     count = np.bincount(index)
@@ -292,25 +293,15 @@ def _clipped_text(clipped: NDArray[np.bool_], how: str, side: str, limit: float)
     return f"{fraction:.2g} % of the pixels are {how}{beyond}."
 
 
-def _within_limits(pixels: EdgePixels, line: EdgeLine, limits: tuple[float, float]) -> EdgePixels:
-    distance = line.distance(pixels.x, pixels.y)
-    return _chosen(pixels, (distance > limits[0]) & (distance < limits[1]))
-
-
 def _chosen(pixels: EdgePixels, kept: NDArray[np.bool_]) -> EdgePixels:
     if kept.sum() < 40:
         raise NoEdgeError(f"{kept.sum()} pixels are not clipped, expected 40 or more")
-    return replace(
-        pixels,
-        x=pixels.x[kept],
-        y=pixels.y[kept],
-        radiance=pixels.radiance[kept],
-        sigma=pixels.sigma[kept],
-    )
+    each = {name: getattr(pixels, name)[kept] for name in ("x", "y", "radiance", "sigma")}
+    return replace(pixels, **each)
 
 
 def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, list[str]]:
-    """The pixels without those that lie far from all others as near to the edge."""
+    """Return the pixels without those that lie far from all others as near to the edge."""
     left = pixels.radiance - quick.predicted(0, pixels)
     spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
     limit = max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
@@ -344,10 +335,10 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
         )
 
 
-def _bent(straightness: Straightness | None, image: EdgeImage) -> list[str]:
-    if straightness is None:
+def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> list[str]:
+    if bend is None:
         return ["The edge was found by its step only; its straightness could not be checked."]
-    bent, unsure = straightness.sagitta, straightness.uncertainty
+    bent, unsure = bend
     if bent < 4 * unsure or bent < 0.05 * image.pitch:
         return []
     return [

@@ -31,7 +31,7 @@ class EdgeLine:
     """Distance in m of the edge from the origin along the normal."""
 
     def distance(self, x: Array, y: Array) -> Array:
-        """Signed distances of points from the edge in m, positive on the bright side."""
+        """Return the signed distances of points from the edge in m, positive on the bright side."""
         return x * cos(self.normal) + y * sin(self.normal) - self.position
 
     @property
@@ -40,18 +40,8 @@ class EdgeLine:
         return (self.normal + pi / 4) % (pi / 2) - pi / 4
 
 
-@dataclass(frozen=True)
-class Straightness:
-    """How far the edge is bent."""
-
-    sagitta: float
-    """Deviation of a parabola through the edge from its chord, in m."""
-    uncertainty: float
-    """Its standard uncertainty in m."""
-
-
-def find_edge(image: Array, x: Array, y: Array) -> tuple[EdgeLine, Straightness | None]:
-    """Find the edge in an image.
+def find_edge(image: Array, x: Array, y: Array) -> tuple[EdgeLine, tuple[float, float] | None]:
+    """Find the edge in an image, and its sagitta with its standard uncertainty in m, if it can.
 
     The step that explains most of the image's variance is looked for at all orientations; the line
     is then fitted to the centroids of the derivative in each row or column near it, without those
@@ -86,7 +76,7 @@ def _best_step(
     width: float,
     angles: Array,
 ) -> tuple[float, float, float]:
-    """Square of Student's t, normal in rad and position in m of the clearest step."""
+    """Return the square of Student's t, normal in rad and position in m of the clearest step."""
     centred = value - value.mean()
     count, total = value.size, float(centred @ centred)
     best = (0.0, 0.0, 0.0)
@@ -112,14 +102,14 @@ def _best_step(
 
 def _refined(
     image: Array, x: Array, y: Array, line: EdgeLine
-) -> tuple[EdgeLine, Straightness | None]:
-    """The line through the centroids of the derivative, and how far they are bent."""
+) -> tuple[EdgeLine, tuple[float, float] | None]:
+    """Return the line through the centroids of the derivative, and how far they are bent."""
     steep = abs(cos(line.normal)) < abs(sin(line.normal))
     rows, along, other = (image.T, y, x) if steep else (image, x, y)
     pitch = abs(float(along[1] - along[0]))
     middles = (along[:-1] + along[1:]) / 2
     derivative = np.diff(rows, axis=1)
-    straightness = None
+    bend = None
     for _ in range(_ROUNDS):
         a, b = cos(line.normal), sin(line.normal)
         here, there = (b, a) if steep else (a, b)
@@ -132,8 +122,8 @@ def _refined(
             return line, None
         slope, start = np.polyfit(place[kept], centre[kept], 1)
         line = _line_of(float(slope), float(start), steep, line)
-        straightness = _straightness(place[kept], centre[kept])
-    return line, straightness
+        bend = _sagitta(place[kept], centre[kept])
+    return line, bend
 
 
 def _centroids(
@@ -143,7 +133,7 @@ def _centroids(
     expected: Array,
     pitch: float,
 ) -> tuple[Array, Array]:
-    """Centroids of the derivative near the line, of the rows in which all of it is there."""
+    """Return the centroids of the derivative near the line, of rows that show all of it."""
     off = (middles[None, :] - expected[:, None]) / (_WINDOW * pitch)
     window = np.where(np.abs(off) <= 1, 0.54 + 0.46 * np.cos(pi * off), 0.0)
     known = np.isfinite(derivative) | (window == 0.0)
@@ -157,7 +147,7 @@ def _centroids(
 
 
 def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
-    """Which centroids lie near their line, by the median of their distances."""
+    """Return which centroids lie near their line, by the median of their distances."""
     kept = np.ones(place.size, dtype=np.bool_)
     for _ in range(_ROUNDS):
         residual = centre - np.polyval(np.polyfit(place[kept], centre[kept], 1), place)
@@ -169,18 +159,19 @@ def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
 
 
 def _line_of(slope: float, start: float, steep: bool, before: EdgeLine) -> EdgeLine:
-    """The line on which one coordinate is slope times the other plus start."""
+    """Return the line on which one coordinate is slope times the other plus start."""
     length = hypot(1.0, slope)
     normal = (-slope / length, 1 / length) if steep else (1 / length, -slope / length)
     sign = 1.0 if normal[0] * cos(before.normal) + normal[1] * sin(before.normal) > 0 else -1.0
     return EdgeLine(atan2(sign * normal[1], sign * normal[0]), sign * start / length)
 
 
-def _straightness(place: Array, centre: Array) -> Straightness:
+def _sagitta(place: Array, centre: Array) -> tuple[float, float]:
+    """Return the deviation of a parabola from its chord, and its standard uncertainty."""
     unit = (place - place.mean()) / (np.ptp(place) / 2)
     design = np.vander(unit, 3)
     solution, *_ = np.linalg.lstsq(design, centre, rcond=None)
     left = centre - design @ solution
     variance = float(left @ left) / (place.size - 3)
     inverse = np.linalg.inv(design.T @ design)
-    return Straightness(abs(float(solution[0])), float(variance * inverse[0, 0]) ** 0.5)
+    return abs(float(solution[0])), float(variance * inverse[0, 0]) ** 0.5

@@ -16,7 +16,7 @@ _FREQUENCIES: Final = 65
 
 
 def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
-    """Edge-spread, line-spread and modulation transfer function of an edge, in SI units.
+    """Return the edge-spread, line-spread and modulation transfer function of an edge, in SI units.
 
     The edge-spread function ``esf``, 0 on the dark and 1 on the bright side, is the mean of the
     ``pixels`` in bins of a quarter of the pitch along the fitted edge's normal, at their mean
@@ -80,7 +80,7 @@ def _transfer(
     residual: Array,
     uncertainty: Array,
 ) -> dict[str, Array]:
-    """Modulation transfer function, its uncertainty, and the fitted one with and without pixel."""
+    """Return the MTF, its uncertainty, and the fitted one with and without pixel."""
     edge, width = fit.edges[index], pixels.pitch / BINS_PER_PITCH
     frequency = np.linspace(0.0, 1 / pixels.pitch, _FREQUENCIES)
     optics = fit.model.transfer(fit.values, frequency, edge.line.normal)

@@ -1,15 +1,79 @@
-"""Point spread functions by the knife edge in NetCDF-4 files."""
+"""Files of the knife edge: images of edges and apertures, and the point spread functions found."""
 
 import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
 
 import xarray as xr
 
 from chipglow.camera import MeasuredPSF
-from chipglow.io import write_dataset
+from chipglow.io import is_measurement, is_scene, write_dataset
+from chipglow.laboratory.measurement import (
+    load_calibration,
+    load_description,
+    load_measurement,
+    load_recording,
+    measurement_of,
+    pixel_correction,
+    repaired_signal,
+)
+from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.laboratory.psf.kernel import psf_kernel
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
+from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities.units import LENGTH
+from chipglow.text import DescriptionError, load_described
 from chipglow.uncertainty import to_xarray
+
+
+def load_edge(
+    source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
+) -> EdgeImage:
+    """Read an image of an edge: a measurement, or a camera's file with or without a calibration.
+
+    Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
+    calibration holds beyond its range, as the edge needs no temperature.
+    """
+    settings, name = list(settings), Path(source).name
+    if is_measurement(source) or is_scene(source):
+        return edge_image(load_measurement(source, settings), name, region)
+    described = load_description(source, settings)
+    recording = load_recording(described)
+    if recording.quantity != "counts" or recording.conversion is not None:
+        return edge_image(measurement_of(described, recording, str(source)), name, region)
+    if described.calibration is not None:
+        calibration = load_calibration(described.calibration)
+        recording = replace(recording, band=recording.band or calibration.band)
+    try:
+        corrected = pixel_correction(described, recording)
+        signal, flags = repaired_signal(recording, *corrected)
+        return counts_image(recording, signal, flags, name, region)
+    except ValueError as error:
+        raise DescriptionError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error
+
+
+@dataclass(frozen=True)
+class ApertureSection(Part):
+    """An image of a round aperture."""
+
+    file: Annotated[FileBeside, Parameter("The measurement.")]
+    diameter: Annotated[float, Parameter("Diameter of the aperture on the object.", LENGTH)]
+
+
+@dataclass(frozen=True)
+class ApertureList(Part):
+    """Images of apertures of several diameters before one source."""
+
+    apertures: Annotated[tuple[ApertureSection, ...], Parameter("The images.")]
+
+
+def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
+    """Read a list of images of apertures from a YAML file."""
+    found = load_described(ApertureList, path)
+    return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]
 
 
 def write_psf(
@@ -58,7 +122,7 @@ def write_psf(
 
 
 def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Variable]:
-    """A model's parameters, their covariance, and how well it fits."""
+    """Return a model's parameters, their covariance, and how well it fits."""
     about: dict[str, float | str] = {
         "parameters": ", ".join(fit.model.parameters),
         "fwhm": fit.fwhm,
@@ -76,7 +140,7 @@ def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Vari
 
 
 def _edge_variables(name: str, edge: EdgeResult) -> dict[str, xr.Variable]:
-    """Edge-spread, line-spread and transfer function of one image."""
+    """Return the edge-spread, line-spread and transfer function of one image."""
     about = {"image": edge.image.name, "fwhm": edge.fwhm, "fwhm_uncertainty": edge.fwhm_uncertainty}
     return {
         f"{name}_{column}": xr.Variable(

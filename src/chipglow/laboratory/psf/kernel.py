@@ -27,7 +27,7 @@ _Kernel = Callable[[PointSpreadFunction], Array]
 
 
 def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
-    """Kernel of the optics' point spread function, with the components of its uncertainty.
+    """Return the kernel of the optics with the components of its uncertainty.
 
     `FIT` has an error for each direction of the covariance of the model's parameters; of the one
     without a model it is that of `RadialPSF`. `MODEL` has one for each other model: its difference
@@ -55,7 +55,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
 
 
 def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
-    """Changes of the kernel by each independent error of the model's parameters."""
+    """Return the changes of the kernel by each independent error of the model's parameters."""
     pixels = knife.edges[0].pixels
     low, high = (np.array(ends) for ends in fit.model.bounds(pixels.pitch, pixels.reach))
     unit = np.where(fit.uncertainties > 0, fit.uncertainties, 1.0)
@@ -72,7 +72,7 @@ def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]
 
 
 def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
-    """Changes of the kernel by each other model, by the root of its weight."""
+    """Return the changes of the kernel by each other model, by the root of its weight."""
     here = kernel(fit.psf())
     return [
         np.sqrt(weight) * (kernel(other.psf()) - here)
@@ -87,7 +87,7 @@ def _component(name: str, effects: Sequence[Array]) -> Component:
 
 
 def _of_side(kernel: Array, side: int) -> Array:
-    """The middle of a kernel, or the kernel amid zeros."""
+    """Return the middle of a kernel, or the kernel amid zeros."""
     more = (side - len(kernel)) // 2
     if more >= 0:
         return np.pad(kernel, more)

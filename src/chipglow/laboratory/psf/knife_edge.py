@@ -138,7 +138,7 @@ class KnifeEdge:
         return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
 
     def to_frame(self) -> pd.DataFrame:
-        """The models; one row each, the best first."""
+        """Return the models; one row each, the best first."""
         return pd.DataFrame(
             {
                 "model": fit.model.name,
@@ -153,11 +153,11 @@ class KnifeEdge:
         )
 
     def edge_frame(self) -> pd.DataFrame:
-        """The images; one row each."""
+        """Return the images; one row each."""
         return pd.DataFrame(map(_edge_row, self.edges, self.best.edges))
 
     def fit(self, name: str) -> ModelFit:
-        """The fit of a model by its name."""
+        """Return the fit of a model by its name."""
         for fit in self.fits:
             if fit.model.name == name:
                 return fit
@@ -167,7 +167,7 @@ class KnifeEdge:
     def psf(
         self, part: Literal["optics", "system"] = "optics", model: str | None = None
     ) -> PointSpreadFunction:
-        """The point spread function, for ``Camera(psf=...)``."""
+        """Return the point spread function, for ``Camera(psf=...)``."""
         if part not in ("optics", "system"):
             raise ValueError(f"part: {part!r}, expected optics or system")
         if model == RADIAL:
@@ -309,7 +309,7 @@ def _result(
 
 
 def _line_fwhm(best: ModelFit, k: int, pixels: EdgePixels) -> float:
-    """Width of the fitted line-spread function in m."""
+    """Return the width of the fitted line-spread function in m."""
     response = best.response(k, pixels)
     half = float(response.slope(np.array(0.0))) / 2
     found = brentq(lambda u: float(response.slope(np.array(u))) - half, 0.0, pixels.reach)
@@ -317,7 +317,7 @@ def _line_fwhm(best: ModelFit, k: int, pixels: EdgePixels) -> float:
 
 
 def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
-    """What of an edge's place may make the results wrong."""
+    """Return warnings about the edge's place in its image."""
     pixels, name = result.pixels, result.image.name
     distance = best.edges[k].line.distance(pixels.x, pixels.y)
     warnings = []
@@ -339,7 +339,7 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
 
 
 def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
-    """What of the best fit may make the results wrong."""
+    """Return warnings about the best fit."""
     warnings = []
     footprint = max(edge.image.footprint for edge in edges)
     if best.fwhm < _UNRESOLVED * footprint or best.fwhm_uncertainty > 0.5 * best.fwhm:
@@ -374,13 +374,13 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
 
 
 def _left(edge: EdgeResult) -> float:
-    """Root of the mean square of what the model leaves near the edge, as a fraction of the step."""
+    """Return the root mean square of the residuals near the edge over the step."""
     near = np.abs(edge.curves["distance"].values) < 2 * edge.line_fwhm
     return float(np.sqrt(np.mean(edge.curves["esf_residual"].values[near] ** 2)))
 
 
 def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
-    """Kernel of optics and a square pixel."""
+    """Return the kernel of optics and a square pixel."""
     spacing = footprint / _SUBSAMPLES
     kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)
     # A mean over squares of sum 1 leaves rounding below 0 where there is no light.

@@ -16,7 +16,13 @@ from scipy.optimize import least_squares
 
 from chipglow.camera import PointSpreadFunction
 from chipglow.laboratory.psf.edge_line import EdgeLine
-from chipglow.laboratory.psf.psf_models import EdgeResponse, PSFModel, disc_response, edge_response
+from chipglow.laboratory.psf.psf_models import (
+    EdgeResponse,
+    PSFModel,
+    disc_response,
+    edge_response,
+    is_length,
+)
 from chipglow.quantities import Array
 
 _APART: Final = pi / 18
@@ -137,15 +143,15 @@ class ModelFit:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def psf(self) -> PointSpreadFunction:
-        """The optics' point spread function."""
+        """Return the optics' point spread function."""
         return self.model.psf(self.values)
 
     def response(self, edge: int, pixels: EdgePixels) -> EdgeResponse:
-        """Edge-spread function of optics and pixel for one of the edges, from 0 to 1."""
+        """Return the edge-spread function of optics and pixel for one of the edges, from 0 to 1."""
         return _response(self.model, self.values, self.edges[edge].line, pixels)
 
     def predicted(self, edge: int, pixels: EdgePixels) -> Array:
-        """Radiance of an edge's pixels in W/(m² sr)."""
+        """Return the radiance of an edge's pixels in W/(m² sr)."""
         found = self.edges[edge]
         distance = found.line.distance(pixels.x, pixels.y)
         return found.background + found.step * self.response(edge, pixels)(distance)
@@ -159,7 +165,7 @@ def fit_model(
     tolerance: float = 1e-8,
     tries: int = 1,
 ) -> ModelFit:
-    """Weighted least squares with the edges' places, backgrounds and steps free."""
+    """Fit by weighted least squares with the edges' places, backgrounds and steps free."""
     problem = _Problem(model, tuple(edges), apertures)
     starts = problem.starts()[:tries] if start is None else [problem.vector_of(start)]
     ends = [problem.least(vector, tolerance) for vector in starts]
@@ -186,7 +192,7 @@ class _Problem:
         self.scales = self._scales()
 
     def least(self, vector: Array, tolerance: float) -> Array:
-        """Parameters with the least squares near some others."""
+        """Return the parameters with the least squares near some others."""
         low, high = self.low / self.scales, self.high / self.scales
         result = least_squares(
             lambda v: self.residual(v * self.scales),
@@ -205,7 +211,7 @@ class _Problem:
         return float(np.sum(self.residual(vector) ** 2))
 
     def starts(self) -> list[Array]:
-        """Some parameters to begin with, those first that fit best as they are."""
+        """Return some parameters to begin with, those first that fit best as they are."""
         pitch = max(edge.pitch for edge in self.edges)
         low, high = self.low[: self.shapes], self.high[: self.shapes]
         candidates = [
@@ -216,7 +222,7 @@ class _Problem:
         return sorted(candidates, key=self.cost)
 
     def vector_of(self, fit: ModelFit) -> Array:
-        """All parameters of an earlier fit."""
+        """Return all parameters of an earlier fit."""
         places = [
             (edge.background, edge.step, edge.line.position, edge.line.normal) for edge in fit.edges
         ]
@@ -224,7 +230,7 @@ class _Problem:
         return np.concatenate([fit.values, *places, source])
 
     def residual(self, vector: Array) -> Array:
-        """Measured less model, over the noise."""
+        """Return measured minus modelled values over the noise."""
         values, places, source = self._split(vector)
         parts = []
         for edge, place in zip(self.edges, places, strict=True):
@@ -237,7 +243,7 @@ class _Problem:
         return np.concatenate(parts)
 
     def jacobian(self, vector: Array) -> Array:
-        """Derivative of the residuals by the parameters."""
+        """Return the derivative of the residuals by the parameters."""
         values, places, _ = self._split(vector)
         here = self.residual(vector)
         result = np.zeros((here.size, vector.size))
@@ -262,7 +268,7 @@ class _Problem:
         return result
 
     def fitted(self, vector: Array) -> ModelFit:
-        """The result, with uncertainties from the residuals."""
+        """Return the result, with uncertainties from the residuals."""
         residual, jacobian = self.residual(vector), self.jacobian(vector)
         reduced = self._reduced_chi_squared(vector, residual)
         scaled = jacobian * self.scales
@@ -297,13 +303,13 @@ class _Problem:
         )  # fmt: skip
 
     def _split(self, vector: Array) -> tuple[Array, Array, Array]:
-        """The model's parameters, those of the edges (edge, 4), and those of the apertures."""
+        """Return the parameters of the model, of the edges (edge, 4) and of the apertures."""
         last = self.shapes + _EDGE_PARAMETERS * len(self.edges)
         edges = vector[self.shapes : last].reshape(-1, _EDGE_PARAMETERS)
         return vector[: self.shapes], edges, vector[last:]
 
     def _fwhm_gradient(self, values: Array) -> Array:
-        """Derivative of the full width at half maximum by the model's parameters."""
+        """Return the derivative of the full width at half maximum by the model's parameters."""
         gradient = np.empty(self.shapes)
         for k in range(self.shapes):
             shift = 1e-3 * self.scales[k]
@@ -315,7 +321,7 @@ class _Problem:
         return gradient
 
     def _reduced_chi_squared(self, vector: Array, residual: Array) -> float:
-        """Means of the residuals at a distance, squared and over their noise, per freedom."""
+        """Return the squared mean residuals at a distance over their noise, per freedom."""
         total, bins = 0.0, 0
         for edge, place, rows in zip(self.edges, self._split(vector)[1], self.rows, strict=True):
             part, distance = residual[rows], _line(place).distance(edge.x, edge.y)
@@ -329,12 +335,12 @@ class _Problem:
         return total / max(bins - vector.size, 1)
 
     def _fractions(self, values: Array) -> Array:
-        """Signals of the apertures as fractions of an endless source's."""
+        """Return the signals of the apertures as fractions of an endless source's."""
         assert self.apertures is not None
         return self.apertures.weights @ self.model.mean_transfer(values, self.apertures.frequency)
 
     def _beginning(self, values: Array) -> Array:
-        """All parameters with these of the model: backgrounds and steps by linear least squares."""
+        """Return all parameters for some of the model, backgrounds and steps by least squares."""
         parts = [values]
         for edge in self.edges:
             response = _response(self.model, values, edge.line, edge)
@@ -348,7 +354,7 @@ class _Problem:
         return np.concatenate(parts)
 
     def _bounds(self) -> tuple[Array, Array]:
-        """Smallest and largest parameters."""
+        """Return the smallest and largest parameters."""
         low, high = self.model.bounds(
             min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
         )
@@ -363,7 +369,8 @@ class _Problem:
         return np.array(low), np.array(high)
 
     def _scales(self) -> Array:
-        parts = [self.model.scales(min(edge.pitch for edge in self.edges))]
+        pitch = min(edge.pitch for edge in self.edges)
+        parts = [np.array([pitch if is_length(name) else 1.0 for name in self.model.parameters])]
         for edge in self.edges:
             contrast = max(float(np.ptp(edge.radiance)), 1e-300)
             parts.append(np.array([contrast, contrast, edge.pitch, edge.pitch / edge.reach]))
@@ -377,7 +384,7 @@ def _line(place: Array) -> EdgeLine:
 
 
 def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
-    """The same pixels with the noise that the residuals show, on the dark and the bright side.
+    """Return the pixels with the noise that the residuals show on either side.
 
     The variance goes straight from that of the dark side to that of the bright one, as the noise
     of the light does.
@@ -407,7 +414,7 @@ def _response(model: PSFModel, values: Array, line: EdgeLine, edge: EdgePixels) 
 def _response_along(
     model: PSFModel, values: tuple[float, ...], normal: float, footprint: float, reach: float
 ) -> EdgeResponse:
-    """Edge response of a model; the residuals and their derivative ask for the same one."""
+    """Return the edge response of a model; residuals and their derivative need the same one."""
     return edge_response(
         lambda frequency: model.transfer(np.array(values), frequency, normal),
         normal,
@@ -417,7 +424,7 @@ def _response_along(
 
 
 def _straight_line(x: Array, y: Array, sigma: Array) -> tuple[float, float]:
-    """Value at x = 0 and slope of the straight line through points, by least squares."""
+    """Return the value at x = 0 and slope of the straight line through points, by least squares."""
     weight = sigma**-2.0
     middle = float(weight @ x / weight.sum()), float(weight @ y / weight.sum())
     off = x - middle[0]
@@ -426,7 +433,7 @@ def _straight_line(x: Array, y: Array, sigma: Array) -> tuple[float, float]:
 
 
 def orientations(edges: Sequence[EdgePixels]) -> list[float]:
-    """Directions of the edges' normals, 0 to π, of which none is within 10 degrees of another."""
+    """Return the directions of the edges' normals, 0 to π, at least 10 degrees apart."""
     found: list[float] = []
     for edge in edges:
         direction = edge.line.normal % pi

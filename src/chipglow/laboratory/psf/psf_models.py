@@ -46,26 +46,26 @@ class PSFModel(ABC):
 
     @abstractmethod
     def starts(self, fwhm: float) -> list[list[float]]:
-        """Initial parameters of a fit, for about this full width at half maximum in m."""
+        """Return initial parameters of fits for about this full width at half maximum in m."""
 
     @abstractmethod
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        """Smallest and largest parameters, for a pitch and an extent of the image in m."""
+        """Return the smallest and largest parameters for a pitch and an image's extent in m."""
 
     @abstractmethod
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """Optical transfer function at frequencies in 1/m along an angle in rad."""
+        """Return the optical transfer function at frequencies in 1/m along an angle in rad."""
 
     def density(self, values: Array, x: Array, y: Array) -> Array:
-        """Light per area, up to a factor, at positions in m from the middle."""
+        """Return the light per area, up to a factor, at positions in m from the middle."""
         raise NotImplementedError
 
     def sampling(self, values: Array) -> tuple[float, float]:
-        """Distance up to which the kernel reaches, and its spacing, in m."""
+        """Return the distance up to which the kernel reaches, and its spacing, in m."""
         raise NotImplementedError
 
     def fwhm(self, values: Array) -> float:
-        """Full width at half maximum of the optics' point spread function in m."""
+        """Return the full width at half maximum of the optics' point spread function in m."""
         zero = np.zeros(())
         half = float(self.density(values, zero, zero)) / 2
         reach, _ = self.sampling(values)
@@ -74,22 +74,18 @@ class PSFModel(ABC):
         )
 
     def psf(self, values: Array) -> PointSpreadFunction:
-        """The optics' point spread function, for a camera of order ``optics``."""
+        """Return the optics' point spread function, for a camera of order ``optics``."""
         return MeasuredPSF(
             *sampled_kernel(lambda x, y: self.density(values, x, y), *self.sampling(values))
         )
 
     def mean_transfer(self, values: Array, frequency: Array) -> Array:
-        """Mean of the transfer function over all directions."""
+        """Return the mean of the transfer function over all directions."""
         return self.transfer(values, frequency, 0.0)
-
-    def scales(self, pitch: float) -> Array:
-        """Size of a step of 1 in a fit, for each parameter."""
-        return np.array([pitch if is_length(name) else 1.0 for name in self.parameters])
 
 
 def is_length(parameter: str) -> bool:
-    """Whether a parameter of a model is a length in m, by its name."""
+    """Return whether a parameter of a model is a length in m, by its name."""
     return any(word in parameter for word in _LENGTHS)
 
 
@@ -172,7 +168,7 @@ class AnnularModel(PSFModel):
         return [max(1e-4, 0.4 * self.wavelength / extent), 0.0], [1.0, 0.81]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """Area that the pupil shares with itself when shifted (O'Neill, 1956), over its own."""
+        """Return the area that the pupil shares with itself when shifted (O'Neill, 1956)."""
         inner = sqrt(max(values[1], 0.0))
         shift = frequency * self.wavelength / values[0]
         shared = _lens(1.0, 1.0, shift) - 2 * _lens(1.0, inner, shift) + _lens(inner, inner, shift)
@@ -224,13 +220,13 @@ class MoffatModel(PSFModel):
         return float(values[0])
 
     def _radius(self, values: Array) -> float:
-        """The length a in m."""
+        """Return the length a in m."""
         return float(values[0]) / (2 * sqrt(2 ** (1 / float(values[1])) - 1))
 
 
 @lru_cache(maxsize=4)
 def _moffat_curve(order: float) -> CubicSpline:
-    """Moffat's transform over the logarithm; Bessel's function is slow, and smooth over it."""
+    """Return Moffat's transform over the logarithm, over which it is smooth."""
     bessel = kve(order, _MOFFAT_NODES) * np.exp(-_MOFFAT_NODES)
     nodes = 2 * (_MOFFAT_NODES / 2) ** order * bessel / gamma(order)
     return CubicSpline(np.log(_MOFFAT_NODES), nodes)
@@ -257,7 +253,7 @@ class DefocusedDiscModel(PSFModel):
         return disc_transfer(values[0] / 2 * frequency) * _gaussian_transfer(values[1], frequency)
 
     def density(self, values: Array, x: Array, y: Array) -> Array:
-        """Light of the disc that the blur puts on a point: the noncentral chi-squared."""
+        """Return the light that the blur puts on a point: the noncentral chi-squared."""
         disc, sigma, radius = values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y)
         if disc > _EVEN_DISC * sigma:
             return np.asarray(ndtr((disc - radius) / sigma))
@@ -301,7 +297,7 @@ class EllipticalModel(PSFModel):
         )
 
     def fwhm(self, values: Array) -> float:
-        """Geometric mean of the two widths along the ellipse's axes in m."""
+        """Return the geometric mean of the two widths along the ellipse's axes in m."""
         return sqrt(sqrt(float(np.linalg.det(self._squares(values)))))
 
     def density(self, values: Array, x: Array, y: Array) -> Array:
@@ -331,7 +327,7 @@ class EdgeResponse:
     """
 
     def __call__(self, distance: Array) -> Array:
-        """Edge-spread function at distances in m (Hermite's cubic); beyond the samples the last."""
+        """Return the edge-spread function at distances in m (Hermite's cubic)."""
         k, t = self._place(distance)
         rise = self.edge[k + 1] - self.edge[k]
         first, last = self.spacing * self.line[k], self.spacing * self.line[k + 1]
@@ -339,12 +335,12 @@ class EdgeResponse:
         return self.edge[k] + t * (first + t * (bend + t * twist))
 
     def slope(self, distance: Array) -> Array:
-        """Line-spread function at distances in m, in 1/m, by straight lines."""
+        """Return the line-spread function at distances in m, in 1/m, by straight lines."""
         k, t = self._place(distance)
         return self.line[k] + t * (self.line[k + 1] - self.line[k])
 
     def _place(self, distance: Array) -> tuple[NDArray[np.int64], Array]:
-        """Sample before each distance, and how far on the way to the next one it is."""
+        """Return the sample before each distance, and how far on the way to the next one it is."""
         last = self.edge.size - 1
         place = np.clip(np.asarray(distance) / self.spacing + last // 2, 0.0, last)
         before = np.minimum(place.astype(np.int64), last - 1)
@@ -357,7 +353,7 @@ def edge_response(
     footprint: float,
     reach: float,
 ) -> EdgeResponse:
-    """Edge-spread function of optics and pixel."""
+    """Return the edge-spread function of optics and pixel."""
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
     frequency, square = _footprint_along(count, step, angle, footprint)
@@ -375,24 +371,23 @@ def edge_response(
 def _footprint_along(
     count: int, step: float, angle: float, footprint: float
 ) -> tuple[Array, Array]:
-    """Frequencies of samples at a distance, and the footprint's transfer function there."""
+    """Return the frequencies of samples, and the footprint's transfer function there."""
     frequency = np.arange(count // 2 + 1, dtype=np.float64) / (count * step)
     return frequency, footprint_transfer(frequency, angle, footprint)
 
 
 def footprint_transfer(frequency: Array, angle: float, footprint: float) -> Array:
-    """Transfer function of a square pixel along a direction; shapes and units as above."""
+    """Return the transfer function of a square pixel at frequencies along a direction."""
     across, down = footprint * cos(angle), footprint * sin(angle)
     return np.sinc(frequency * across) * np.sinc(frequency * down)
 
 
 def disc_response(frequency: Array, diameter: float, radii: Array, footprint: float) -> Array:
-    """Weights that make of a transfer function the signal in the middle of a bright disc."""
+    """Return weights by which a transfer function gives the signal in the middle of a disc."""
     radius = diameter / 2
-    angles = ((np.arange(12) + 0.5) * pi / 24).tolist()
     square = np.zeros_like(frequency)
-    for angle in angles:
-        square += footprint_transfer(frequency, angle, footprint) / len(angles)
+    for angle in ((np.arange(12) + 0.5) * pi / 24).tolist():
+        square += footprint_transfer(frequency, angle, footprint) / 12
     middle = np.mean([j0(2 * pi * frequency * rho) for rho in radii.tolist()], axis=0)
     weight = 2 * pi * radius * j1(2 * pi * frequency * radius) * middle * square
     step = float(frequency[1])
@@ -407,7 +402,7 @@ def sampled_kernel(
     reach: float,
     spacing: float,
 ) -> tuple[Array, float]:
-    """Kernel of a density over the plane, integrated over squares, and their side in m."""
+    """Return the kernel of a density, integrated over squares, and their side in m."""
     spacing = max(spacing, 2 * reach / (_MOST_SIDE - 1))
     half = ceil(reach / spacing)
     node, weight = np.polynomial.legendre.leggauss(_KERNEL_NODES)
@@ -421,7 +416,7 @@ def sampled_kernel(
 
 
 def disc_transfer(cycles: Array) -> Array:
-    """Transfer function of an even disc over frequency times radius."""
+    """Return the transfer function of an even disc over frequency times radius."""
     argument = 2 * pi * cycles
     safe = np.where(argument == 0.0, 1.0, argument)
     return np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
@@ -433,7 +428,7 @@ def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
 
 
 def _lens(large: float, small: float, distance: Array) -> Array:
-    """Area that two discs of these radii share, their middles at a distance."""
+    """Return the area that two discs of these radii share, their middles at a distance."""
     if small == 0.0:
         return np.zeros_like(distance)
     apart = np.clip(distance, large - small, large + small)

@@ -41,7 +41,7 @@ _REPEATS: Final = 24
 
 
 def psf_cause(name: str, content: Array, errors: int) -> Cause:
-    """A cause of errors of one point spread function, the same in another run."""
+    """Return a cause of errors of one point spread function, the same in another run."""
     return Cause(name, hashlib.sha256(content.tobytes()).hexdigest()[:16], errors)
 
 
@@ -89,7 +89,7 @@ class RadialPSF:
         return self.estimate.linear(np.tri(self.edges.size, self.fractions.size, -1))
 
     def psf(self) -> MeasuredPSF:
-        """The kernel with its uncertainty, straight lines between the rings' middles."""
+        """Return the kernel with its uncertainty, straight lines between the rings' middles."""
         kernel, spacing = self._kernel(self.fractions)
         (found,) = self.estimate.components
         directions, sizes, _ = np.linalg.svd(found.effects, full_matrices=False)
@@ -100,11 +100,11 @@ class RadialPSF:
         return MeasuredPSF(kernel, spacing, (Component(cause, effects),))
 
     def model_psf(self) -> MeasuredPSF:
-        """The same kernel of the best model: with what the rings are too coarse for."""
+        """Return the same kernel of the best model: with what the rings are too coarse for."""
         return MeasuredPSF(*self._kernel(self.model))
 
     def _kernel(self, fractions: Array) -> tuple[Array, float]:
-        """Kernel of light that is shared among the rings so, and its spacing in m."""
+        """Return the kernel of light that is shared among the rings so, and its spacing in m."""
         radius, density = self.radius, fractions / np.diff(self.edges**2)
 
         def at(x: Array, y: Array) -> Array:
@@ -155,7 +155,7 @@ def radial_psf(
 
 
 def _ring_width(edges: Array, fractions: Array) -> float:
-    """Twice the largest radius in m with half of the largest density, by straight lines."""
+    """Return twice the largest radius in m with half of the largest density."""
     radius, density = (edges[1:] + edges[:-1]) / 2, fractions / np.diff(edges**2)
     half = density.max() / 2
     last = int(np.flatnonzero(density >= half)[-1])
@@ -166,7 +166,7 @@ def _ring_width(edges: Array, fractions: Array) -> float:
 
 
 def _drawn(fit: ModelFit, edges: Sequence[EdgePixels], generator: np.random.Generator) -> Array:
-    """Parameters of the model as other noise would have given them, shape (repeat, parameter)."""
+    """Draw the model's parameters as of other noise, shape (repeat, parameter)."""
     values, vectors = np.linalg.eigh(fit.covariance)
     spread = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = fit.values + generator.standard_normal((_REPEATS, values.size)) @ spread.T
@@ -175,14 +175,14 @@ def _drawn(fit: ModelFit, edges: Sequence[EdgePixels], generator: np.random.Gene
 
 
 def _effects(values: Array) -> Array:
-    """What the repeats (from row 2 on) and the rougher solution (row 1) change, (value, error)."""
+    """Return what the repeats (rows 2 on) and the rougher solution (row 1) change."""
     repeats = values[2:]
     away = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
     return np.concatenate([[values[1] - values[0]], away]).T.copy()
 
 
 def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> Array:
-    """Limits of the rings: even in the core, in proportion to the radius beyond."""
+    """Return the limits of the rings: even in the core, in proportion to the radius beyond."""
     core = _core(fit, edges)
     last = 0.8 * min(edge.reach for edge in edges)
     return core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1))
@@ -199,7 +199,7 @@ def _rows(
     apertures: ApertureSignals | None,
     radii: Array,
 ) -> tuple[Array, Array]:
-    """Design, and what the model leaves of the data, over the noise, of bins and apertures."""
+    """Return the design and the model's residuals of bins and apertures, over the noise."""
     rows, data = [], []
     for found, pixels, one in zip(fit.edges, edges, curves, strict=True):
         uncertainty = one["esf_uncertainty"].values
@@ -225,7 +225,7 @@ def _rows(
 
 
 def _ring_transfer(radii: Array, k: int, frequency: Array) -> Array:
-    """Transfer function of an even ring."""
+    """Return the transfer function of an even ring."""
     inner, outer = radii[k], radii[k + 1]
     whole = outer**2 * disc_transfer(frequency * outer) - inner**2 * disc_transfer(
         frequency * inner
@@ -234,7 +234,7 @@ def _ring_transfer(radii: Array, k: int, frequency: Array) -> Array:
 
 
 def _penalty(radii: Array, width: float) -> Array:
-    """Second differences from ring to ring; beyond the last one there is nothing.
+    """Return the second differences from ring to ring; beyond the last one there is nothing.
 
     They are those of the density in the core, which is flat there, and of the density times the
     square of the radius in the tails, in which the density alone would be too small to be smoothed.
@@ -246,7 +246,7 @@ def _penalty(radii: Array, width: float) -> Array:
 
 
 def _shares_by(fit: ModelFit, radii: Array) -> Callable[[Array], Array]:
-    """What gives the fraction of a model's light in each ring by the model's parameters."""
+    """Return a function of a model's parameters for its light in each ring."""
     frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
     middle = np.zeros(1)
     encircled = np.array(
@@ -267,7 +267,7 @@ def _solved(design: Array, data: Array, penalty: Array, model: Array) -> Array:
 
 
 def _criterion(design: Array, data: Array, penalty: Array, fractions: Array) -> float:
-    """Squared residuals, and twice the trace of what makes fitted data of data."""
+    """Return squared residuals plus twice the trace of the smoother."""
     left = data - design @ fractions
     free = fractions > 0
     normal = design[:, free].T @ design[:, free]

@@ -35,7 +35,7 @@ class ApertureImage:
 
 
 def aperture_image(measurement: Measurement, diameter: float, name: str) -> ApertureImage:
-    """The mean of a measurement's frames as an image of an aperture."""
+    """Return the mean of a measurement's frames as an image of an aperture."""
     usable = (np.bitwise_or.reduce(measurement.flags, axis=0) & (UNUSABLE | Flag.REPLACED)) == 0
     radiance = np.where(usable, measurement.radiance.mean(axis=0), np.nan)
     raster = measurement.raster
@@ -43,7 +43,7 @@ def aperture_image(measurement: Measurement, diameter: float, name: str) -> Aper
 
 
 def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
-    """What the middle pixels of apertures read.
+    """Read the middle pixels of apertures.
 
     The middle is the centroid of what is brighter than half; the signal is the mean of the pixels
     within a pitch of it, whose distances from the middle are kept.
@@ -53,29 +53,19 @@ def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> Apert
             f"apertures: {len(images)} images of {len({i.diameter for i in images})} diameters, "
             f"expected {_LEAST_APERTURES} diameters or more"
         )
-    read = [_middle(image) for image in images]
+    signals, sigmas, radii, outside = zip(*map(_middle, images), strict=True)
     return ApertureSignals(
         np.array([image.diameter for image in images]),
-        np.array([middle.signal for middle in read]),
-        np.array([middle.sigma for middle in read]),
-        tuple(middle.radii for middle in read),
+        np.array(signals),
+        np.array(sigmas),
+        radii,
         footprint,
-        min(middle.outside for middle in read),
+        min(outside),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Middle:
-    """Signal of the centre pixels, its uncertainty, their distances, and the surroundings."""
-
-    signal: float
-    sigma: float
-    radii: Array
-    outside: float
-
-
-def _middle(image: ApertureImage) -> _Middle:
-    """Find the middle of an aperture and read it."""
+def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
+    """Return signal, uncertainty and distances of the middle pixels, and the surroundings."""
     known = np.isfinite(image.radiance)
     if not known.any():
         raise ValueError(f"{image.name}: no usable pixel, expected an aperture")
@@ -110,11 +100,11 @@ def _middle(image: ApertureImage) -> _Middle:
     number = int(inner.sum())
     signal = float(image.radiance[inner].mean())
     least = 1e-7 * float(high - low)
-    return _Middle(signal, max(sigma / number**0.5, least), away[inner], outside)
+    return signal, max(sigma / number**0.5, least), away[inner], outside
 
 
 def _noise(radiance: Array, outside: NDArray[np.bool_]) -> float:
-    """Noise of a pixel in W/(m² sr), from the differences of neighbours outside the aperture."""
+    """Return the noise of a pixel in W/(m² sr), from differences of neighbours outside."""
     pairs = outside[:, 1:] & outside[:, :-1]
     if pairs.sum() < _FEWEST_OUTSIDE:
         pairs = np.isfinite(radiance[:, 1:]) & np.isfinite(radiance[:, :-1])

@@ -12,7 +12,7 @@ from chipglow.quantities import uncertain_text
 
 
 def sentences(found: KnifeEdge) -> list[str]:
-    """The result, and how to use it."""
+    """Return the result, and how to use it."""
     width = uncertain_text(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
     lines = [
         f"The optics' point spread function is {width} um wide (full width at half maximum, with "
@@ -25,7 +25,7 @@ def sentences(found: KnifeEdge) -> list[str]:
 
 
 def study_section(found: KnifeEdge) -> str | None:
-    """The best model as a study's camera section takes it; None if only a file can hold it."""
+    """Return the best model as a study's camera section; None if only a file can hold it."""
     psf = found.psf()
     if isinstance(psf, GaussianPSF):
         return f"{{kind: gaussian, fwhm: {psf.fwhm * 1e6:.4g} um}}"
@@ -50,7 +50,7 @@ def _parameters(fit: ModelFit) -> str:
 
 
 def _directions(found: KnifeEdge) -> list[str]:
-    """Whether edges of several orientations agree."""
+    """Return whether edges of several orientations agree."""
     if len(found.edges) < 2:
         return []
     widths = np.array([edge.fwhm for edge in found.edges])

@@ -34,7 +34,7 @@ class Arrangement:
     """How far from the image's border, in pixels, a dot is surely found."""
 
     def shows(self, pixels: Array) -> int:
-        """How many of these places are within the image's margin."""
+        """Return how many of these places are within the image's margin."""
         last = np.array([self.shape[1] - 1.0, self.shape[0] - 1.0]) - self.margin
         return int(((pixels > self.margin) & (pixels < last)).all(axis=1).sum())
 
@@ -101,7 +101,7 @@ class _Placement:
 def _rivals(
     best: _Placement, judged: list[_Placement], first: Array, spacing: float
 ) -> tuple[str, ...]:
-    """A warning for the best other placement that hardly more speaks against."""
+    """Return a warning for the best other placement that hardly more speaks against."""
     others = [
         other
         for other in judged
@@ -125,7 +125,7 @@ def _hypotheses(
     tree: KDTree,
     spacing: float,
 ) -> list[Array]:
-    """Similarities that put a pair of neighbours on another, most matches first: (2, 3) each."""
+    """Return similarities (2, 3) that put a pair of neighbours on another, the best first."""
     middle = np.argsort(np.hypot(*(first - np.median(first, axis=0)).T))[:_BASES]
     near = KDTree(first).query(first[middle], min(_NEAREST + 1, len(first)))[1][:, 1:]
     a = np.repeat(middle, near.shape[1])
@@ -162,7 +162,7 @@ def _distinct(matrices: list[Array], first: Array, spacing: float) -> list[Array
 def _fitted(
     matrix: Array, first: Array, tree: KDTree, spacing: float
 ) -> tuple[Array, NDArray[np.int64]] | None:
-    """Affine map of the matches near a placement, and these: (2, n)."""
+    """Return the affine map of the matches near a placement, and these: (2, n)."""
     whole = np.column_stack([first, np.ones(len(first))])
     pairs = _pairs(whole @ matrix.T, tree, spacing)
     for _ in range(_ROUNDS):
@@ -176,7 +176,7 @@ def _fitted(
 
 
 def _pairs(placed: Array, tree: KDTree, spacing: float) -> NDArray[np.int64]:
-    """Dots that are each other's nearest and near, shape (2, n)."""
+    """Return dots that are each other's nearest and near, shape (2, n)."""
     distance, which = tree.query(placed)
     back = KDTree(placed).query(tree.data)[1]
     mutual = (distance < _NEAR * spacing) & (back[which] == np.arange(len(placed)))
@@ -189,7 +189,7 @@ def _contradictions(
     second: Arrangement,
     pairs: NDArray[np.int64],
 ) -> int:
-    """Number of dots that the other image should show and does not."""
+    """Return the number of dots that the other image should show and does not."""
     linear, shift = matrix[:, :2], matrix[:, 2]
     there = np.delete(first.pixels, pairs[0], axis=0) @ linear.T + shift
     back = np.linalg.solve(linear, (np.delete(second.pixels, pairs[1], axis=0) - shift).T).T
@@ -197,6 +197,6 @@ def _contradictions(
 
 
 def _distance(one: Array, other: Array, places: Array) -> float:
-    """Median distance of where two maps put places."""
+    """Return the median distance of where two maps put places."""
     apart = places @ (one - other)[:, :2].T + (one - other)[:, 2]
     return float(np.median(np.hypot(apart[:, 0], apart[:, 1])))

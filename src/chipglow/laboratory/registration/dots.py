@@ -155,7 +155,7 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
 
 
 def _strengths(image: Array) -> tuple[Array, Array]:
-    """Sizes in pixels, and the normalised Laplacian of each, shape (size, y, x)."""
+    """Return the sizes in pixels, and the normalised Laplacian of each, shape (size, y, x)."""
     count = int(np.log(min(image.shape) * _GREATEST_SIZE / _LEAST_SIZE) / np.log(_NEXT_SIZE))
     sizes = _LEAST_SIZE * _NEXT_SIZE ** np.arange(max(count, 1) + 1)
     found = [size**2 * gaussian_laplace(image, size) for size in sizes]
@@ -163,7 +163,7 @@ def _strengths(image: Array) -> tuple[Array, Array]:
 
 
 def _blobs(image: Array, sizes: Array, strength: Array) -> Array:
-    """Column, row, size and strength of the strongest round extrema, shape (n, 4)."""
+    """Return column, row, size and strength of the strongest round extrema, shape (n, 4)."""
     level, row, column = np.nonzero((strength == maximum_filter(strength, 3)) & (strength > 0))
     size, found = sizes[level], strength[level, row, column]
     room = np.minimum.reduce(
@@ -176,7 +176,7 @@ def _blobs(image: Array, sizes: Array, strength: Array) -> Array:
 
 
 def _apart(blobs: Array) -> Array:
-    """Blobs in order of strength, without those that lie on a stronger one."""
+    """Return the blobs in order of strength, without those that lie on a stronger one."""
     left, kept = blobs, []
     while len(left):
         kept.append(left[0])
@@ -185,7 +185,7 @@ def _apart(blobs: Array) -> Array:
 
 
 def _roundness(image: Array, blobs: Array) -> Array:
-    """Determinant of the Hessian over that of a circle with the same trace: 1 if round."""
+    """Return the determinant of the Hessian over that of a circle of the same trace."""
     found = np.zeros(len(blobs))
     for size in np.unique(blobs[:, 2]):
         here = blobs[:, 2] == size
@@ -198,12 +198,12 @@ def _roundness(image: Array, blobs: Array) -> Array:
 
 
 def _weight(blobs: Array) -> float:
-    """Squares of the strength, of which many small blobs of noise have less than some of dots."""
+    """Return the weight of blobs: many small ones of noise have less than some of dots."""
     return float((blobs[:, 3] ** 2 * blobs[:, 2]).sum())
 
 
 def _alike(blobs: Array) -> Array:
-    """The group of like size and strength with the largest weight."""
+    """Return the group of like size and strength with the largest weight."""
     best = blobs[:0]
     for size, strength in blobs[:, 2:].tolist():
         alike = np.abs(np.log(blobs[:, 2] / size)) < np.log(_ALIKE_SIZE)
@@ -227,13 +227,13 @@ class _Disc:
     residual: Array
 
     def brightness(self, columns: Array, rows: Array) -> Array:
-        """Over that of the ground."""
+        """Return the brightness over that of the ground."""
         distance = np.hypot(columns - self.column, rows - self.row)
         return np.asarray(self.contrast * erfc((distance - self.radius) / self.softness) / 2)
 
 
 def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
-    """Discs of like radius at blobs, fitted again without the skirts of their neighbours."""
+    """Return discs of like radius at blobs, fitted again without their neighbours' skirts."""
     first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
     discs = _like(first, bright)
     for _ in range(_AGAIN):
@@ -246,7 +246,7 @@ def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -
 
 
 def _settled(before: list[_Disc], discs: list[_Disc]) -> bool:
-    """Whether no middle moved by much of its uncertainty."""
+    """Return whether no middle moved by much of its uncertainty."""
     moves = [
         max(abs(new.column - old.column), abs(new.row - old.row)) / new.unsure
         for old, new in zip(before, discs, strict=False)
@@ -255,7 +255,7 @@ def _settled(before: list[_Disc], discs: list[_Disc]) -> bool:
 
 
 def _without(image: Array, discs: list[_Disc]) -> Array:
-    """An image without the discs."""
+    """Return an image without the discs."""
     rest = image.copy()
     for disc in discs:
         reach = disc.radius + 3 * disc.softness
@@ -267,7 +267,7 @@ def _without(image: Array, discs: list[_Disc]) -> Array:
 def _window(
     shape: tuple[int, ...], column: float, row: float, reach: float
 ) -> tuple[tuple[slice, slice], Array, Array]:
-    """The part of an image round a place, and its columns and rows."""
+    """Return the part of an image round a place, and its columns and rows."""
     part = (
         slice(max(round(row - reach), 0), min(round(row + reach) + 1, shape[0])),
         slice(max(round(column - reach), 0), min(round(column + reach) + 1, shape[1])),
@@ -277,7 +277,7 @@ def _window(
 
 
 def _like(found: list[_Disc | None], bright: bool) -> list[_Disc]:
-    """Those whose radius is like the others', and which are bright or dark as they should be."""
+    """Return the discs whose radius is like the others' and whose contrast has the right sign."""
     discs = [disc for disc in found if disc is not None and (disc.contrast > 0) == bright]
     likely = float(np.median([disc.radius for disc in discs])) if discs else 0.0
     return [d for d in discs if likely / _ALIKE_SIZE < d.radius < _ALIKE_SIZE * likely]
@@ -291,7 +291,7 @@ def _disc(
     size: float,
     own: _Disc | None = None,
 ) -> _Disc | None:
-    """The disc near a place in an image from which its own brightness was taken, if given."""
+    """Fit the disc near a place; its own brightness, if given, was taken from the image."""
     reach = max(_WINDOW * size, _LEAST_WINDOW)
     part, columns, rows = _window(image.shape, column, row, reach)
     used = (np.hypot(columns - column, rows - row) <= reach) & known[part]
@@ -330,7 +330,7 @@ def _disc(
 
 
 def _correlation(discs: list[_Disc]) -> float:
-    """How much more uncertain a middle is as the residuals of neighbours are alike, 1 or more.
+    """Return the factor on the uncertainty by which neighbours' residuals are alike.
 
     Newey and West's sum of their correlations up to eight pixels away, over all discs.
     """
@@ -344,7 +344,7 @@ def _correlation(discs: list[_Disc]) -> float:
 
 
 def _systematic(found: Registration, raster: Raster) -> Array:
-    """Covariance of shift, turn and scale that are a little wrong in the same way for all dots."""
+    """Return the covariance of shift, turn and scale that all dots have wrong in common."""
     left, right, bottom, top = raster.extent
     middle = np.array([(left + right) / 2, (bottom + top) / 2])
     pixels = _SYSTEMATIC * raster.spacing * np.sqrt(abs(np.linalg.det(found.jacobian(middle))))

@@ -64,7 +64,7 @@ def blink_pictures(
     visible: NDArray[Any],
     tool: Tool | None = None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Visible picture, and the infrared image as the visible camera would have it.
+    """Return the visible picture, and the infrared image as the visible camera would have it.
 
     Parameters are those of `draw_registration`.
     """

@@ -45,7 +45,7 @@ class RegistrationDescription(Part):
         self.build()
 
     def build(self) -> Registration:
-        """The registration."""
+        """Return the registration."""
         for name, rows in (("matrix", self.matrix), ("covariance", self.covariance)):
             if len({len(row) for row in rows}) != 1:
                 raise ValueError(f"{name}: expected rows of one length")

@@ -59,7 +59,7 @@ def _frames(path: Path) -> NDArray[np.float32]:
 
 
 def _brightness(page: Image.Image) -> NDArray[np.float32]:
-    """Pages of one channel as they are, with 16 bits or more too; others as luminance."""
+    """Return a page of one channel as it is, another one as luminance."""
     one = page.mode in ("1", "L", "I", "F") or page.mode.startswith("I;")
     return np.asarray(page if one else page.convert("L"), np.float32)
 

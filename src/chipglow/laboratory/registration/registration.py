@@ -79,33 +79,33 @@ class Registration:
             )
 
     def pixels(self, positions: ArrayLike) -> Array:
-        """Column and row in the visible picture of positions x, y in m, shape (..., 2)."""
+        """Return columns and rows in the visible picture of positions x, y in m, (..., 2)."""
         return mapped_places(self.matrix, np.asarray(positions, np.float64))
 
     def positions(self, pixels: ArrayLike) -> Array:
-        """Position x, y in m of columns and rows of the visible picture, shape (..., 2)."""
+        """Return positions x, y in m of columns and rows of the visible picture, (..., 2)."""
         back = np.asarray(np.linalg.inv(self.matrix), np.float64)
         return mapped_places(back, np.asarray(pixels, np.float64))
 
     def pixel_covariance(self, positions: ArrayLike) -> Array:
-        """Covariance of `pixels` in pixels², shape (..., 2, 2)."""
+        """Return the covariance of `pixels` in pixels², shape (..., 2, 2)."""
         slope = element_slopes(self.matrix, np.asarray(positions, np.float64))
         return slope @ self.covariance @ np.swapaxes(slope, -1, -2)
 
     def position_covariance(self, positions: ArrayLike) -> Array:
-        """Covariance in m² of the position that is found for the pixel of each position."""
+        """Return the covariance in m² of the position found for the pixel of each position."""
         back = np.linalg.inv(self.jacobian(positions))
         return back @ self.pixel_covariance(positions) @ np.swapaxes(back, -1, -2)
 
     def jacobian(self, positions: ArrayLike) -> Array:
-        """Pixels per m at positions: derivative of column and row by x and y, (..., 2, 2)."""
+        """Return the derivative of column and row by x and y at positions, (..., 2, 2)."""
         places = np.asarray(positions, np.float64)
         depth = _depth(self.matrix, places)[..., None, None]
         pixels = self.pixels(places)[..., None]
         return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
-        """Standard uncertainty of a mapped position in m: median and largest over an image.
+        """Return median and largest standard uncertainty of a mapped position in m.
 
         It is the root of the sum of the variances along x and y.
         """
@@ -115,7 +115,7 @@ class Registration:
         return float(np.median(found)), float(found.max())
 
     def geometry(self, raster: Raster) -> Geometry:
-        """Size and turn of the visible picture in the middle of an infrared image."""
+        """Return the size and turn of the visible picture in the middle of an infrared image."""
         left, right, bottom, top = raster.extent
         slope = self.jacobian(np.array([(left + right) / 2, (bottom + top) / 2]))
         area = float(np.linalg.det(slope))
@@ -123,7 +123,7 @@ class Registration:
         return Geometry(1 / float(np.sqrt(abs(area))), turn, area > 0)
 
     def warp(self, image: NDArray[np.floating], raster: Raster, shape: tuple[int, int]) -> Array:
-        """An infrared image as the visible camera would have it."""
+        """Return an infrared image as the visible camera would have it."""
         rows, columns = np.indices(shape)
         place = self.positions(np.stack([columns, rows], axis=-1))
         column = np.floor((place[..., 0] - raster.left) / raster.spacing)
@@ -150,7 +150,7 @@ class PointFit:
     """The points: x and y in m, and column and row in the visible picture, each of shape (n, 2)."""
 
     def to_frame(self) -> pd.DataFrame:
-        """Every point; one row each."""
+        """Return a table of the points."""
         return pd.DataFrame(
             {
                 "point": np.arange(1, len(self.positions) + 1),
@@ -248,7 +248,7 @@ class NormalisedFrame:
 
     @classmethod
     def around(cls, positions: Array, pixels: Array) -> "NormalisedFrame":
-        """The middle of points, and their distance from it, in both images."""
+        """Return the middle of points, and their distance from it, in both images."""
         centre, pixel_centre = positions.mean(axis=0), pixels.mean(axis=0)
         spreads = (
             float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
@@ -258,15 +258,15 @@ class NormalisedFrame:
         return cls(centre, scale, pixel_centre, pixel_scale)
 
     def unit(self, positions: Array) -> Array:
-        """Positions in these coordinates."""
+        """Return positions in these coordinates."""
         return (positions - self.centre) / self.scale * [1.0, -1.0]
 
     def unit_pixels(self, pixels: Array) -> Array:
-        """Columns and rows in these coordinates."""
+        """Return columns and rows in these coordinates."""
         return (pixels - self.pixel_centre) / self.pixel_scale
 
     def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
-        """A matrix in these coordinates, and its covariance, for m and pixels."""
+        """Return a matrix in these coordinates, and its covariance, for m and pixels."""
         before, after = self._sides()
         whole = after @ matrix @ before
         slope = np.kron(after, before.T)
@@ -286,7 +286,7 @@ class NormalisedFrame:
 
 
 def parameter_basis(model: Model, mirrored: bool) -> Array:
-    """Elements of a matrix by the parameters of a model, shape (9, parameters).
+    """Return the elements of a matrix by the parameters of a model, shape (9, parameters).
 
     The matrix is this times the parameters, and 1 for its last element.
     """
@@ -303,7 +303,7 @@ def parameter_basis(model: Model, mirrored: bool) -> Array:
 def _least(
     found: Array, target: Array, model: Model, mirrored: bool
 ) -> tuple[Array, Array, Array, Array]:
-    """Basis, residuals, their slopes and the matrix of the least squares."""
+    """Return basis, residuals, their slopes and the matrix of the least squares."""
     basis, last = parameter_basis(model, mirrored), np.eye(3)[2]
 
     def matrix_of(parameters: Array) -> Array:
@@ -327,7 +327,7 @@ def _linear(found: Array, target: Array, basis: Array) -> Array:
 
 
 def _direct(found: Array, target: Array) -> Array:
-    """The direct linear solution of a homography: the least singular vector."""
+    """Return the direct linear solution of a homography: the least singular vector."""
     whole = np.concatenate([found, np.ones((len(found), 1))], axis=1)
     none = np.zeros_like(whole)
     rows = np.concatenate(
@@ -373,7 +373,7 @@ def _orientations(model: Model) -> tuple[bool, ...]:
 
 
 def _misplaced(residual: Array, hat: Array, variance: float, freedom: int) -> NDArray[np.bool_]:
-    """The F test of every point against the scatter of the others, 1 % over all points."""
+    """Do the F test of every point against the scatter of the others, 1 % over all points."""
     count = residual.size // 2
     if freedom <= 2 or variance <= _EXACT**2:
         return np.zeros(count, np.bool_)
@@ -392,12 +392,12 @@ def _depth(matrix: Array, places: Array) -> Array:
 
 
 def mapped_places(matrix: Array, places: Array) -> Array:
-    """What a matrix makes of places, shape (..., 2)."""
+    """Return what a matrix makes of places, shape (..., 2)."""
     return (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
 
 
 def element_slopes(matrix: Array, places: Array) -> Array:
-    """Derivative of what a matrix maps places to by its elements, shape (..., 2, 9)."""
+    """Return the derivative of what a matrix maps places to by its elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]
     mapped = mapped_places(matrix, places)

@@ -49,11 +49,11 @@ class TimeAlignment:
     """Why it cannot be trusted, a sentence each."""
 
     def visible_time(self, infrared_time: Array) -> Array:
-        """Times of the visible camera's clock in s."""
+        """Return the times of the visible camera's clock in s."""
         return infrared_time + self.offset + self.drift * (infrared_time - self.reference)
 
     def uncertainty(self, infrared_time: Array) -> Array:
-        """Standard uncertainty of `visible_time` in s."""
+        """Return the standard uncertainty of `visible_time` in s."""
         slope = np.stack([np.ones_like(infrared_time), infrared_time - self.reference], axis=-1)
         return np.asarray(np.sqrt(((slope @ self.covariance) * slope).sum(axis=-1)))
 
@@ -121,7 +121,7 @@ def simultaneous_frames(
     visible_times: Array,
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
-    """Visible frames that were exposed within each infrared integration.
+    """Return the visible frames that were exposed within each infrared integration.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def region_signals(
     visible: NDArray[np.generic],
     region: tuple[float, float, float, float],
 ) -> tuple[Array, Array]:
-    """Mean brightness of one region in every frame of both cameras."""
+    """Return the mean brightness of one region in every frame of both cameras."""
     left, bottom, right, top = region
     columns = (raster.x >= left) & (raster.x <= right)
     rows = (raster.y >= bottom) & (raster.y <= top)
@@ -185,7 +185,7 @@ def _check(name: str, times: Array, values: Array) -> None:
 
 
 def _smoothed(signal: Array) -> Array:
-    """Least squares with a penalty on second differences, chosen by cross-validation."""
+    """Smooth by a penalty on second differences, chosen by generalised cross-validation."""
     parts = dct(signal, norm="ortho")
     rough = (2 - 2 * np.cos(np.pi * np.arange(signal.size) / signal.size)) ** 2
 
@@ -204,7 +204,7 @@ def _correlations(
     visible_times: Array,
     spline: CubicSpline,
 ) -> tuple[Array, Array]:
-    """Offsets in s on a grid, and the correlation at each."""
+    """Return offsets in s on a grid, and the correlation at each."""
     step = float(np.median(np.diff(visible_times))) / 3
     low = visible_times[0] - np.quantile(times, 1 - _LEAST_OVERLAP)
     high = visible_times[-1] - np.quantile(times, _LEAST_OVERLAP)
@@ -221,7 +221,7 @@ def _correlations(
 
 
 def _correlation(target: Array, values: Array) -> Array:
-    """Correlation of each row of values with the target where both are known, shape (n,)."""
+    """Return the correlation of each row with the target where both are known, shape (n,)."""
     known = np.isfinite(values)
     count = np.maximum(known.sum(axis=1, keepdims=True), 1)
     one, other = np.where(known, target, 0.0), np.where(known, values, 0.0)
@@ -240,7 +240,7 @@ def _refined(
     begin: float,
     drift: bool,
 ) -> tuple[tuple[float, float], Array, float, float]:
-    """Offset and drift of least squares, their covariance, degrees of freedom, correlation."""
+    """Return offset and drift, their covariance, degrees of freedom and correlation."""
     known = np.isfinite(spline(times + begin))
     times, target = times[known], target[known]
     first, last = float(spline.x[0]), float(spline.x[-1])
@@ -274,7 +274,7 @@ def _refined(
 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
-    """A warning where one of so many offsets would have such a correlation by chance."""
+    """Return a warning where one of so many offsets would have such a correlation by chance."""
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
     if likely < _CHANCE:
@@ -283,7 +283,7 @@ def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]
 
 
 def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> tuple[str, ...]:
-    """A warning for the best other offset that is nearly as likely, beyond the best one's peak."""
+    """Return a warning for another offset beyond the best one's peak that is nearly as likely."""
     squares = correlations**2
     below = squares < squares[best] / 2
     left = np.flatnonzero(below[:best])
@@ -313,7 +313,7 @@ class RecordingAlignment:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every infrared frame; one row each."""
+        """Return a table of the infrared frames."""
         return pd.DataFrame(
             {
                 "infrared_frame": np.arange(self.infrared_times.size),
@@ -350,6 +350,6 @@ def align_recordings(
 
 
 def infrared_radiance(measurement: Measurement, frame: int) -> Array:
-    """Radiance of a frame as `fit_images` and `fit_dots` take it: NaN where a pixel is dead."""
+    """Return the radiance of a frame for `fit_images` and `fit_dots`: NaN where a pixel is dead."""
     dead = measurement.flags[frame] & Flag.DEAD > 0
     return np.where(dead, np.nan, measurement.radiance[frame])
