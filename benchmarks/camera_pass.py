@@ -34,8 +34,16 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from chipglow.analysis import spread_starts
-from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF
-from chipglow.camera.detector import Detector, OperationPoint, PhotonResponse, ReadNoise, ShotNoise
+from chipglow.camera import (
+    AnnularAperturePSF,
+    Camera,
+    Detector,
+    GaussianPSF,
+    OperationPoint,
+    PhotonResponse,
+    ReadNoise,
+    ShotNoise,
+)
 from chipglow.camera.optics.sampling import integrate
 from chipglow.io import SceneWriter, open_scene
 from chipglow.radiometry import spectral_radiance

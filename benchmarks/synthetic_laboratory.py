@@ -40,6 +40,7 @@ from chipglow.camera import (
     FittedCalibration,
     GainPattern,
     GaussianPSF,
+    LinearCalibration,
     MeasuredPSF,
     Measurement,
     OffsetPattern,
@@ -47,7 +48,7 @@ from chipglow.camera import (
     ReadNoise,
     Recording,
     ShotNoise,
-    fit_linear,
+    fit_calibration,
 )
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
@@ -383,7 +384,8 @@ class Evaluation:
             self.folder / "points.csv",
             lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
         )
-        fit = fit_linear(
+        fit = fit_calibration(
+            LinearCalibration,
             points["temperature"],
             points["counts"],
             BAND,

@@ -10,7 +10,13 @@ from matplotlib.collections import PolyCollection
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from typer.testing import CliRunner
 
-from chipglow.camera import CalibrationErrors, Measurement, fit_linear, fit_sakuma_hattori
+from chipglow.camera import (
+    CalibrationErrors,
+    LinearCalibration,
+    Measurement,
+    SakumaHattori,
+    fit_calibration,
+)
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
@@ -61,8 +67,8 @@ def by_sakuma_hattori(counts, offset, a, b, scale):
 # Of counts, of each blackbody and of all of them in K. The form's parameters are so uncertain by
 # themselves that, with errors as of the line, counts are no longer linear in them.
 CAMERAS = {
-    "line": (fit_linear, by_line, (2.0, 0.3, 1.0)),
-    "form": (fit_sakuma_hattori, by_sakuma_hattori, (0.05, 0.008, 0.2)),
+    "line": (LinearCalibration, by_line, (2.0, 0.3, 1.0)),
+    "form": (SakumaHattori, by_sakuma_hattori, (0.05, 0.008, 0.2)),
 }
 
 
@@ -111,11 +117,11 @@ def displaced(points, drawn):
     return moved + np.sin(turn)[..., None] * (across[:, None] * up - along[:, None] * into)
 
 
-@pytest.mark.parametrize(("fitted", "temperature_of", "stated"), CAMERAS.values(), ids=CAMERAS)
-def test_squares_and_band_have_errors_in_common(fitted, temperature_of, stated):
+@pytest.mark.parametrize(("kind", "temperature_of", "stated"), CAMERAS.values(), ids=CAMERAS)
+def test_squares_and_band_have_errors_in_common(kind, temperature_of, stated):
     """Against draws of the calibration's parameters and of the tool's place."""
     generator = np.random.default_rng(7)
-    fit = fitted(BODIES, counts_of(BODIES), BAND, *stated).calibration
+    fit = fit_calibration(kind, BODIES, counts_of(BODIES), BAND, *stated).calibration
     measurement = looked_at(fit)
     grid = rake_grid(measurement, TOOL, uncertainty=FOUND)
     profile = band_profile(measurement, TOOL, curve=CURVE, position=0.0, uncertainty=FOUND)
@@ -160,7 +166,9 @@ def test_squares_and_band_have_errors_in_common(fitted, temperature_of, stated):
 
 def test_the_calibration_alone_is_as_drawn():
     generator = np.random.default_rng(8)
-    fit = fit_linear(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    fit = fit_calibration(
+        LinearCalibration, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0
+    ).calibration
     grid = rake_grid(looked_at(fit), TOOL)
     kelvins = grid.frame_mean[grid.frame_count > 0]
     read = by_line(counts_of(kelvins), *drawn_parameters(fit, generator))
@@ -178,14 +186,16 @@ def test_the_calibration_alone_is_as_drawn():
 
 
 def test_draws_of_an_estimate_are_of_its_calibration():
-    fit = fit_linear(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    fit = fit_calibration(
+        LinearCalibration, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0
+    ).calibration
     grid = rake_grid(looked_at(fit), TOOL)
     (values,) = draw([grid.frame_estimate[0, 1:3]], 4000, np.random.default_rng(2))
     assert np.corrcoef(values.T)[0, 1] == pytest.approx(1.0, abs=1e-3)
 
 
 def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
-    fit = fit_sakuma_hattori(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    fit = fit_calibration(SakumaHattori, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
     measurement = looked_at(fit)
     write_measurement(measurement, tmp_path / "m.nc")
     again = read_measurement(tmp_path / "m.nc")
@@ -195,7 +205,9 @@ def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
     # Two files by one calibration have its errors in common, two calibrations do not.
     same = rake_grid(again, TOOL).estimate - rake_grid(measurement, TOOL).estimate
     assert np.nanmax(same.standard_uncertainty) < 1e-9
-    other = fit_sakuma_hattori(BODIES, counts_of(BODIES), BAND, 2.0, 0.4, 1.0).calibration
+    other = fit_calibration(
+        SakumaHattori, BODIES, counts_of(BODIES), BAND, 2.0, 0.4, 1.0
+    ).calibration
     apart = rake_grid(looked_at(other), TOOL).estimate - rake_grid(measurement, TOOL).estimate
     assert np.nanmin(apart.contribution("calibration")) > 0.5
     alone = Measurement.from_radiance(
@@ -209,10 +221,10 @@ def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
         assert result.estimate.unevaluated == ("calibration",)
 
 
-@pytest.mark.parametrize("fitted", [fit_linear, fit_sakuma_hattori])
-def test_the_table_of_errors_is_what_the_covariance_says(fitted):
+@pytest.mark.parametrize("kind", [LinearCalibration, SakumaHattori])
+def test_the_table_of_errors_is_what_the_covariance_says(kind):
     """Between its nodes too, against Equation 13 of the GUM with differences for derivatives."""
-    fit = fitted(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    fit = fit_calibration(kind, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
     kelvins = np.linspace(fit.lowest, fit.highest, 37)
     counts = fit.counts(kelvins)
     changes = []

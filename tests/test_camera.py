@@ -24,7 +24,7 @@ from chipglow.camera import (
     MeasuredPSF,
     Measurement,
 )
-from chipglow.camera.exposure import expose, expose_all, frame_weights
+from chipglow.camera.exposure import View, expose, frame_weights
 from chipglow.camera.optics.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
@@ -165,7 +165,7 @@ def test_the_ends_of_the_tables_are_as_exact(temperature):
 def test_peaks_and_centre():
     scene, surface = random_scene(frames=5)
     band = Camera().band
-    exposure = expose(scene, surface.on(scene), band, 0.0, 5 * STEP)
+    (exposure,) = expose(scene, [View(surface.on(scene), band)], 0.0, 5 * STEP)
     temperature = scene.data["temperature"].values
     radiance = surface.values * band.radiance(temperature.astype(np.float64))
     # float32 has a step of 6e-8, the look-up is within 4e-7
@@ -196,10 +196,10 @@ def test_exposures_of_several_surfaces_are_those_of_each():
     )
     scene = Scene(data)
     for some in (surfaces, [CHIP_1, CHIP_2, CHIP_1.redrawn(1)]):
-        fields = [surface.on(scene) for surface in some]
-        found = expose_all(scene, fields, Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
-        for one, surface in zip(found, some, strict=True):
-            alone = expose(scene, surface.on(scene), Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
+        views = [View(surface.on(scene), Camera().band, 500.0) for surface in some]
+        found = expose(scene, views, 0.1 * STEP, 4 * STEP)
+        for one, view in zip(found, views, strict=True):
+            (alone,) = expose(scene, [view], 0.1 * STEP, 4 * STEP)
             np.testing.assert_array_equal(one.peak_temperature, alone.peak_temperature)
             for name in ("mean_radiance", "peak_radiance", "centre_radiance"):
                 # One unit of float32 of the emissivity, see test_surface.
@@ -226,7 +226,7 @@ def test_peaks_count_only_what_the_exposure_covers():
     temperature = np.full((4, 9, 9), 800.0)
     temperature[3] = 1500.0
     scene = make_scene(temperature)
-    exposure = expose(scene, BLACK.on(scene), Camera().band, 0.0, 3 * STEP)
+    (exposure,) = expose(scene, [View(BLACK.on(scene), Camera().band)], 0.0, 3 * STEP)
     assert exposure.peak_temperature.max() == 800.0
 
 
@@ -664,9 +664,9 @@ def test_what_has_no_radiance_is_refused():
 def test_exposures_of_different_grids_are_refused():
     one = Camera().expose(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0)
     other = Camera().expose(make_scene(np.full((1, 9, 18), 900.0)), BLACK, 0.0)
-    with pytest.raises(ValueError, match="different grids"):
+    with pytest.raises(ValueError, match="the same grid"):
         Camera().form_measurement([one, other])
-    with pytest.raises(ValueError, match="expected 1 or more"):
+    with pytest.raises(ValueError, match="one or more exposures"):
         Camera().form_measurement([])
     with pytest.raises(ValueError, match="mean_radiance has shape"):
         Exposure(**{**vars(one), "mean_radiance": np.zeros((2, 2))})

@@ -372,7 +372,7 @@ def test_impossible_detectors_are_refused(fields, message):
         (lambda: ReadNoise(-1.0), "ReadNoise.standard_deviation: -1, expected 0 or more"),
         (lambda: Lag(1.0), "Lag.fraction: 1, expected 0 or more, under 1"),
         (lambda: PhotonResponse(1.5, 15e-6, 2.0), "quantum_efficiency: 1.5, expected over 0, up"),
-        (lambda: OperationPoint(frame_rate=0.0), "frame_rate is 0.0, expected over 0"),
+        (lambda: OperationPoint(frame_rate=0.0), "frame_rate: 0 Hz, expected over 0"),
     ],
 )
 def test_impossible_parts_are_refused(part, message):

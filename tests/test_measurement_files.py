@@ -18,11 +18,12 @@ from chipglow.camera import (
     EnergyResponse,
     Flag,
     GainPattern,
+    LinearCalibration,
     OffsetPattern,
     ReadNoise,
     Recording,
-    fit_linear,
-    fit_sakuma_hattori,
+    SakumaHattori,
+    fit_calibration,
 )
 from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
@@ -95,7 +96,8 @@ def fill(folder, seed=1):
 
 def calibrate_points(folder):
     table = read_columns(folder / "points.csv", POINT_COLUMNS)
-    fit = fit_linear(
+    fit = fit_calibration(
+        LinearCalibration,
         table["temperature"], table["counts"], BAND,
         table["count_uncertainty"], table["temperature_uncertainty"], integration_time=1e-5,
     )  # fmt: skip
@@ -129,8 +131,11 @@ def test_a_calibration_comes_back_from_its_file(tmp_path):
     kelvins = CELSIUS + 273.15
     response = TabulatedResponse((3.8e-6, 4.4e-6, 5.1e-6), (0.5, 1.0, 0.7))
     band = Band(*response.limits, response)
-    for fitted in (fit_linear, fit_sakuma_hattori):
-        fit = fitted(kelvins, 400.0 + 2.0 * band.radiance(kelvins), band, 1.0, 0.3, 0.5, 1e-5, "A")
+    for kind in (LinearCalibration, SakumaHattori):
+        counts, said = 400.0 + 2.0 * band.radiance(kelvins), (1.0, 0.3, 0.5)
+        fit = fit_calibration(
+            kind, kelvins, counts, band, *said, integration_time=1e-5, range_name="A"
+        )
         text = calibration_text(CalibrationDescription.of(fit))
         (tmp_path / "calibration.yaml").write_text(text)
         again, first = load_calibration(tmp_path / "calibration.yaml"), fit.calibration
@@ -420,7 +425,7 @@ def test_calibrate_says_what_is_doubtful(laboratory):
     assert "Assumed: The blackbody reflects 20 degC" in said
     code, said = run("calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "97")
     assert code == 2
-    assert "emissivity: is 97.0, expected over 0 to 1" in said
+    assert "emissivity: 97, expected over 0, up to 1" in said
     (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
     code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
     assert code == 0, said
@@ -579,7 +584,7 @@ def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
     )
     assert code == 0, output
     counts = [uniform_counts(f"body {celsius:g}.npy", CORRECTED) for celsius in CELSIUS[:4]]
-    expected = fit_linear(CELSIUS[:4] + 273.15, counts, BAND).calibration
+    expected = fit_calibration(LinearCalibration, CELSIUS[:4] + 273.15, counts, BAND).calibration
     found = load_calibration("of files.yaml")
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
 

@@ -12,11 +12,7 @@ from scipy.special import erf, j0, j1
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
 from chipglow.camera.optics.convolution import (
     blur,
-    blur_of_like,
-    both_borders,
-    both_images_on_pixels,
     image_on_pixels,
-    light_from_beyond,
 )
 from chipglow.camera.optics.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
 from chipglow.camera.optics.sampling import integrate, sensor_raster
@@ -381,23 +377,12 @@ def test_the_far_tail_of_an_edge(distance):
 @pytest.mark.parametrize("psf", KINDS, ids=repr)
 def test_the_light_from_beyond_is_what_the_view_does_not_send(psf):
     shape, spacing = (25, 31), 3e-6
-    beyond = light_from_beyond(psf, spacing, shape)
+    beyond = 1 - blur(np.ones(shape), psf, spacing, "nothing")
     within = convolve(np.ones(shape), psf.view_kernel(spacing, 40, 40), mode="constant")
     np.testing.assert_allclose(beyond, 1 - within, atol=1e-12)
     radiance = np.random.default_rng(4).uniform(1, 100, shape)
     inside = convolve(radiance, psf.view_kernel(spacing, 40, 40), mode="constant")
-    np.testing.assert_allclose(blur_of_like(radiance, psf, spacing), inside / within, rtol=1e-11)
-
-
-@pytest.mark.parametrize("psf", KINDS, ids=repr)
-def test_both_borders_are_the_images_by_either_rule(psf):
-    radiance = np.random.default_rng(5).uniform(1, 100, (40, 23))
-    kept = radiance.copy()
-    edge, like = both_borders(radiance, psf, 2e-6)
-    np.testing.assert_array_equal(radiance, kept)
-    # The same operations.
-    np.testing.assert_array_equal(edge, blur(radiance, psf, 2e-6))
-    np.testing.assert_array_equal(like, blur_of_like(radiance, psf, 2e-6))
+    np.testing.assert_allclose(blur(radiance, psf, spacing, "nothing"), inside, rtol=1e-11)
 
 
 # A pixel of samples, of parts of them, of less than one, and the middle of one.
@@ -410,26 +395,20 @@ def test_an_image_on_pixels_is_what_they_integrate_of_the_whole_one(psf, pitch, 
     scene = Raster(-10e-6, 20e-6, 2e-6, 37, 52)
     sensors = sensor_raster(scene, pitch, (3.1e-6, 4.7e-6), None)
     radiance = np.random.default_rng(6).lognormal(0.0, 3.0, scene.shape)
-    image, like = both_images_on_pixels(radiance, psf, scene, sensors, fill)
-    expected = integrate(blur(radiance, psf, scene.spacing), scene, sensors, fill)
     # What transforms round is a part of the largest value, not of each.
-    np.testing.assert_allclose(image, expected, rtol=1e-13, atol=1e-15 * radiance.max())
-    np.testing.assert_array_equal(image_on_pixels(radiance, psf, scene, sensors, fill), image)
-    # Where nothing is at the edges, the first rule has no light from beyond.
-    radiance[[0, -1]] = radiance[:, [0, -1]] = 0.0
-    image, like = both_images_on_pixels(radiance, psf, scene, sensors, fill)
-    within = 1 - integrate(light_from_beyond(psf, 2e-6, scene.shape), scene, sensors, fill)
-    np.testing.assert_allclose(like, image / within, rtol=1e-12, atol=1e-15 * radiance.max())
-    _, like = both_images_on_pixels(np.full(scene.shape, 5.0), psf, scene, sensors, fill)
-    np.testing.assert_allclose(like, 5.0, rtol=1e-13)
+    exact = {"rtol": 1e-13, "atol": 1e-15 * radiance.max()}
+    for beyond in ("edge", "nothing"):
+        image = image_on_pixels(radiance, psf, scene, sensors, fill, beyond)
+        expected = integrate(blur(radiance, psf, scene.spacing, beyond), scene, sensors, fill)
+        np.testing.assert_allclose(image, expected, **exact)
 
 
 def test_half_the_light_at_a_border_is_from_beyond_it():
-    beyond = light_from_beyond(GaussianPSF(8e-6), 0.1e-6, (500, 500))
+    beyond = 1 - blur(np.ones((500, 500)), GaussianPSF(8e-6), 0.1e-6, "nothing")
     # The middle of the outermost sample is half a sample from the border: 0.6 % of the light.
     assert beyond[0, 250] == pytest.approx(1 / 2, abs=0.007)
     assert beyond[0, 0] == pytest.approx(3 / 4, abs=0.007)
-    assert beyond[250, 250] == 0.0
+    assert beyond[250, 250] == pytest.approx(0.0, abs=1e-13)
 
 
 def test_where_there_is_no_light_there_is_none_after_the_blur():

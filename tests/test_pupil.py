@@ -232,7 +232,7 @@ def test_an_f_number_is_a_numerical_aperture():
 @pytest.mark.parametrize(
     ("make", "expected"),
     [
-        (lambda: PupilPSF(MWIR, 1.2), "numerical_aperture is 1.2, expected over 0 to 1"),
+        (lambda: PupilPSF(MWIR, 1.2), "numerical_aperture: 1.2, expected over 0, up to 1"),
         (lambda: PupilPSF(MWIR, 0.3, 0.95), r"obscuration: 0.95, expected 0 to 0.9"),
         (lambda: PupilPSF(MWIR, 0.3, zernike=((3, 1e-7),)), r"zernike: \(3, 1e-07\), expected"),
         (lambda: PupilPSF(MWIR, 0.3, zernike=((4, 1e-7), (4, 1e-7))), "each once"),

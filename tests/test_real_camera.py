@@ -8,11 +8,12 @@ from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import (
     Flag,
+    LinearCalibration,
     NonUniformity,
     PlanckConversion,
     Recording,
     find_bad_pixels,
-    fit_linear,
+    fit_calibration,
     replace_bad_pixels,
 )
 from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
@@ -21,8 +22,8 @@ from chipglow.text import Notes
 
 BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.linspace(573.15, 1273.15, 8)
-LINE = fit_linear(
-    KELVINS, 500.0 + 1.8 * BAND.radiance(KELVINS), BAND, count_uncertainty=2.0
+LINE = fit_calibration(
+    LinearCalibration, KELVINS, 500.0 + 1.8 * BAND.radiance(KELVINS), BAND, count_uncertainty=2.0
 ).calibration
 RNG = np.random.default_rng(7)
 

@@ -8,7 +8,7 @@ import xarray as xr
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from typer.testing import CliRunner
 
-from chipglow.camera import CalibrationErrors, Flag, Measurement, fit_linear
+from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement, fit_calibration
 from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
@@ -44,7 +44,9 @@ def fitted(generator=None, common=0.0, spread=0.3):
     if generator is not None:
         shift = generator.normal(0.0, common) + generator.normal(0.0, spread, BODIES.size)
     counts = OFFSET + GAIN * BAND.radiance(BODIES + shift)
-    return fit_linear(BODIES, counts, BAND, 0.01, spread, common).calibration
+    return fit_calibration(
+        LinearCalibration, BODIES, counts, BAND, 0.01, spread, common
+    ).calibration
 
 
 def developed(calibration, kelvins, emissivity, frames=1, noise=0.0, seed=0, room=ROOM):

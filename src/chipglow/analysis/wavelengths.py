@@ -15,7 +15,7 @@ from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSc
 from chipglow.analysis.cut import Progress, find_cut, spread_starts
 from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
 from chipglow.analysis.plan import Plan
-from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
+from chipglow.camera import Camera, Exposure, RatioCamera, expose, frame_weights
 from chipglow.camera.ratio_camera import views_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
@@ -186,12 +186,12 @@ def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: flo
     aligned = replace(second, offset=first.offset)
     duration, of_second = first.integration_time, second.integration_time
     views = views_of(surface, scene, (first, second))
-    one, two = alike = expose_views(scene, views, start, duration)
+    one, two = alike = expose(scene, views, start, duration)
     if of_second != duration:
-        (two,) = expose_views(scene, views[1:], start, of_second)
+        (two,) = expose(scene, views[1:], start, of_second)
     late = two
     if camera.delay:
-        (late,) = expose_views(scene, views[1:], start + camera.delay, of_second)
+        (late,) = expose(scene, views[1:], start + camera.delay, of_second)
     formed, delayed = _image(first, one), _image(second, late)
     pixels = first.pixels(scene.raster)
     points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
@@ -336,10 +336,10 @@ def _draws(
     """Return every band and ratio at one spot with one texture, a draw for each phase."""
     duration = cameras[0].integration_time
     views = views_of(surface, scene, cameras)
-    exposures = expose_views(scene, views, spot.start, duration)
+    exposures = expose(scene, views, spot.start, duration)
     images = late = [ExposureImages(one, shares_blur=True) for one in exposures]
     if plan.delay:
-        delayed = expose_views(scene, views, spot.start + plan.delay, duration)
+        delayed = expose(scene, views, spot.start + plan.delay, duration)
         late = [ExposureImages(one, shares_blur=True) for one in delayed]
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
     pixels = [

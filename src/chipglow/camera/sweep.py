@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
@@ -45,38 +46,24 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """What is summed over the sub-frames; see `Exposure`.
-
-    Parameters
-    ----------
-    views : ndarray
-        Numbers of the surface and of the band of every view, int64 of shape (view, 2).
-    tables : ndarray
-        Radiance in every band from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the
-        next value; float32 of shape (band, n, 2).
-    environments : ndarray
-        Radiance of every view's surroundings in W/(m² sr), float32 of shape (view,).
-    most : float
-        Largest emissivity that is possible.
-    mean, centre : ndarray
-        Float64 of shape (view, y, x), zero to start with.
-    peak : ndarray
-        Float32 of the same shape.
-    hottest : ndarray
-        Float32 of shape (y, x).
-    check : callable
-        Called before every block of rows; what it raises ends the pass.
-    """
+    """Sums over the sub-frames; see `Exposure`."""
 
     views: NDArray[np.int64]
+    """Numbers of the surface and of the band of every view, int64, shape (view, 2)."""
     tables: NDArray[np.float32]
+    """Radiance in every band from 200 K on and its change to the next value, (band, n, 2)."""
     environments: NDArray[np.float32]
+    """Radiance of every view's surroundings in W/(m² sr), shape (view,)."""
     most: float
-    mean: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    """Largest emissivity that is possible."""
+    mean: Array
+    """Shape (view, y, x), as `centre` and `peak`."""
+    centre: Array
     peak: NDArray[np.float32]
     hottest: NDArray[np.float32]
-    check: Check
+    """Shape (y, x)."""
+    check: Check | None
+    """Called before every block of rows; an error that it raises ends the pass."""
 
     @classmethod
     def zero(
@@ -86,9 +73,9 @@ class Sums:
         environments: NDArray[np.float32],
         most: float,
         shape: tuple[int, int],
-        check: Check,
+        check: Check | None,
     ) -> "Sums":
-        """Sums of nothing."""
+        """Return sums of nothing."""
         mean, centre = (np.zeros((len(views), *shape)) for _ in range(2))
         peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
         return cls(views, tables, environments, most, mean, centre, peak, hottest, check)
@@ -97,22 +84,13 @@ class Sums:
         self,
         frames: Sequence[Frame],
         emissivities: Sequence[NDArray[np.float32]],
-        weights: NDArray[np.float64],
+        weights: Array,
         middles: NDArray[np.intp],
     ) -> None:
-        """Add frames with the emissivities of all surfaces, each of shape (surface, y, x).
+        """Add up to `BATCH` frames with the emissivities (surface, y, x) of each.
 
-        Parameters
-        ----------
-        frames : sequence of Frame
-            Up to `BATCH` of them.
-        emissivities : sequence of ndarray
-            One of each frame.
-        weights : ndarray
-            Fraction of each row's exposure that each frame stands for, shape (row, frame); 0 where
-            the row is not exposed.
-        middles : ndarray
-            Which of them is in the middle of each row's exposure, if any of them is, shape (row,).
+        `weights` (row, frame) are fractions of each row's exposure; `middles` (row,) is the frame
+        in the middle of each row's exposure, if any is.
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
@@ -128,21 +106,13 @@ class Sums:
         positions: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]],
         shifts: NDArray[np.float32],
         textures: Textures,
-        weights: NDArray[np.float64],
+        weights: Array,
         middles: NDArray[np.intp],
     ) -> None:
-        """Add frames with the emissivities that their features have.
+        """Add frames as `add_given`, with the emissivities of their features.
 
-        Parameters
-        ----------
-        frames, weights, middles
-            As for `add_given`.
-        positions : sequence of tuple of ndarray
-            Where each frame's samples are looked up in the textures.
-        shifts : ndarray
-            Shifts of the textures, shape (frame, feature, 2).
-        textures : Textures
-            The surfaces.
+        `positions` are where each frame's samples are looked up in the textures, and `shifts`
+        (frame, feature, 2) those of the textures.
         """
         temperature, material, strain, rate = (
             _batch(frames, name)
@@ -162,20 +132,12 @@ class Sums:
         positions: tuple[NDArray[np.float32], NDArray[np.float32]] | None,
         shifts: NDArray[np.float32],
         textures: Textures,
-        weights: NDArray[np.float64],
+        weights: Array,
         middles: NDArray[np.intp],
     ) -> None:
-        """Add frames of splines: their samples are never written anywhere.
+        """Add frames of splines on one lattice as `add_features`: their samples are stored nowhere.
 
-        Parameters
-        ----------
-        frames : sequence of SplineFrame
-            Any number, of one lattice.
-        positions : tuple of ndarray, optional
-            Where the samples are looked up in the textures; by their material coordinates if left
-            out.
-        shifts, textures, weights, middles
-            As for `add_features`.
+        Without `positions` textures are looked up by the material coordinates.
         """
         lattice = frames[0].lattice
         nodes = np.stack([frame.nodes for frame in frames])
@@ -198,14 +160,15 @@ class Sums:
 
     def _in_blocks(self, add: Callable[[int, int], None]) -> None:
         def checked(first: int, last: int) -> None:
-            self.check()
+            if self.check is not None:
+                self.check()
             add(first, last)
 
         in_blocks(len(self.hottest), checked)
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
-    """As many arrays as a kernel was compiled for; those at the end count for nothing."""
+    """Return as many arrays as a kernel was compiled for; those at the end count for nothing."""
     return tuple((arrays + [arrays[-1]] * BATCH)[:BATCH])
 
 
@@ -218,7 +181,7 @@ def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
 
 @njit(**_FAST)
 def _find(temperature, last, number, past):  # type: ignore[no-untyped-def]
-    """Entry of the table before a temperature, and how far past it that is; NaN off the table."""
+    """Find the table's entry before a temperature, and how far past it that is, or NaN."""
     for i in range(temperature.size):
         position = (temperature[i] - np.float32(TABLE_COLDEST)) * np.float32(STEPS_PER_KELVIN)
         inside = min(max(position, np.float32(0.0)), np.float32(last))
@@ -287,14 +250,7 @@ def _add_row(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, **_FAST)
 def _add_given(  # type: ignore[no-untyped-def]
-    temperature,
-    material,
-    emissivities,
-    weights,
-    middles,
-    first,
-    last,
-    own,
+    temperature, material, emissivities, weights, middles, first, last, own
 ):
     columns = own[_MEAN].shape[2]
     work = np.empty((3, columns), np.float32)
@@ -311,14 +267,7 @@ def _add_given(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, **_FAST)
 def _add_features(  # type: ignore[no-untyped-def]
-    fields,
-    shifts,
-    textures,
-    weights,
-    middles,
-    first,
-    last,
-    own,
+    fields, shifts, textures, weights, middles, first, last, own
 ):
     temperature, material, strain, rate, x, y = fields
     surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
@@ -373,17 +322,7 @@ def _take(tool, kind, temperature):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, **_FAST)
 def _add_splines(  # type: ignore[no-untyped-def]
-    nodes,
-    limits,
-    grid,
-    fixed,
-    shifts,
-    textures,
-    weights,
-    middles,
-    first,
-    last,
-    own,
+    nodes, limits, grid, fixed, shifts, textures, weights, middles, first, last, own
 ):
     first_down, down, first_across, across, in_tool = grid
     surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
