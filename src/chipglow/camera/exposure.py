@@ -71,38 +71,13 @@ def expose(
     delays: Array | None = None,
     check: Check | None = None,
 ) -> tuple[Exposure, ...]:
-    """Sum a scene's apparent radiance over an integration time, of one or more views.
+    """Sum a scene's apparent radiance from `start` on over a duration, in s, for some views.
 
     Each frame is read once. A surface that is seen in several bands, and a band in which several
-    surfaces are seen, are computed once for each frame.
+    surfaces are seen, are computed once for each frame. `delays` are how much later than `start`
+    each row of samples begins in s, of a rolling shutter; an error that `check`, called now and
+    then, raises ends the pass.
 
-    Parameters
-    ----------
-    scene : Scene
-        The true temperature over time.
-    views : sequence of View
-        Surfaces, laid on the scene, and the bands in which they are seen.
-    start, duration : float
-        When the integration begins and how long it lasts, in s.
-    delays : ndarray, optional
-        How much later than `start` the integration of each row of samples begins in s, 0 or more,
-        shape (y,): a rolling shutter's (`Camera.row_delays`). All at once by default.
-    check : callable, optional
-        Called now and then meanwhile; an error that it raises ends the pass.
-
-    Returns
-    -------
-    tuple of Exposure
-        One for each view.
-
-    Raises
-    ------
-    ValueError
-        If the integration reaches beyond the scene or into a gap between its frames, or a
-        temperature is outside the range of the camera's tables or an emissivity outside 0 to 1.
-
-    Notes
-    -----
     Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
     (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
     between values 1/32 K apart, within 6e-7 of it from 250 K on.
@@ -114,7 +89,7 @@ def expose(
     bands = list(dict.fromkeys(view.band for view in views))
     places = {id(one): number for number, one in enumerate(fields)}
     stack = EmissivityStack(fields)
-    sums = Sums.zero(
+    sums = Sums(
         np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
         np.stack([_fine_table(band) for band in bands]),
         np.array([view.environment for view in views], np.float32),
@@ -214,19 +189,14 @@ def _sweep(
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
     features = stack.features if stack.is_bare else None
     if features is not None and (splines := _splines(scene, indices)):
-        shifts = np.stack([features.shift(frame.time) for frame in splines])
-        textures, fixed = features.textures, features.fixed_positions
-        sums.add_splines(splines, fixed, shifts, textures, weights, middles)
+        sums.add_splines(splines, features, weights, middles)
         return
     for begin, frames in _batches(scene, indices, stack.needed):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
-        inside = middles - begin
         if features is None:
-            sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
+            sums.add_given(frames, stack, part, middles - begin)
         else:
-            positions = [features.positions(frame) for frame in frames]
-            shifts = np.stack([features.shift(frame.time) for frame in frames])
-            sums.add_features(frames, positions, shifts, features.textures, part, inside)
+            sums.add_features(frames, features, part, middles - begin)
 
 
 def _splines(scene: Scene, indices: range) -> list[SplineFrame]:

@@ -1,5 +1,8 @@
 """A camera's spectral band: in-band radiance (Equation 1) and its inverse, radiance temperature."""
 
+# Kernels have no types: Numba finds them.
+# mypy: allow-untyped-defs
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -245,7 +248,7 @@ def _as_floats(values: ArrayLike) -> NDArray[np.floating]:
 
 
 @njit(inline="always")
-def table_radiance(temperature, table):  # type: ignore[no-untyped-def]
+def table_radiance(temperature, table):
     """Look up in-band radiance by cubic Hermite interpolation; NaN outside the table."""
     position = (temperature - TABLE_COLDEST) / _TEMPERATURE_STEP
     if not (0.0 <= position <= table.shape[0] - 1):
@@ -261,7 +264,7 @@ def table_radiance(temperature, table):  # type: ignore[no-untyped-def]
 # These run on the caller's thread: threads that wait for work by spinning would take the processor
 # from others, for what lasts a few microseconds a frame.
 @njit(**_KERNEL)
-def _look_up_radiance(temperature, table, radiance):  # type: ignore[no-untyped-def]
+def _look_up_radiance(temperature, table, radiance):
     """Fill in radiances, NaN where the table has none; return how many are NaN."""
     missing = 0
     for i in range(temperature.size):
@@ -272,7 +275,7 @@ def _look_up_radiance(temperature, table, radiance):  # type: ignore[no-untyped-
 
 
 @njit(**_KERNEL)
-def _look_up_temperature(radiance, first, cubics, temperature):  # type: ignore[no-untyped-def]
+def _look_up_temperature(radiance, first, cubics, temperature):
     """Fill in temperatures, NaN where the table has none; return how many are NaN."""
     block = np.empty(_BLOCK)
     missing = 0

@@ -24,8 +24,9 @@ _NODES: Final = 513
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Calibration(ABC):
-    """Meaning of a camera's counts."""
+    """Meaning of a camera's counts; `description` says what it is."""
 
+    description: ClassVar[str]
     band: Band
     lowest: float = 0.0
     """Radiance temperature in K from which on it holds."""
@@ -43,14 +44,9 @@ class Calibration(ABC):
         """Return the in-band radiance in W/(m² sr) of counts; NaN where there is none."""
 
     @property
-    @abstractmethod
     def errors(self) -> CalibrationErrors | None:
         """Effects of its errors on the radiance; None if they are not known."""
-
-    @property
-    @abstractmethod
-    def description(self) -> str:
-        """What it is, for people."""
+        return None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,6 +150,7 @@ class LinearCalibration(FittedCalibration):
     """Counts that are a straight line over the in-band radiance: S = offset + gain L(T)."""
 
     kind: ClassVar[str] = "linear"
+    description: ClassVar[str] = "straight line over the in-band radiance"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "gain")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "counts m² sr/W")
 
@@ -166,10 +163,6 @@ class LinearCalibration(FittedCalibration):
     def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
         gain, offset = np.polyfit(np.asarray(band.radiance(kelvins), np.float64), counts, 1)
         return np.array([offset, gain])
-
-    @property
-    def description(self) -> str:
-        return "straight line over the in-band radiance"
 
     def counts(self, temperature: ArrayLike) -> Array:
         offset, gain = self.parameters
@@ -201,6 +194,7 @@ class SakumaHattori(FittedCalibration):
     """
 
     kind: ClassVar[str] = "sakuma-hattori"
+    description: ClassVar[str] = "Planckian form of Sakuma and Hattori"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "A", "B", "C")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "m", "m K", "counts")
 
@@ -219,10 +213,6 @@ class SakumaHattori(FittedCalibration):
         form = _occupation(SECOND_RADIATION_CONSTANT / (a * kelvins + b))
         scale, offset = np.polyfit(form, counts, 1)
         return np.array([offset, a, b, scale])
-
-    @property
-    def description(self) -> str:
-        return "Planckian form of Sakuma and Hattori"
 
     def counts(self, temperature: ArrayLike) -> Array:
         offset, _, _, scale = self.parameters
@@ -260,19 +250,12 @@ class SakumaHattori(FittedCalibration):
 class FactoryCalibration(Calibration):
     """The conversion that a camera's maker stored in the file; its uncertainty is not known."""
 
+    description: ClassVar[str] = "the maker's, from the file; its uncertainty is not known"
     conversion: PlanckConversion
-
-    @property
-    def description(self) -> str:
-        return "the maker's, from the file; its uncertainty is not known"
 
     def radiance(self, counts: ArrayLike) -> Array:
         kelvins = self.conversion.temperature(np.asarray(counts))
         return np.asarray(self.band.radiance(kelvins), np.float64)
-
-    @property
-    def errors(self) -> None:
-        """None: makers do not store them."""
 
 
 def _floats(values: ArrayLike) -> NDArray[Any]:

@@ -111,41 +111,16 @@ def fit_calibration(
     range_name: str | None = None,
     blackbody: Blackbody = _IDEAL,
 ) -> CalibrationFit[Kind]:
-    """Fit a calibration to blackbodies.
+    """Fit a `LinearCalibration` or `SakumaHattori` to blackbodies of temperatures in K.
 
-    Parameters
-    ----------
-    kind : type
-        `LinearCalibration` or `SakumaHattori`.
-    temperatures, counts : array_like
-        Temperatures of the blackbody in K and counts, shape (n,).
-    band : Band
-        The camera's band.
-    count_uncertainty, temperature_uncertainty : array_like, optional
-        Standard uncertainties in counts and in K of each point, independent of those of the other
-        points; of shape (n,) or one for all. If neither is given, all points weigh the same, and
-        the scatter of the residuals gives the uncertainty.
-    common_uncertainty : float
-        Standard uncertainty in K of the blackbody's temperature that all points have in common,
-        as of its certificate.
-    integration_time, range_name : optional
-        Integration time in s and measuring range of the camera.
-    blackbody : Blackbody
-        Emissivity of the blackbody and what it reflects; an ideal one by default.
+    Uncertainties of the points are standard ones in counts and K, of each or of all. If neither is
+    given, all points weigh the same, and the scatter of the residuals gives the uncertainty.
 
-    Raises
-    ------
-    ValueError
-        If there are too few points, a value is impossible, or the counts do not rise with the
-        temperature.
-
-    Notes
-    -----
     Weights are by the effective variance u²(S) + (dS/dT)² u²(T) at the fitted slope, iterated
-    (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters is that of the weighted
-    fit, times the square of `CalibrationFit.enlargement`; a common error of the temperatures or of
-    the blackbody's emissivity moves all points at once, and what it does to the parameters is
-    added to their covariance as one more term (JCGM 100, Equation 13).
+    (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters is that of the
+    weighted fit, times the square of `CalibrationFit.enlargement`; a common error of the
+    temperatures or of the blackbody's emissivity moves all points at once, and what it does to
+    the parameters is added to their covariance as one more term (JCGM 100, Equation 13).
     """
     points = _Points.checked(
         temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty

@@ -88,7 +88,6 @@ class ChargeDiffusion(_RandomBlur):
 
     kind: ClassVar[str] = "charge-diffusion"
     example: ClassVar[str] = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
-    standard_deviation: Deviation
 
 
 @final
@@ -99,7 +98,6 @@ class Jitter(_RandomBlur):
 
     kind: ClassVar[str] = "jitter"
     example: ClassVar[str] = "{kind: jitter, standard_deviation: 1 um}"
-    standard_deviation: Deviation
 
 
 @final

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final, final
 
 import numpy as np
 import scipy
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.optics.kernel import (
@@ -336,9 +336,8 @@ class MeasuredPSF(PointSpreadFunction):
             If it cannot be read.
         """
         path = Path(path)
-        readers = {".npy": _read_npy, ".csv": _read_csv}
         kind = path.suffix.lower()
-        if kind not in (*readers, ".nc"):
+        if kind not in (".npy", ".csv", ".nc"):
             raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy, .csv or .nc")
         if (spacing is None) != (kind == ".nc"):
             raise ValueError(
@@ -350,7 +349,7 @@ class MeasuredPSF(PointSpreadFunction):
                 estimate, spacing, stated = _read_netcdf(path)
                 held = stated if includes is None else includes
                 return cls(estimate.values, spacing, estimate.components, held)
-            return cls(readers[kind](path), spacing, includes=includes or ())
+            return cls(_read_array(path), spacing, includes=includes or ())
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
 
@@ -490,15 +489,12 @@ def _checked_weights(weights: ArrayLike) -> Array:
     return array
 
 
-def _read_npy(path: Path) -> NDArray[Any]:
-    with path.open("rb") as file:
-        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
-
-
-def _read_csv(path: Path) -> Array:
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    rows = [[float(cell) for cell in line.split(",")] for line in lines if line.strip()]
-    return np.array(rows, dtype=np.float64)
+def _read_array(path: Path) -> Array:
+    if path.suffix.lower() == ".npy":
+        with path.open("rb") as file:
+            return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+    rows = path.read_text(encoding="utf-8-sig").splitlines()
+    return np.array([[float(cell) for cell in row.split(",")] for row in rows if row.strip()])
 
 
 def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
