@@ -73,11 +73,6 @@ class Texture:
             deviates /= _enlarged_standard_deviation(deviates)
         return cls(deviates.astype(np.float32), grain, emissivity)
 
-    @property
-    def period(self) -> float:
-        """Distance in m after which the map repeats, along x and along y."""
-        return MAP_SIZE * self.grain
-
     @cached_property
     def mean(self) -> float:
         """Mean over the enlarged map."""
