@@ -57,7 +57,6 @@ class Direction(Modifier):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """See `Modifier.change`."""
         ratio = np.float32(self.ratio(cos(self.tilt)))
 
         def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
@@ -83,7 +82,6 @@ class Fresnel(Direction):
     k: Annotated[float, Parameter("Its extinction coefficient.", least=0.0)]
 
     def emissivity(self, cosine: ArrayLike) -> NDArray[np.float64]:
-        """See `Direction.emissivity`."""
         cosines = np.asarray(cosine, np.complex128)
         index = complex(self.n, self.k)
         inside = np.sqrt(index**2 - 1.0 + cosines**2)

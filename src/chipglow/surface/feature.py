@@ -93,7 +93,6 @@ class FeatureSurface(Surface, Part):
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
         numbers = {name: getattr(self, name) for name in FEATURES}
         restored = "" if self.restore_standard_deviation else ", standard deviation not restored"
         return {
@@ -312,18 +311,15 @@ class FeatureTrends(Modifier):
 
     @property
     def description(self) -> str:
-        """See `Modifier.description`."""
         lines = ", ".join(f"{name} {line}" for name, line in self.trends.items())
         return f"{lines}{draw_text(self.draw)}"
 
     def redrawn(self, number: int) -> Self:
-        """See `Modifier.redrawn`."""
         return replace(self, draw=self.draw + number) if number else self
 
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """See `Modifier.change`."""
         drawn = drawn_trends(tuple(self.trends.values()), self.draw)
         lines = dict(zip(self.trends, drawn, strict=True))
 

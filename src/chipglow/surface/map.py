@@ -62,7 +62,6 @@ class MapSurface(Surface):
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
         across = f"{self.raster.columns} x {self.raster.rows} pixels of {self.raster.spacing:g} m"
         stated = [f"image of {across}, mean {np.nanmean(self.values):.4g}"]
         stated += [f"elsewhere {self.elsewhere:g}"]
@@ -97,7 +96,6 @@ class MapSurface(Surface):
     def on(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        """See `Surface.on`."""
         image, shape = self.at(scene.raster), scene.raster.shape
         slopes = np.zeros(shape, np.float32)
         if self.slopes is not None:

@@ -60,7 +60,6 @@ class Oxide(Modifier):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """See `Modifier.change`."""
         history = self.history(scene)
 
         def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
@@ -95,7 +94,6 @@ class ParabolicOxide(Oxide):
     ] = 169_452.0
 
     def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """See `Oxide.growth`."""
         kelvins = np.asarray(temperature, np.float64)
         return np.asarray(self.rate * np.exp(-self.activation_energy / (R * kelvins)), np.float64)
 

@@ -103,7 +103,6 @@ class SideShape(Modifier):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Reflections:
-        """See `Modifier.change`."""
         if scene.tool is None:
             raise ValueError(
                 "reflections: the scene does not state its tool, expected one, between whose rake "
@@ -177,7 +176,6 @@ class Wedge(SideShape):
 
     @property
     def outline(self) -> NDArray[np.float64]:
-        """See `SideShape.outline`."""
         slope = (pi / 2 - self.angle) * (1.0 - _graded(_SIDE_ELEMENTS))
         depth = self.bulge_radius * (cos(self.angle) - np.sin(slope))
         height = self.bulge_radius * (np.cos(slope) - 1.0) - self.overhang

@@ -69,7 +69,6 @@ class SpectralSurface(Surface):
     def on(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        """See `Surface.on`."""
         return self.in_band(known_band(self.kind, band), reflected).on(scene)
 
 
@@ -181,14 +180,12 @@ class Dispersion(Modifier):
 
     @property
     def description(self) -> str:
-        """See `Modifier.description`."""
         band = f"{1e6 * self.measured_in.lower:g} um to {1e6 * self.measured_in.upper:g} um"
         return f"measured in {band}, elsewhere by {self.law!r}"
 
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """See `Modifier.change`."""
         known = self.law.in_band(self.measured_in, None)
         seen = self.law.in_band(known_band(self.effect, band), reflected)
         here, there = (np.clip(one.columns[1], _LEAST, 1 - _LEAST) for one in (known, seen))

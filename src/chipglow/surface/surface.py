@@ -159,17 +159,14 @@ class ModifiedSurface(Surface):
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
         return {**self.bare.effects, **{one.effect: one.description for one in self.modifiers}}
 
     def modified(self, *modifiers: Modifier) -> "ModifiedSurface":
-        """See `Surface.modified`."""
         return replace(self, modifiers=(*self.modifiers, *modifiers))
 
     def on(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        """See `Surface.on`."""
         field, surface = self.bare.on(scene, band, reflected), self.bare
         for one in self.modifiers:
             field = EmissivityField(
@@ -182,7 +179,6 @@ class ModifiedSurface(Surface):
         return field
 
     def redrawn(self, number: int) -> Self:
-        """See `Surface.redrawn`."""
         bare = self.bare.redrawn(number)
         modifiers = tuple(one.redrawn(number) for one in self.modifiers)
         old, new = (self.bare, *self.modifiers), (bare, *modifiers)

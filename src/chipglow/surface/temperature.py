@@ -25,7 +25,6 @@ class HomogeneousSurface(Surface):
     def on(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        """See `Surface.on`."""
         return EmissivityField(self._emissivity, frozenset())
 
     def _emissivity(self, frame: Frame) -> NDArray[np.float32]:
@@ -43,7 +42,6 @@ class UniformSurface(HomogeneousSurface):
     emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)] = 1.0
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
-        """See `HomogeneousSurface.at`."""
         return self.emissivity
 
 
@@ -77,7 +75,6 @@ class TemperatureSurface(HomogeneousSurface):
         return np.array(self.table, np.float64).reshape(-1, 2).T
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
-        """See `HomogeneousSurface.at`."""
         values: NDArray[np.float64] = np.interp(temperature, *self.columns)
         return values
 
@@ -111,7 +108,6 @@ class PhaseSurface(HomogeneousSurface):
             )
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
-        """See `HomogeneousSurface.at`."""
         table = (self.solidus, self.liquidus), (self.solid, self.liquid)
         values: NDArray[np.float64] = np.interp(temperature, *table)
         return values
@@ -169,15 +165,12 @@ class TrendSurface(HomogeneousSurface):
 
     @property
     def effects(self) -> dict[str, str]:
-        """See `Surface.effects`."""
         return {"emissivity": f"{self.trend}{draw_text(self.draw)}"}
 
     def redrawn(self, number: int) -> Self:
-        """See `Surface.redrawn`."""
         return replace(self, draw=self.draw + number) if number else self
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
-        """See `HomogeneousSurface.at`."""
         (line,) = drawn_trends((self.trend,), self.draw)
         return np.clip(line.at(temperature), 0.0, 1.0)
 
