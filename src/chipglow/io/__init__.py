@@ -2,7 +2,6 @@
 
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.import_description import (
-    IMPORT_SOURCES,
     ImportDescription,
     import_description,
     import_text,
@@ -26,11 +25,9 @@ from chipglow.io.scene_file import (
     write_scene,
 )
 from chipglow.io.spool import UnfinishedScene, unfinished_scenes
-from chipglow.io.table_file import check_table_path
 from chipglow.io.tool_section import ToolSection, read_tool_outline
 
 __all__ = [
-    "IMPORT_SOURCES",
     "SCENE_FORMAT",
     "Import",
     "ImportDescription",
@@ -42,7 +39,6 @@ __all__ = [
     "atomic_folder",
     "atomic_path",
     "check_movie_path",
-    "check_table_path",
     "example_scene",
     "import_description",
     "import_scene",

@@ -1,5 +1,6 @@
 """Results in files: their frames as CSV, their arrays as NetCDF-4."""
 
+import csv
 import os
 from pathlib import Path
 from typing import Any, Protocol
@@ -7,7 +8,7 @@ from typing import Any, Protocol
 import pandas as pd
 import xarray as xr
 
-from chipglow.io.table_file import write_table, write_table_or_dataset
+from chipglow.io import atomic_path, write_dataset
 
 
 class Result(Protocol):
@@ -22,7 +23,13 @@ class Result(Protocol):
 
 def write_result(result: Result, path: str | os.PathLike[str]) -> None:
     """Write a result in the format that the file suffix names."""
-    write_table_or_dataset(Path(path), *columns_and_rows(result.to_frame()), result.to_dataset)
+    suffix = Path(path).suffix.lower()
+    if suffix == ".nc":
+        write_dataset(result.to_dataset(), path)
+    elif suffix == ".csv":
+        write_frame(result.to_frame(), path)
+    else:
+        raise ValueError(f"{path}: expected a file that ends in .csv or .nc")
 
 
 def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
@@ -30,7 +37,11 @@ def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
 
     Numbers have nine digits; NaN is an empty cell.
     """
-    write_table(Path(path), *columns_and_rows(frame))
+    columns, rows = columns_and_rows(frame)
+    with atomic_path(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(columns)
+        table.writerows(rows)
 
 
 def columns_and_rows(frame: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
