@@ -11,7 +11,7 @@ import argparse
 
 import numpy as np
 
-from chipglow.camera import Blackbody, fit_linear, fit_sakuma_hattori
+from chipglow.camera import Blackbody, LinearCalibration, SakumaHattori, fit_calibration
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -38,59 +38,63 @@ def points(generator, kelvins=KELVINS, larger=1.0, emissivity=1.0):
 
 def sound(generator):
     """Nothing is wrong."""
-    return fit_linear(*points(generator), BAND, **STATED)
+    return fit_calibration(LinearCalibration, *points(generator), BAND, **STATED)
 
 
 def planckian(generator):
     """The same, fitted by the form of Sakuma and Hattori."""
-    return fit_sakuma_hattori(*points(generator), BAND, **STATED)
+    return fit_calibration(SakumaHattori, *points(generator), BAND, **STATED)
 
 
 def unstated(generator):
     """The same, and nothing is stated."""
-    return fit_linear(*points(generator), BAND)
+    return fit_calibration(LinearCalibration, *points(generator), BAND)
 
 
 def planckian_unstated(generator):
     """Sakuma and Hattori's form, and nothing is stated."""
-    return fit_sakuma_hattori(*points(generator), BAND)
+    return fit_calibration(SakumaHattori, *points(generator), BAND)
 
 
 def emissivity_given(generator):
     """A blackbody of about 0.97, which is said."""
     said = Blackbody(0.97, 0.005, ROOM)
     true = 0.97 + generator.normal(0.0, 0.005)
-    return fit_linear(*points(generator, emissivity=true), BAND, blackbody=said, **STATED)
+    return fit_calibration(
+        LinearCalibration, *points(generator, emissivity=true), BAND, blackbody=said, **STATED
+    )
 
 
 def emissivity_left_out(generator):
     """The same, which is not said."""
-    return fit_linear(*points(generator, emissivity=0.97), BAND, **STATED)
+    return fit_calibration(LinearCalibration, *points(generator, emissivity=0.97), BAND, **STATED)
 
 
 def understated(generator):
     """Errors seven times as large as stated: a reduced chi-squared of about 50."""
-    return fit_linear(*points(generator, larger=7.0), BAND, **STATED)
+    return fit_calibration(LinearCalibration, *points(generator, larger=7.0), BAND, **STATED)
 
 
 def outlier(generator):
     """One temperature was noted 10 K wrong."""
     kelvins, counts = points(generator)
     wrong = kelvins + np.where(np.arange(8) == generator.integers(8), 10.0, 0.0)
-    return fit_linear(wrong, counts, BAND, **STATED)
+    return fit_calibration(LinearCalibration, wrong, counts, BAND, **STATED)
 
 
 def three_points(generator):
     """Three points of unknown uncertainty, whose counts scatter alike."""
     kelvins = KELVINS[[0, 4, 7]]
-    return fit_linear(kelvins, signal(kelvins) + generator.normal(0.0, 5.0, 3), BAND)
+    return fit_calibration(
+        LinearCalibration, kelvins, signal(kelvins) + generator.normal(0.0, 5.0, 3), BAND
+    )
 
 
 def self_heating(generator, kelvins=KELVINS):
     """The camera warms up: 15 counts from the first point to the last."""
     kelvins, counts = points(generator, kelvins)
     warm = 15.0 * np.linspace(0.0, 1.0, kelvins.size)
-    return fit_linear(kelvins, counts + warm, BAND, **STATED)
+    return fit_calibration(LinearCalibration, kelvins, counts + warm, BAND, **STATED)
 
 
 def self_heating_twice(generator):

@@ -19,7 +19,7 @@ from chipglow.app.files import figure_file, measurement_file, study_file
 from chipglow.app.opening import open_any, open_uploaded
 from chipglow.app.pictures import MeasurementModel, SceneModel
 from chipglow.app.session import Newest, Session, SupersededError
-from chipglow.camera import expose, expose_all
+from chipglow.camera import View, expose
 from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
 from chipglow.io.sources import SourceError
@@ -402,7 +402,7 @@ def test_only_the_newest_job_is_done():
 
 def test_a_pass_that_nobody_waits_for_ends_early(opened):
     scene, camera = opened.scene, Study().camera.build()
-    field = camera.lay(CHIP_1, scene)
+    views = [View(camera.lay(CHIP_1, scene), camera.band)]
     start = opened.controls.initial.start
     calls = []
 
@@ -411,10 +411,10 @@ def test_a_pass_that_nobody_waits_for_ends_early(opened):
         raise SupersededError
 
     with pytest.raises(SupersededError):
-        expose_all(scene, (field,), camera.band, start, 10e-6, check=check)
+        expose(scene, views, start, 10e-6, check=check)
     assert calls
-    whole = expose(scene, field, camera.band, start, 10e-6)
-    (again,) = expose_all(scene, (field,), camera.band, start, 10e-6, check=lambda: None)
+    (whole,) = expose(scene, views, start, 10e-6)
+    (again,) = expose(scene, views, start, 10e-6, check=lambda: None)
     np.testing.assert_array_equal(whole.mean_radiance, again.mean_radiance)
 
 

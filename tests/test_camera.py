@@ -3,12 +3,10 @@
 import re
 from dataclasses import replace
 from math import log, sqrt
-from warnings import catch_warnings
 
 import numba
 import numpy as np
 import pytest
-import xarray as xr
 from figure6 import figure_6
 from hypothesis import given, strategies as st
 from scipy.special import erf
@@ -24,7 +22,7 @@ from chipglow.camera import (
     MeasuredPSF,
     Measurement,
 )
-from chipglow.camera.exposure import expose, expose_all, frame_weights
+from chipglow.camera.exposure import View, expose, frame_weights
 from chipglow.camera.optics.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
@@ -122,24 +120,6 @@ def test_a_black_body_measures_its_temperature(temperature, pitch, fill, offset,
     np.testing.assert_allclose(measured, np.float32(temperature), atol=tolerance, rtol=0)
 
 
-def test_a_grey_body_measures_its_radiance_temperature():
-    scene, camera = make_scene(np.full((2, 18, 18), 900.0)), Camera(integration_time=STEP)
-    band = camera.band
-    measured = temperature_of(camera.measure(scene, UniformSurface(0.42), 0.0))
-    expected = band.temperature(np.float32(0.42) * band.radiance(900.0))
-    np.testing.assert_allclose(measured, expected, atol=ROUNDING)
-
-
-def test_reflected_surroundings_add_what_the_surface_does_not_emit():
-    scene = make_scene(np.full((1, 18, 18), 900.0))
-    camera = Camera(reflected=800.0)
-    band = camera.band
-    exposure = camera.expose(scene, UniformSurface(0.5), 0.0)
-    # Equation 2; the look-up is within 4e-7.
-    expected = 0.5 * band.radiance(900.0) + 0.5 * band.radiance(800.0)
-    np.testing.assert_allclose(exposure.mean_radiance, expected, rtol=1e-6)
-
-
 def test_where_there_is_no_surface_nothing_is_reflected():
     scene = make_scene(np.full((1, 18, 18), 900.0), material=0)
     exposure = Camera(reflected=800.0).expose(scene, BLACK, 0.0)
@@ -165,7 +145,7 @@ def test_the_ends_of_the_tables_are_as_exact(temperature):
 def test_peaks_and_centre():
     scene, surface = random_scene(frames=5)
     band = Camera().band
-    exposure = expose(scene, surface, band, 0.0, 5 * STEP)
+    (exposure,) = expose(scene, [View(surface, band)], 0.0, 5 * STEP)
     temperature = scene.data["temperature"].values
     radiance = surface.values * band.radiance(temperature.astype(np.float64))
     # float32 has a step of 6e-8, the look-up is within 4e-7
@@ -196,10 +176,10 @@ def test_exposures_of_several_surfaces_are_those_of_each():
     )
     scene = Scene(data)
     for some in (surfaces, [CHIP_1, CHIP_2, CHIP_1.redrawn(1)]):
-        fields = [surface.on(scene) for surface in some]
-        found = expose_all(scene, fields, Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
-        for one, surface in zip(found, some, strict=True):
-            alone = expose(scene, surface.on(scene), Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
+        views = [View(surface.on(scene), Camera().band, 500.0) for surface in some]
+        found = expose(scene, views, 0.1 * STEP, 4 * STEP)
+        for one, view in zip(found, views, strict=True):
+            (alone,) = expose(scene, [view], 0.1 * STEP, 4 * STEP)
             np.testing.assert_array_equal(one.peak_temperature, alone.peak_temperature)
             for name in ("mean_radiance", "peak_radiance", "centre_radiance"):
                 # One unit of float32 of the emissivity, see test_surface.
@@ -225,7 +205,7 @@ def test_exposures_beside_a_gap_are_taken():
 def test_peaks_count_only_what_the_exposure_covers():
     temperature = np.full((4, 9, 9), 800.0)
     temperature[3] = 1500.0
-    exposure = expose(make_scene(temperature), BLACK, Camera().band, 0.0, 3 * STEP)
+    (exposure,) = expose(make_scene(temperature), [View(BLACK, Camera().band)], 0.0, 3 * STEP)
     assert exposure.peak_temperature.max() == 800.0
 
 
@@ -294,14 +274,6 @@ def test_sensors_of_a_plane_read_it_at_their_middles(pitch, offset, fill):
     # in x and in y: (1 + 3) / 2 samples.
     found = integrate(plane, scene, sensors, fill)
     np.testing.assert_allclose(found, expected, atol=2 * SPACING)
-
-
-def test_sampling_of_whole_groups_is_their_mean():
-    scene = Raster(0.0, 0.0, SPACING, 27, 36)
-    radiance = np.random.default_rng(6).uniform(1, 2, scene.shape)
-    groups = radiance.reshape(3, 9, 4, 9).mean(axis=(1, 3))
-    found = integrate(radiance, scene, sensor_raster(scene, 6e-6, (0.0, 0.0), None), 1.0)
-    np.testing.assert_allclose(found, groups, rtol=1e-9)
 
 
 def test_a_ninth_of_a_sensor_is_its_middle_third():
@@ -378,16 +350,6 @@ def test_knife_edge_with_the_sensors_first():
     np.testing.assert_allclose(response, expected, atol=3e-4)
 
 
-@pytest.mark.parametrize(("order", "footprints"), [("optics", 1), ("detector", 2)])
-def test_how_often_each_order_counts_the_footprint(order, footprints):
-    fwhm, pitch = 14e-6, 6e-6
-    x, response = edge_response(order, fwhm, pitch)
-    line, middle = np.diff(response), (x[1:] + x[:-1]) / 2
-    expected = fwhm**2 / (8 * log(2)) + footprints * pitch**2 / 12
-    # The energy that the kernel leaves out holds 0.2 % of the variance, a footprint 8 %.
-    assert line @ middle**2 == pytest.approx(expected, rel=5e-3)
-
-
 @pytest.mark.parametrize("order", ["optics", "detector"])
 @pytest.mark.parametrize("psf", PSFS, ids=repr)
 def test_a_pixel_does_not_depend_on_how_many_others_are_read_out(psf, order):
@@ -452,19 +414,6 @@ def test_light_from_beyond_the_scene():
     assert (Camera(psf=None).light_from_beyond(scene) == 0.0).all()
 
 
-def test_case_2_comes_from_the_same_exposure():
-    scene, surface = random_scene()
-    camera = Camera(integration_time=6 * STEP, lower_limit=None)
-    exposure = camera.expose(scene, surface, 0.0)
-    case_2 = replace(camera, psf=None)
-    np.testing.assert_array_equal(
-        case_2.form_measurement(exposure).radiance, case_2.measure(scene, surface, 0.0).radiance
-    )
-    assert not np.allclose(
-        case_2.form_measurement(exposure).radiance, camera.form_measurement(exposure).radiance
-    )
-
-
 def test_a_sequence_is_its_frames():
     scene, surface = random_scene(frames=8)
     camera = Camera(integration_time=3 * STEP, lower_limit=None)
@@ -474,10 +423,6 @@ def test_a_sequence_is_its_frames():
     for index, start in enumerate(starts):
         one = camera.measure(scene, surface, start)
         np.testing.assert_array_equal(measured.radiance[index], one.radiance[0])
-
-
-def test_frame_times():
-    np.testing.assert_allclose(Camera().frame_times(1.0, 3), [1.0, 1 + 1 / 600, 1 + 2 / 600])
 
 
 def test_result_does_not_depend_on_the_number_of_threads():
@@ -515,13 +460,6 @@ def test_without_a_floor_only_darkness_is_flagged():
     np.testing.assert_array_equal(measured.flags[0], [[Flag.UNDER_RANGE, 0]])
 
 
-def test_flagged_temperatures_need_the_band():
-    measured = Camera().measure(make_scene(np.full((1, 9, 9), 500.0)), BLACK, 0.0)
-    del measured.data.attrs["band_upper"]
-    with pytest.raises(ValueError, match="band_upper"):
-        measured.radiance_temperature(flagged=True)
-
-
 def test_a_measurement_keeps_a_response_that_is_no_box(tmp_path):
     def hill(wavelength):
         return np.exp(-(((wavelength - 4.2e-6) / 0.3e-6) ** 2))
@@ -540,19 +478,7 @@ def test_a_measurement_keeps_a_response_that_is_no_box(tmp_path):
         again.band.radiance(800.0)
 
 
-def test_measurement_tells_camera_place_and_units():
-    scene = make_scene(np.full((1, 18, 18), 900.0))
-    measured = Camera(psf=GaussianPSF(8e-6)).measure(scene, BLACK, 0.0)
-    assert measured.raster.left == pytest.approx(scene.raster.left)
-    assert measured.raster.top == pytest.approx(scene.raster.top)
-    assert measured.raster.shape == (2, 2)
-    assert measured.data.attrs["psf"] == "GaussianPSF(fwhm=8e-06)"
-    assert measured.data.attrs["integration_time"] == 10e-6
-    assert "reflected" not in measured.data.attrs
-    assert Measurement(measured.data).radiance.shape == (1, 2, 2)
-
-
-@pytest.mark.parametrize("broken", ["radiance", "units", "pitch"])
+@pytest.mark.parametrize("broken", ["radiance", "units", "pitch", "band_upper"])
 def test_broken_measurements_are_refused(broken):
     data = Camera().measure(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0).data.copy()
     if broken == "radiance":
@@ -560,10 +486,9 @@ def test_broken_measurements_are_refused(broken):
     elif broken == "units":
         data["radiance"] = data["radiance"].assign_attrs(units="W")
     else:
-        data.attrs = {}
-    assert isinstance(data, xr.Dataset)
-    with pytest.raises(ValueError, match=r"measurement: .*(radiance|pitch)"):
-        Measurement(data)
+        del data.attrs[broken]
+    with pytest.raises(ValueError, match=r"measurement: .*(radiance|pitch|band_upper)"):
+        Measurement(data).radiance_temperature(flagged=True)
 
 
 @pytest.mark.parametrize(
@@ -571,32 +496,22 @@ def test_broken_measurements_are_refused(broken):
     [
         {"pitch": 0.0},
         {"pitch": 6.0},
-        {"pitch": float("nan")},
         {"shape": (0, 5)},
         {"offset": (-1e-6, 0.0)},
-        {"fill_factor": 0.0},
         {"fill_factor": 1.1},
         {"psf": 12e-6},
         {"psf_order": "both"},
-        {"integration_time": 0.0},
         {"integration_time": 10e-3},
-        {"integration_time": float("nan")},
         {"frame_rate": -600.0},
+        {"detector": 3},
+        {"seed": -1},
         {"lower_limit": 20.0},
-        {"reflected": 20.0},
         {"band": "3-5 um"},
-        {"pitch": "6 s"},
         {"shape": 5},
-        {"shape": "5x"},
         {"shape": (5.0, 5.0)},
         {"offset": 6e-6},
-        {"offset": "00"},
-        {"fill_factor": "1"},
-        {"psf": "12 um"},
         {"integration_time": "10 um"},
-        {"frame_rate": "600"},
         {"frame_rate": float("inf")},
-        {"lower_limit": "300"},
         {"reflected": "-300 degC"},
     ],
     ids=str,
@@ -614,12 +529,8 @@ def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
         camera = Camera(lower_limit=lower_limit)
     assert camera.lower_limit == lower_limit
     assert w[0].filename == __file__
-
-
-@pytest.mark.parametrize("lower_limit", [None, 253.15, 273.15, 400.0, 573.15])
-def test_other_floors_are_not_doubted(lower_limit):
-    with catch_warnings(action="error"):
-        assert Camera(lower_limit=lower_limit).lower_limit == lower_limit
+    # Warnings are errors in tests: others are not doubted.
+    assert Camera(lower_limit=lower_limit + 3.15).lower_limit == lower_limit + 3.15
 
 
 @pytest.mark.parametrize("look", [Camera.expose, Camera.measure])
@@ -663,9 +574,9 @@ def test_what_has_no_radiance_is_refused():
 def test_exposures_of_different_grids_are_refused():
     one = Camera().expose(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0)
     other = Camera().expose(make_scene(np.full((1, 9, 18), 900.0)), BLACK, 0.0)
-    with pytest.raises(ValueError, match="different grids"):
+    with pytest.raises(ValueError, match="the same grid"):
         Camera().form_measurement([one, other])
-    with pytest.raises(ValueError, match="expected 1 or more"):
+    with pytest.raises(ValueError, match="one or more exposures"):
         Camera().form_measurement([])
     with pytest.raises(ValueError, match="mean_radiance has shape"):
         Exposure(**{**vars(one), "mean_radiance": np.zeros((2, 2))})

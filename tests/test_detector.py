@@ -8,7 +8,6 @@ from hypothesis import given, settings, strategies as st
 from scipy.constants import c, h
 
 from chipglow.camera import (
-    DETECTOR_TERMS,
     RESPONSES,
     Camera,
     ColumnNoise,
@@ -229,12 +228,6 @@ def test_full_well_and_digitiser_end_the_counts():
     assert (digitiser.capacity, digitiser.saturation) == (409.5, 4094)
 
 
-def test_the_gain_fills_the_digitiser_if_it_is_not_given():
-    made = detector(gain=None, full_well=1e6, bits=14)
-    assert frames(made, 1e6, 1).max() == (1 << 14) - 1
-    assert made.conversion_gain == pytest.approx((16383 - 400) / 1e6)
-
-
 def test_the_photon_transfer_curve_gives_gain_and_read_noise_back():
     """EMVA 1288, 6.6: the slope of the variance over the mean is the gain, at no light the dark."""
     gain, read = 0.02, 400.0
@@ -260,14 +253,6 @@ def test_the_order_of_the_list_does_not_matter():
     terms = (ReadNoise(5.0), ShotNoise(), DarkCurrent(1e6), GainPattern(0.1), NonLinearity(0.1))
     counts = [frames(detector(*order), 2e5, 2) for order in (terms, terms[::-1])]
     np.testing.assert_array_equal(*counts)
-
-
-def test_the_same_state_gives_the_same_counts_and_another_others():
-    made, radiance = detector(ReadNoise(9.0)), np.full((2, 30, 40), 100.0)
-    first = made.counts(radiance, generator(7))
-    np.testing.assert_array_equal(first, made.counts(radiance, generator(7)))
-    assert (first != made.counts(radiance, generator(8))).any()
-    assert (first[0] != first[1]).any()
 
 
 every_term = st.sampled_from(
@@ -315,12 +300,6 @@ def test_more_light_is_no_fewer_counts_by_the_same_noise(terms, less, more):
     made = detector(*terms, full_well=5e4)
     dim, bright = (frames(made, light, 2, (5, 6)) for light in (less, less + more))
     assert (bright >= dim).all()
-
-
-def test_every_term_has_an_example_and_a_place():
-    for kind, term in DETECTOR_TERMS.parts.items():
-        assert kind in term.example
-        assert term.stage is not None
 
 
 def test_a_recording_knows_the_camera():
@@ -372,7 +351,7 @@ def test_impossible_detectors_are_refused(fields, message):
         (lambda: ReadNoise(-1.0), "ReadNoise.standard_deviation: -1, expected 0 or more"),
         (lambda: Lag(1.0), "Lag.fraction: 1, expected 0 or more, under 1"),
         (lambda: PhotonResponse(1.5, 15e-6, 2.0), "quantum_efficiency: 1.5, expected over 0, up"),
-        (lambda: OperationPoint(frame_rate=0.0), "frame_rate is 0.0, expected over 0"),
+        (lambda: OperationPoint(frame_rate=0.0), "frame_rate: 0 Hz, expected over 0"),
     ],
 )
 def test_impossible_parts_are_refused(part, message):

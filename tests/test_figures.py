@@ -16,7 +16,7 @@ from analytic_chip import AnalyticChip
 from documented import ROOT
 
 import chipglow
-from chipglow.camera import Camera
+from chipglow.camera import Camera, LinearCalibration
 from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.laboratory.emissivity.figure import draw_emissivity
 from chipglow.laboratory.measurement.figures import draw_calibrations
@@ -70,10 +70,10 @@ def test_knife_edge():
 
 @compared
 def test_calibration():
-    from chipglow.camera import fit_linear
+    from chipglow.camera import fit_calibration
 
     kelvins = np.arange(573.15, 1274.0, 100.0)
     counts = 400.0 + 1.8 * chipglow.Band(3.8e-6, 5.1e-6).radiance(kelvins)
     off = counts + np.array([3.0, -2.0, 1.0, 0.0, -3.0, 2.0, 1.0, -1.0])
-    fit = fit_linear(kelvins, off, chipglow.Band(3.8e-6, 5.1e-6), 2.0, 0.3)
+    fit = fit_calibration(LinearCalibration, kelvins, off, chipglow.Band(3.8e-6, 5.1e-6), 2.0, 0.3)
     return draw_calibrations({"linear": fit})

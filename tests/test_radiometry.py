@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from chipglow.camera import Blackbody
 from chipglow.radiometry import Band, ObjectParameters, TabulatedResponse
 from chipglow.radiometry.planck import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
 
@@ -158,9 +159,18 @@ def test_a_gray_object_without_surroundings_sends_its_share_of_a_black_body():
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
-    [("emissivity", 0.0), ("emissivity", 1.1), ("transmittance", -0.1), ("reflected", 0.0)],
+    ("kind", "values", "message"),
+    [
+        (ObjectParameters, {"emissivity": 0.0}, r"ObjectParameters.emissivity: 0, expected over 0"),
+        (ObjectParameters, {"transmittance": 1.1}, r"transmittance: 1.1, expected over 0, up to 1"),
+        (ObjectParameters, {"reflected": 0.0}, r"reflected: 0 K, expected over 0"),
+        (Blackbody, {"emissivity": 1.1}, r"emissivity: 1.1, expected over 0, up to 1"),
+        (Blackbody, {"emissivity_uncertainty": -0.1}, r"emissivity_uncertainty: -0.1, expected 0"),
+        (TabulatedResponse, {"wavelengths": (3e-6,), "values": (1.0,)}, "2 or more"),
+        (TabulatedResponse, {"wavelengths": (3e-6, 2e-6), "values": (1.0, 1.0)}, "ascend"),
+        (TabulatedResponse, {"wavelengths": (3e-6, 4e-6), "values": (1.0, -1.0)}, "0 or more"),
+    ],
 )
-def test_impossible_object_parameters_are_refused(field, value):
-    with pytest.raises(ValueError, match=f"object parameters: {field} is {value}"):
-        ObjectParameters(**{field: value})
+def test_impossible_values_are_refused(kind, values, message):
+    with pytest.raises(ValueError, match=message):
+        kind(**values)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from chipglow.camera import Camera, expose_all
+from chipglow.camera import Camera, View, expose
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry
 from chipglow.study import Study
@@ -408,9 +408,9 @@ def test_several_surfaces_are_seen_as_each_alone():
     scene = a_scene(-7.0)
     surfaces = [ReflectingSurface(chip, Wedge()) for chip in (CHIP_1, CHIP_2)]
     surfaces += [ReflectingSurface(CHIP_1, Wedge(mirror=1.0)), CHIP_2]
-    fields = [CAMERA.lay(surface, scene) for surface in surfaces]
+    views = [View(CAMERA.lay(surface, scene), BAND) for surface in surfaces]
     for chosen in (slice(0, 2), slice(0, 4)):
-        together = expose_all(scene, fields[chosen], BAND, 0.0, 1e-5)
+        together = expose(scene, views[chosen], 0.0, 1e-5)
         for exposure, surface in zip(together, surfaces[chosen], strict=True):
             np.testing.assert_array_equal(exposure.mean_radiance, apparent(scene, surface))
 

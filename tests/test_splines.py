@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from chipglow.camera.exposure import expose, expose_all
+from chipglow.camera.exposure import View, expose
 from chipglow.camera.sweep import STEPS_PER_KELVIN
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
@@ -288,7 +288,7 @@ def test_a_pass_over_splines_is_that_over_their_samples(tmp_path, follow):
     surfaces = [replace(one, follow=follow, grain=7e-6) for one in (CHIP_1, CHIP_2, BOUNDED)]
     for start, duration in ((0.0, 6 * STEP), (0.3 * STEP, 3.1 * STEP)):
         passes = [
-            expose_all(one, [s.on(one) for s in surfaces], BAND, start, duration, 500.0)
+            expose(one, [View(s.on(one), BAND, 500.0) for s in surfaces], start, duration)
             for one in (scene, samples)
         ]
         for found, expected in zip(*passes, strict=True):
@@ -303,11 +303,11 @@ def test_a_row_that_begins_later_is_that_of_a_later_exposure(tmp_path):
     delays = np.repeat([0.0, 0.7, 1.5, 3.0], RASTER.rows)[::4][: RASTER.rows] * STEP
     for one in (scene, in_memory(scene)):
         for surface in (CHIP_1, UniformSurface(0.4)):
-            field = surface.on(one)
-            rolling = expose(one, field, BAND, 0.3 * STEP, 2.2 * STEP, delays=delays)
+            views = [View(surface.on(one), BAND)]
+            (rolling,) = expose(one, views, 0.3 * STEP, 2.2 * STEP, delays)
             for delay in set(delays.tolist()):
                 later, rows = (
-                    expose(one, field, BAND, 0.3 * STEP + delay, 2.2 * STEP),
+                    expose(one, views, 0.3 * STEP + delay, 2.2 * STEP)[0],
                     delays == delay,
                 )
                 for name in (
@@ -324,7 +324,7 @@ def test_the_pass_is_the_literal_sum(tmp_path):
     scene = open_scene(a_file(tmp_path / "scene.nc"))
     for surface in (CHIP_1, UniformSurface(0.4)):
         field = surface.on(scene)
-        found = expose(scene, field, BAND, 0.0, 6 * STEP)
+        (found,) = expose(scene, [View(field, BAND)], 0.0, 6 * STEP)
         radiance, hottest = [], []
         for frame in scene.frames():
             there = frame.material != Material.VOID
@@ -346,7 +346,7 @@ def test_the_pass_does_not_depend_on_the_number_of_threads(tmp_path):
     try:
         for threads in (1, before):
             numba.set_num_threads(threads)
-            found.append(expose(scene, CHIP_1.on(scene), BAND, 0.0, 6 * STEP))
+            found += expose(scene, [View(CHIP_1.on(scene), BAND)], 0.0, 6 * STEP)
     finally:
         numba.set_num_threads(before)
     np.testing.assert_array_equal(found[0].mean_radiance, found[1].mean_radiance)
@@ -359,8 +359,10 @@ def test_the_table_of_radiance_is_close_enough():
     temperature[0, 0] = 250.0 + (np.arange(50) + 0.5) / STEPS_PER_KELVIN  # the worst places
     raster = Raster(0.0, 0.0, 1e-6, 40, 50)
     scene = Scene.from_fields(raster, [0.0], {"temperature": temperature})
-    found = expose(scene, UniformSurface(1.0), BAND, 0.0, 1e-6).mean_radiance
-    np.testing.assert_allclose(found, BAND.radiance(temperature[0].astype(float)), rtol=6e-7)
+    (found,) = expose(scene, [View(UniformSurface(1.0), BAND)], 0.0, 1e-6)
+    np.testing.assert_allclose(
+        found.mean_radiance, BAND.radiance(temperature[0].astype(float)), rtol=6e-7
+    )
 
 
 def test_only_what_a_surface_needs_is_read(tmp_path, monkeypatch):
@@ -379,5 +381,5 @@ def test_only_what_a_surface_needs_is_read(tmp_path, monkeypatch):
     ):
         field = surface.on(scene)
         read.clear()
-        expose(scene, field, BAND, 0.0, 6 * STEP)
+        expose(scene, [View(field, BAND)], 0.0, 6 * STEP)
         assert sorted(read) == sorted((name, index) for name in names for index in range(6))

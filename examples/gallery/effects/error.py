@@ -25,16 +25,12 @@ import numpy as np
 from samples.chip import closed_form_chip
 
 import chipglow
-from chipglow.camera import expose
 from chipglow.drawing.drawing import new_figure, show_image, style
 from chipglow.drawing.scales import SIGNED
 
 scene = closed_form_chip(40)
 camera = chipglow.Camera(integration_time=8e-6, psf=chipglow.AnnularAperturePSF(4.45e-6))
-emissivity = camera.lay(chipglow.CHIP_2, scene)
-exposure = expose(
-    scene, emissivity, camera.band, scene.times[24], camera.integration_time, camera.reflected
-)
+exposure = camera.expose(scene, chipglow.CHIP_2, scene.times[24])
 errors, pixels = chipglow.error_images(camera, exposure), camera.pixels(scene.raster)
 
 shown = {

@@ -26,13 +26,14 @@ from chipglow.camera import (
     Detector,
     EnergyResponse,
     GainPattern,
+    LinearCalibration,
     NonUniformity,
     OffsetPattern,
     ReadNoise,
     Recording,
+    SakumaHattori,
     find_bad_pixels,
-    fit_linear,
-    fit_sakuma_hattori,
+    fit_calibration,
 )
 from chipglow.drawing.drawing import new_figure, show_image, style
 from chipglow.drawing.scales import HEAT, KELVIN
@@ -49,8 +50,8 @@ true = KELVINS + rng.normal(0.0, TEMPERATURE_UNCERTAINTY, KELVINS.size)
 counts = 400.0 + 1.8 * BAND.radiance(true) + rng.normal(0.0, COUNT_UNCERTAINTY, KELVINS.size)
 stated = (COUNT_UNCERTAINTY, TEMPERATURE_UNCERTAINTY)
 fits = {
-    "linear": fit_linear(KELVINS, counts, BAND, *stated),
-    "sakuma-hattori": fit_sakuma_hattori(KELVINS, counts, BAND, *stated),
+    "linear": fit_calibration(LinearCalibration, KELVINS, counts, BAND, *stated),
+    "sakuma-hattori": fit_calibration(SakumaHattori, KELVINS, counts, BAND, *stated),
 }
 figure = draw_calibrations(fits)
 
@@ -66,13 +67,17 @@ for lower, upper, coldest, hottest in (
 ):
     band = Band(lower * 1e-6, upper * 1e-6)
     kelvins = np.linspace(coldest, hottest, 141) + KELVIN
-    fit = fit_sakuma_hattori(kelvins, band.radiance(kelvins), band, temperature_uncertainty=1.0)
+    fit = fit_calibration(
+        SakumaHattori, kelvins, band.radiance(kelvins), band, temperature_uncertainty=1.0
+    )
     worst = np.abs(fit.residuals_temperature).max()
     print(f"{lower}-{upper} µm, {coldest} to {hottest} °C: at most {1e3 * worst:.1f} mK")
 for lower, upper in ((3.9, 5.1), (3.8, 5.0), (3.0, 5.0)):
     band = Band(lower * 1e-6, upper * 1e-6)
     seen = 400.0 + 1.8 * BAND.radiance(KELVINS)
-    fit = fit_linear(KELVINS, seen, band, temperature_uncertainty=TEMPERATURE_UNCERTAINTY)
+    fit = fit_calibration(
+        LinearCalibration, KELVINS, seen, band, temperature_uncertainty=TEMPERATURE_UNCERTAINTY
+    )
     worst = np.abs(fit.residuals_temperature).max()
     print(f"fitted with {lower}-{upper} µm: residuals to {worst:.2f} K")
 
@@ -104,8 +109,8 @@ found = find_bad_pixels(cold, hot)
 recording = Recording(
     signal=chip[:1], quantity="counts", times=np.zeros(1), camera="simulated", pitch=6e-6
 )
-calibration = fit_linear(
-    KELVINS, [np.median(frames(kelvins)) for kelvins in KELVINS], BAND
+calibration = fit_calibration(
+    LinearCalibration, KELVINS, [np.median(frames(kelvins)) for kelvins in KELVINS], BAND
 ).calibration
 plain = calibrate_recording(recording, calibration)
 corrected = calibrate_recording(

@@ -1,6 +1,7 @@
 """The error of one band and of the ratio of two against the true temperature, cause by cause."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -15,7 +16,7 @@ from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSc
 from chipglow.analysis.cut import Progress, find_cut, middle_frame, spread_starts
 from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
 from chipglow.analysis.plan import Plan
-from chipglow.camera import Camera, Exposure, RatioCamera, expose_views, frame_weights
+from chipglow.camera import Camera, Exposure, RatioCamera, expose, frame_weights
 from chipglow.camera.ratio_camera import views_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
@@ -128,7 +129,6 @@ class WavelengthPlan(Part):
         return [*((number,) for number in range(len(self.bands))), *self.pairs]
 
     def thermometer(self, pair: Sequence[int]) -> RatioThermometer:
-        """The ratio of two bands of a grey body."""
         first, second = (self.bands[number] for number in pair)
         exponent = log((second.lower + second.upper) / (first.lower + first.upper))
         return RatioThermometer(first, second, 1.0, self.exponent_uncertainty * exponent)
@@ -186,12 +186,12 @@ def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: flo
     aligned = replace(second, offset=first.offset)
     duration, of_second = first.integration_time, second.integration_time
     views = views_of(surface, scene, (first, second))
-    one, two = alike = expose_views(scene, views, start, duration)
+    one, two = alike = expose(scene, views, start, duration)
     if of_second != duration:
-        (two,) = expose_views(scene, views[1:], start, of_second)
+        (two,) = expose(scene, views[1:], start, of_second)
     late = two
     if camera.delay:
-        (late,) = expose_views(scene, views[1:], start + camera.delay, of_second)
+        (late,) = expose(scene, views[1:], start + camera.delay, of_second)
     formed, delayed = _image(first, one), _image(second, late)
     pixels = first.pixels(scene.raster)
     points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
@@ -238,7 +238,8 @@ def wavelength_errors(
     """
     tell = progress or (lambda label, part: None)
     cameras = [camera.in_band(band) for band in plan.bands]
-    kept = [spot for spot in spots if _has_room(scene, camera, spot.start, plan.delay)]
+    duration = camera.integration_time
+    kept = [spot for spot in spots if _has_room(scene, spot.start + plan.delay, duration)]
     if not kept:
         raise ValueError(
             f"delay: {1e6 * plan.delay:g} us, expected so little that the scene lasts until the "
@@ -291,7 +292,7 @@ def cut_spots(
 ) -> list[Spot]:
     """Return spots at the rake face, half a pixel into the chip, and in each shear band."""
     tell = progress or (lambda label, part: None)
-    cut = find_cut(scene, camera.integration_time, plan.exposures, plan.touching, tell)
+    cut = find_cut(scene, camera.integration_time, plan.exposures, tell)
     spots = []
     for segment in cut.segments:
         tool = segment.tool
@@ -316,13 +317,11 @@ def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str
     ]
 
 
-def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
-    """Return whether the scene lasts until a delayed exposure ends."""
-    try:
-        frame_weights(scene.times, scene.frame_spacing, start + delay, camera.integration_time)
-    except ValueError:
-        return False
-    return True
+def _has_room(scene: Scene, start: float, duration: float) -> bool:
+    with suppress(ValueError):
+        frame_weights(scene.times, scene.frame_spacing, start, duration)
+        return True
+    return False
 
 
 def _draws(
@@ -336,10 +335,10 @@ def _draws(
     """Return every band and ratio at one spot with one texture, a draw for each phase."""
     duration = cameras[0].integration_time
     views = views_of(surface, scene, cameras)
-    exposures = expose_views(scene, views, spot.start, duration)
+    exposures = expose(scene, views, spot.start, duration)
     images = late = [ExposureImages(one, shares_blur=True) for one in exposures]
     if plan.delay:
-        delayed = expose_views(scene, views, spot.start + plan.delay, duration)
+        delayed = expose(scene, views, spot.start + plan.delay, duration)
         late = [ExposureImages(one, shares_blur=True) for one in delayed]
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
     pixels = [
@@ -419,7 +418,6 @@ def _compared(
 
 
 def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: Array) -> Array:
-    """Return the temperature by radiance and emissivity in a band."""
     return np.asarray(band.temperature((radiance - environment) / emissivity + environment))
 
 
@@ -444,7 +442,6 @@ def _of_place(
 
 
 def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
-    """Return the centre of the pixel that holds a spot."""
     pixels = camera.pixels(scene.raster)
     corner = np.array([pixels.left, pixels.top])
     column, row = np.floor((spot.point - corner) * [1, -1] / pixels.spacing).astype(int)
@@ -475,17 +472,14 @@ def _of_pixel(
 
 
 def _image(camera: Camera, exposure: Exposure) -> Array:
-    """Return the radiance of a camera's pixels before its detector in W/(m² sr), shape (y, x)."""
     return camera.form_image(exposure.mean_radiance, exposure.raster)
 
 
 def _ideal(camera: Camera) -> Camera:
-    """Return the camera without its optics."""
     return replace(camera, psf=None, optics=())
 
 
 def _read(camera: Camera, image: Array, start: float) -> Array:
-    """Return what the camera's detector makes of an image."""
     return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)
 
 

@@ -1,173 +1,122 @@
-"""Cameras, virtual and real: optics, exposure, calibration, and the measurement that comes out."""
+"""Virtual and real cameras: optics, exposure, detector, calibration and measurement."""
 
-from chipglow.camera.calibration.blackbody import Blackbody
+from chipglow.camera.calibration.blackbody import (
+    Blackbody as Blackbody,
+)
 from chipglow.camera.calibration.calibration import (
-    Calibration,
-    FactoryCalibration,
-    FittedCalibration,
-    LinearCalibration,
-    SakumaHattori,
+    MODELS as MODELS,
+    Calibration as Calibration,
+    FactoryCalibration as FactoryCalibration,
+    FittedCalibration as FittedCalibration,
+    LinearCalibration as LinearCalibration,
+    SakumaHattori as SakumaHattori,
 )
-from chipglow.camera.calibration.errors import CalibrationErrors
+from chipglow.camera.calibration.errors import (
+    CalibrationErrors as CalibrationErrors,
+)
 from chipglow.camera.calibration.fit import (
-    MODELS,
-    CalibrationFit,
-    fit_linear,
-    fit_models,
-    fit_sakuma_hattori,
-    preferred,
+    CalibrationFit as CalibrationFit,
+    fit_calibration as fit_calibration,
 )
-from chipglow.camera.camera import Camera
-from chipglow.camera.detector import (
-    DETECTOR_TERMS,
-    LEAST_FRAMES,
-    RESPONSES,
-    BadPixels,
-    ColumnNoise,
-    DarkCurrent,
-    DeadElements,
-    Detector,
-    DetectorResponse,
-    DetectorTerm,
-    EnergyResponse,
-    EquivalentNoise,
-    FlatFieldCalibration,
-    FlickerNoise,
-    GainPattern,
-    Lag,
-    NonLinearity,
-    NonUniformity,
-    OffsetPattern,
-    OperationPoint,
-    PhotonResponse,
-    RangeResponse,
-    ReadNoise,
-    Readout,
-    ShotNoise,
-    Stage,
-    find_bad_pixels,
-    flat_field_calibration,
-    lower_range_limit,
-    replace_bad_pixels,
+from chipglow.camera.camera import (
+    Camera as Camera,
 )
-from chipglow.camera.exposure import Exposure, View, expose, expose_all, expose_views, frame_weights
-from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
+from chipglow.camera.detector.bad_pixels import (
+    LEAST_FRAMES as LEAST_FRAMES,
+    BadPixels as BadPixels,
+    find_bad_pixels as find_bad_pixels,
+    replace_bad_pixels as replace_bad_pixels,
+)
+from chipglow.camera.detector.detector import (
+    Detector as Detector,
+)
+from chipglow.camera.detector.flat_field import (
+    FlatFieldCalibration as FlatFieldCalibration,
+    flat_field_calibration as flat_field_calibration,
+    lower_range_limit as lower_range_limit,
+)
+from chipglow.camera.detector.nonuniformity import (
+    NonUniformity as NonUniformity,
+)
+from chipglow.camera.detector.response import (
+    RESPONSES as RESPONSES,
+    DetectorResponse as DetectorResponse,
+    EnergyResponse as EnergyResponse,
+    OperationPoint as OperationPoint,
+    PhotonResponse as PhotonResponse,
+    RangeResponse as RangeResponse,
+)
+from chipglow.camera.detector.terms import (
+    DETECTOR_TERMS as DETECTOR_TERMS,
+    ColumnNoise as ColumnNoise,
+    DarkCurrent as DarkCurrent,
+    DeadElements as DeadElements,
+    DetectorTerm as DetectorTerm,
+    EquivalentNoise as EquivalentNoise,
+    FlickerNoise as FlickerNoise,
+    GainPattern as GainPattern,
+    Lag as Lag,
+    NonLinearity as NonLinearity,
+    OffsetPattern as OffsetPattern,
+    ReadNoise as ReadNoise,
+    Readout as Readout,
+    ShotNoise as ShotNoise,
+    Stage as Stage,
+)
+from chipglow.camera.exposure import (
+    Exposure as Exposure,
+    View as View,
+    expose as expose,
+    frame_weights as frame_weights,
+)
+from chipglow.camera.measurement import (
+    UNUSABLE as UNUSABLE,
+    Flag as Flag,
+    Measurement as Measurement,
+)
 from chipglow.camera.optics.blurs import (
-    BLURS,
-    BlurredPSF,
-    BlurTerm,
-    ChargeDiffusion,
-    Jitter,
-    LinearMotion,
-    Vibration,
+    BLURS as BLURS,
+    BlurredPSF as BlurredPSF,
+    BlurTerm as BlurTerm,
+    ChargeDiffusion as ChargeDiffusion,
+    Jitter as Jitter,
+    LinearMotion as LinearMotion,
+    Vibration as Vibration,
 )
-from chipglow.camera.optics.convolution import blur
+from chipglow.camera.optics.convolution import (
+    blur as blur,
+)
 from chipglow.camera.optics.psf import (
-    PSFS,
-    AiryAperture,
-    AnnularAperturePSF,
-    GaussianPSF,
-    MeasuredPSF,
-    MeasuredPSFFile,
-    PointSpreadFunction,
-    PSFChoice,
+    PSFS as PSFS,
+    AiryAperture as AiryAperture,
+    AnnularAperturePSF as AnnularAperturePSF,
+    GaussianPSF as GaussianPSF,
+    MeasuredPSF as MeasuredPSF,
+    MeasuredPSFFile as MeasuredPSFFile,
+    PointSpreadFunction as PointSpreadFunction,
+    PSFChoice as PSFChoice,
 )
-from chipglow.camera.optics.pupil import Pupil, PupilPSF
+from chipglow.camera.optics.pupil import (
+    Pupil as Pupil,
+    PupilPSF as PupilPSF,
+)
 from chipglow.camera.optics.terms import (
-    OPTICS_TERMS,
-    Distortion,
-    FieldBlur,
-    Narcissus,
-    OpticalElement,
-    OpticsTerm,
-    Veil,
+    OPTICS_TERMS as OPTICS_TERMS,
+    Distortion as Distortion,
+    FieldBlur as FieldBlur,
+    Narcissus as Narcissus,
+    OpticalElement as OpticalElement,
+    OpticsTerm as OpticsTerm,
+    Veil as Veil,
 )
-from chipglow.camera.ratio_camera import RatioCamera, RatioMeasurement
-from chipglow.camera.recording import PlanckConversion, Recording
-from chipglow.camera.warning import ChipglowWarning
-
-__all__ = [
-    "BLURS",
-    "DETECTOR_TERMS",
-    "LEAST_FRAMES",
-    "MODELS",
-    "OPTICS_TERMS",
-    "PSFS",
-    "RESPONSES",
-    "UNUSABLE",
-    "AiryAperture",
-    "AnnularAperturePSF",
-    "BadPixels",
-    "Blackbody",
-    "BlurTerm",
-    "BlurredPSF",
-    "Calibration",
-    "CalibrationErrors",
-    "CalibrationFit",
-    "Camera",
-    "ChargeDiffusion",
-    "ChipglowWarning",
-    "ColumnNoise",
-    "DarkCurrent",
-    "DeadElements",
-    "Detector",
-    "DetectorResponse",
-    "DetectorTerm",
-    "Distortion",
-    "EnergyResponse",
-    "EquivalentNoise",
-    "Exposure",
-    "FactoryCalibration",
-    "FieldBlur",
-    "FittedCalibration",
-    "Flag",
-    "FlatFieldCalibration",
-    "FlickerNoise",
-    "GainPattern",
-    "GaussianPSF",
-    "Jitter",
-    "Lag",
-    "LinearCalibration",
-    "LinearMotion",
-    "MeasuredPSF",
-    "MeasuredPSFFile",
-    "Measurement",
-    "Narcissus",
-    "NonLinearity",
-    "NonUniformity",
-    "OffsetPattern",
-    "OperationPoint",
-    "OpticalElement",
-    "OpticsTerm",
-    "PSFChoice",
-    "PhotonResponse",
-    "PlanckConversion",
-    "PointSpreadFunction",
-    "Pupil",
-    "PupilPSF",
-    "RangeResponse",
-    "RatioCamera",
-    "RatioMeasurement",
-    "ReadNoise",
-    "Readout",
-    "Recording",
-    "SakumaHattori",
-    "ShotNoise",
-    "Stage",
-    "Veil",
-    "Vibration",
-    "View",
-    "blur",
-    "expose",
-    "expose_all",
-    "expose_views",
-    "find_bad_pixels",
-    "fit_linear",
-    "fit_models",
-    "fit_sakuma_hattori",
-    "flat_field_calibration",
-    "frame_weights",
-    "lower_range_limit",
-    "preferred",
-    "replace_bad_pixels",
-]
+from chipglow.camera.ratio_camera import (
+    RatioCamera as RatioCamera,
+    RatioMeasurement as RatioMeasurement,
+)
+from chipglow.camera.recording import (
+    PlanckConversion as PlanckConversion,
+    Recording as Recording,
+)
+from chipglow.camera.warning import (
+    ChipglowWarning as ChipglowWarning,
+)

@@ -2,41 +2,27 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from typing import Annotated, Final, Literal
 from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.detector import (
-    Detector,
-    FlatFieldCalibration,
-    Lag,
-    OperationPoint,
-    flat_field_calibration,
-)
-from chipglow.camera.detector.terms import follows
-from chipglow.camera.exposure import Exposure, expose_all
+from chipglow.camera.detector.detector import Detector
+from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
+from chipglow.camera.detector.response import OperationPoint
+from chipglow.camera.detector.terms import Lag, follows
+from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
-from chipglow.camera.optics import (
-    BLURS,
-    AnnularAperturePSF,
-    OpticsTerm,
-    PointSpreadFunction,
-    blur,
-)
-from chipglow.camera.optics.convolution import (
-    blur_of_like,
-    both_borders,
-    both_images_on_pixels,
-    image_on_pixels,
-    light_from_beyond,
-)
+from chipglow.camera.optics.blurs import BLURS
+from chipglow.camera.optics.convolution import Beyond, blur, image_on_pixels
+from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
-from chipglow.camera.optics.terms import Blur
+from chipglow.camera.optics.terms import OpticsTerm
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
@@ -46,6 +32,7 @@ from chipglow.surface import EmissivityField, Surface
 BORDER_TOLERANCE: Final = 1.0
 """Change in K of a pixel from which on it is said that the border of the scene matters."""
 
+_ROUNDING: Final = 1e-13
 _COLD_FLOOR: Final = 373.15
 """Floor in K up to which a round number is probably one of degrees Celsius."""
 
@@ -195,94 +182,43 @@ class Camera(Part):
 
     @classmethod
     def paper(cls) -> "Camera":
-        """The camera of the paper's simulation, as far as the paper states it.
+        """Return the camera of the paper's simulation, as far as the paper states it.
 
-        The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6:
-        that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
-        the paper prints as a picture only, is an assumption: see `AnnularAperturePSF`. A study's
-        camera is this one, unless it says otherwise.
+        The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6;
+        that changes temperatures by up to 7 K. The point spread function, which the paper prints as
+        a picture only, is an assumption: see `AnnularAperturePSF`.
         """
         return cls(psf_order="detector")
 
     def pixels(self, scene: Raster) -> Raster:
-        """Where the pixels lie on a scene.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-
-        Raises
-        ------
-        ValueError
-            If not one pixel fits, or `shape` reaches beyond the scene.
-        """
+        """Return the raster of the pixels on a scene."""
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
 
     def in_band(self, band: Band) -> "Camera":
-        """The camera with another band: its diffraction is that of the band.
-
-        Parameters
-        ----------
-        band : Band
-            The other band. There is no lower range limit in it: the camera's is of its own band.
-        """
+        """Return the camera with another band and its diffraction, without a lower range limit."""
         psf = None if self.psf is None else self.psf.in_band(band)
         return replace(self, band=band, psf=psf, lower_limit=None)
 
     def redrawn(self, number: int) -> "Camera":
-        """The camera with other noise of its detector: the seed `number` further on."""
+        """Return the camera with other detector noise: its seed increased by `number`."""
         return replace(self, seed=self.seed + number) if number and self.detector else self
 
     def calibration(self, shape: tuple[int, int]) -> FlatFieldCalibration | None:
-        """The calibration of the detector at this camera's exposure; None without a detector.
-
-        Parameters
-        ----------
-        shape : tuple of int
-            Rows and columns of the pixels.
-        """
+        """Return the detector's calibration for pixels of this shape; None without a detector."""
         if self.detector is None:
             return None
         point = OperationPoint(self.band, self.integration_time, self.frame_rate, self.fill_factor)
         return flat_field_calibration(self.detector, point, shape)
 
-    def frame_times(self, start: float, count: int) -> NDArray[np.float64]:
-        """When the frames of a sequence begin.
-
-        Parameters
-        ----------
-        start : float
-            When the first frame begins in s.
-        count : int
-            Number of frames.
-
-        Returns
-        -------
-        ndarray
-            Times in s, shape (count,).
-        """
+    def frame_times(self, start: float, count: int) -> Array:
+        """Return the start times of a sequence of frames in s, shape (count,)."""
         return start + np.arange(count) / self.frame_rate
 
-    def row_delays(self, scene: Raster) -> NDArray[np.float64]:
-        """How much later than the first row's each sample's integration begins.
+    def row_delays(self, scene: Raster) -> Array:
+        """Return how much later than the first row each row of samples begins to integrate.
 
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-
-        Returns
-        -------
-        ndarray
-            For each row of samples that of the pixels in which its middle lies, or of the nearest
-            ones, in s, shape (y,); 0 with a global shutter.
-
-        Raises
-        ------
-        ValueError
-            If the pixels do not fit the scene, or all their rows take longer than there is between
-            frames.
+        In s, shape (y,): that of the pixels in which the row's middle lies, or of the nearest ones;
+        0 with a global shutter.
         """
         sensors = self.pixels(scene)
         if self.line_time is None:
@@ -297,30 +233,11 @@ class Camera(Part):
         return np.asarray(self.line_time * np.clip(rows, 0, sensors.rows - 1), np.float64)
 
     def frame_duration(self, scene: Raster) -> float:
-        """Time in s from the beginning of the first row's integration to the end of the last's.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-        """
+        """Return the time in s from the first row's start of integration to the last's end."""
         return self.integration_time + float(self.row_delays(scene).max())
 
     def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
-        """Lay a surface on a scene as this camera sees it, in its band and its surroundings.
-
-        Parameters
-        ----------
-        surface : Surface
-            The surface.
-        scene : Scene
-            What it is laid on.
-
-        Raises
-        ------
-        ValueError
-            If the surface is none, or the scene lacks what it needs.
-        """
+        """Return a surface laid on a scene, in this camera's band and surroundings."""
         if not isinstance(surface, Surface):
             raise ValueError(
                 f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
@@ -329,22 +246,9 @@ class Camera(Part):
         return surface.in_band(self.band, self.reflected).on(scene)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
-        """Let a scene shine on the camera for one integration time.
+        """Return the exposure of a scene from `start` on, in s, over one integration time.
 
-        Parameters
-        ----------
-        scene : Scene
-            What is truly there.
-        surface : Surface
-            Its emissivity.
-        start : float
-            When the integration begins in s.
-
-        Raises
-        ------
-        ValueError
-            If the surface is none, the integration reaches beyond the scene, or the pixels do not
-            fit it.
+        A ValueError if the integration reaches beyond the scene, or the pixels do not fit it.
         """
         (exposure,) = self.expose_fields(scene, (self.lay(surface, scene),), start)
         return replace(exposure, effects=surface.effects)
@@ -356,112 +260,83 @@ class Camera(Part):
         start: float,
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
-        """Exposures of a scene with several surfaces: each of its frames is read once.
+        """Return the exposures of several surfaces, laid by `lay`: each frame is read once.
 
-        Parameters
-        ----------
-        scene : Scene
-            What is truly there.
-        fields : sequence of EmissivityField
-            The surfaces as this camera sees them (`lay`); one or more.
-        start : float
-            When the integration of the first row begins in s.
-        check : callable, optional
-            Called now and then meanwhile; what it raises ends the pass.
-
-        Raises
-        ------
-        ValueError
-            As for `expose`.
+        `start` is when the integration of the first row begins in s; an error that `check`, called
+        now and then meanwhile, raises ends the pass.
         """
-        when = start, self.integration_time
+        views = [View(field, self.band, self.reflected) for field in fields]
         delays = self.row_delays(scene.raster)
-        return expose_all(scene, fields, self.band, *when, self.reflected, delays, check)
+        return expose(scene, views, start, self.integration_time, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
-        """Make the frames that the camera reads from exposures.
+        """Return the frames that the camera reads from exposures.
 
-        Size of source, blur and mean over time are linear and change places: the mean, which an
-        exposure holds, is blurred and integrated once. That is equal to the loop of Figure 6, and
-        any number of cameras with the same band, integration time and surroundings may develop
-        the same exposures.
+        Size of source, blur and mean over time are linear and commute: the mean, which an exposure
+        holds, is blurred and integrated once. That equals the loop of Figure 6, and any number of
+        cameras with the same band, integration time and surroundings may use the same exposures.
 
         Parameters
         ----------
         exposures : Exposure or iterable of Exposure
-            What the scene sent, one for each frame.
+            One for each frame.
 
         Returns
         -------
         Measurement
-            As many frames as exposures. Its attribute ``warnings`` says how far the border of the
+            As many frames as exposures. Its attribute ``warnings`` states how far the border of the
             scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
 
         Raises
         ------
         ValueError
-            If there is no exposure, they are of different grids, or the pixels do not fit.
+            If there is no exposure, their grids differ, or the pixels do not fit.
 
         Notes
         -----
-        What is beyond the scene is not known. It is taken to be as at the scene's edge, and the
-        light that comes from there (`light_from_beyond`) is what a warning is about: it compares
-        with a second assumption, by which each pixel sees beyond the scene the like of what it
-        sees within.
+        Beyond the scene radiance is taken to be as at the scene's edge. The warning compares with a
+        second assumption: that beyond the scene each pixel sees the like of what it sees within.
         """
-        if isinstance(exposures, Exposure):
-            exposures = (exposures,)
-        starts, frames, alike, effects, sensors = [], [], [], [], None
-        for exposure in exposures:
-            found = self.pixels(exposure.raster)
-            if sensors not in (None, found):
-                raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
-            sensors = found
+        images: list[Array] = []
+        alike, starts, effects, grids = [], [], [], set()
+        for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
+            scene = exposure.raster
+            images.append(self.form_image(exposure.mean_radiance, scene))
+            alike.append(self._image_of_like(exposure.mean_radiance, scene))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
-            image, like = self._both_images(exposure.mean_radiance, exposure.raster, sensors)
-            frames.append(image)
-            if like is not None:
-                alike.append(like)
-        if sensors is None:
-            raise ValueError("camera: no exposure to develop, expected 1 or more")
-        images, times = np.stack(frames), np.array(starts)
-        measured = self._measurement(images, times, sensors)
+            grids.add(self.pixels(scene))
+        if len(grids) != 1:
+            raise ValueError("camera: one or more exposures of the same grid are required")
+        measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
-        said = list(self._warnings(times))
-        if alike:
-            other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
-            # Noise is no matter of the border.
-            ideal = (
-                replace(self, detector=None)._measurement(images, times, sensors)
-                if self.detector
-                else measured
-            )
-            said += _border_warning(ideal, other, exposure.raster)
-        if said:
-            measured.data.attrs["warnings"] = "\n".join(said)
+        warnings = [
+            *self._lag_warning(measured.times),
+            *self._border_warning(np.stack(images), np.stack(alike), scene),
+        ]
+        if warnings:
+            measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured
 
     def measure(
-        self, scene: Scene, surface: Surface, start: float | Sequence[float] | NDArray[np.float64]
+        self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
         """Measure a scene.
 
         Parameters
         ----------
         scene : Scene
-            What is truly there.
+            The true temperatures.
         surface : Surface
             Its emissivity.
         start : float or sequence of float
-            When the integration of each frame begins in s; see `frame_times` for a sequence at
-            the frame rate.
+            Start of each frame's integration in s; see `frame_times` for a sequence at the frame
+            rate.
 
         Returns
         -------
         Measurement
-            As many frames as starts. It states the scene's tool, and in its attributes camera and
-            surface: every effect that made it.
+            As many frames as starts, with the scene's tool, and attributes of camera and surface.
 
         Raises
         ------
@@ -476,35 +351,12 @@ class Camera(Part):
         )
         return measured.with_tool(scene.tool) if scene.tool else measured
 
-    def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
-        """Fraction of the light of every pixel that comes from beyond a scene, where none is known.
+    def light_from_beyond(self, scene: Raster) -> Array:
+        """Return the fraction of each pixel's light that comes from beyond a scene, (y, x)."""
+        return 1 - self._own_light(scene)
 
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-
-        Returns
-        -------
-        ndarray
-            From 0 to under 1, of the shape of `sensors`; 0 without a point spread function.
-
-        Raises
-        ------
-        ValueError
-            If the pixels do not fit the scene.
-        """
-        sensors = self.pixels(scene)
-        if self.psf is None:
-            return np.zeros(sensors.shape)
-        if self.psf_order == "optics":
-            fraction = light_from_beyond(self.psf, scene.spacing, scene.shape)
-            return integrate(fraction, scene, sensors, self._sensitive(scene))
-        whole, own = whole_raster(scene, sensors)
-        return light_from_beyond(self.psf, self.pitch, whole.shape)[own].copy()
-
-    def form_image(self, radiance: NDArray[np.float64], scene: Raster) -> NDArray[np.float64]:
-        """Image of a map of radiance on the pixels: optics, point spread function and footprint.
+    def form_image(self, radiance: Array, scene: Raster) -> Array:
+        """Return the image of a radiance map on the pixels: optics, PSF and footprint.
 
         Parameters
         ----------
@@ -522,7 +374,7 @@ class Camera(Part):
         Raises
         ------
         ValueError
-            If the map is not of the raster's shape, holds what is no radiance, or the pixels do
+            If the map is not of the raster's shape or not finite and 0 or more, or the pixels do
             not fit the scene.
         """
         image = np.asarray(radiance, np.float64)
@@ -530,53 +382,43 @@ class Camera(Part):
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
-        sensors = self.pixels(scene)
-        if self.psf is not None and self.psf_order == "optics":
-            if not self.optics:
-                return image_on_pixels(image, self.psf, scene, sensors, self._sensitive(scene))
-            image = blur(image, self.psf, scene.spacing)
-        return self._read_out(image, scene, sensors, blur)
+        return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
 
-    def _both_images(
-        self, radiance: NDArray[np.float64], scene: Raster, sensors: Raster
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-        """Image on the pixels by either rule of what is beyond the scene, if that matters."""
-        image = like = radiance
-        if self.psf is None and not self.optics:
-            return self._read_out(image, scene, sensors, blur), None
+    def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
+        """Return the radiance that the pixels receive: point spread function, optics, footprint."""
+        pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
             if not self.optics:
                 sensitive = self._sensitive(scene)
-                return both_images_on_pixels(image, self.psf, scene, sensors, sensitive)
-            image, like = both_borders(image, self.psf, scene.spacing)
-        return (
-            self._read_out(image, scene, sensors, blur),
-            self._read_out(like, scene, sensors, blur_of_like),
-        )
-
-    def _read_out(
-        self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """Radiance of every pixel, `sensors.shape`, from an image behind the optics' own PSF."""
+                return image_on_pixels(image, self.psf, scene, pixels, sensitive, beyond)
+            image = blurred(image, self.psf, scene.spacing)
         for term in self.optics:
-            image = term.on_samples(image, scene, sensors, blurred)
-        image = self._on_pixels(image, scene, sensors, blurred)
-        for term in self.optics:
-            image = term.on_pixels(image, sensors, self.band)
-        return image
-
-    def _on_pixels(
-        self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """What pixels integrate, in the detector's order with the point spread function."""
+            image = term.on_samples(image, scene, pixels, blurred)
         if self.psf is None or self.psf_order == "optics":
-            return integrate(image, scene, sensors, self._sensitive(scene))
+            return integrate(image, scene, pixels, self._sensitive(scene))
         # Pixels that are not read out tell what is beyond those that are.
-        whole, own = whole_raster(scene, sensors)
+        whole, own = whole_raster(scene, pixels)
         return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
+    def _show(self, image: Array, pixels: Raster) -> Array:
+        """Return the radiance that the optics show for what the pixels received."""
+        for term in self.optics:
+            image = term.on_pixels(image, pixels, self.band)
+        return image
+
+    def _image_of_like(self, image: Array, scene: Raster) -> Array:
+        """Return the image if each pixel saw beyond the scene the like of what it sees within."""
+        within = self._collect(image, scene, "nothing") / self._own_light(scene)
+        return self._show(within, self.pixels(scene))
+
+    @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
+    def _own_light(self, scene: Raster) -> Array:
+        """Return the fraction of each pixel's light that comes from within the scene."""
+        fraction = self._collect(np.ones(scene.shape), scene, "nothing")
+        return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
+
     def _sensitive(self, scene: Raster) -> float:
-        """Fraction of a pixel's square that it integrates: a sample, if the blur did the rest."""
+        """Return the fraction of a pixel's square that it integrates, less after a footprint."""
         if not self._blur_has_footprint:
             return self.fill_factor
         return min((scene.spacing / self.pitch) ** 2, 1.0)
@@ -585,40 +427,19 @@ class Camera(Part):
     def _blur_has_footprint(self) -> bool:
         return self.psf is not None and "footprint" in self.psf.includes
 
-    def measurement(
-        self, images: NDArray[np.float64], starts: NDArray[np.float64], scene: Raster
-    ) -> Measurement:
-        """The frames that the camera reads from images that it formed.
+    def measurement(self, images: Array, starts: Array, scene: Raster) -> Measurement:
+        """Return the frames read from images of `form_image` of a scene, shape (time, y, x)."""
+        pixels = self.pixels(scene)
+        radiance, flags = self.read(images, starts)
+        attributes = self._attributes(pixels.shape)
+        return Measurement.from_radiance(
+            radiance, self.band, starts, pixels, self.lower_limit, flags, attributes=attributes
+        )
 
-        Parameters
-        ----------
-        images : ndarray
-            Radiance in W/(m² sr) as `form_image` gives it, shape (time, y, x).
-        starts : ndarray
-            When the integration of each began in s, shape (time,).
-        scene : Raster
-            The samples of the scene that they are images of.
-        """
-        return self._measurement(images, starts, self.pixels(scene))
+    def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
+        """Return radiance and flags that detector and calibration make of images (time, y, x).
 
-    def read(
-        self, images: NDArray[np.float64], starts: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.uint8] | None]:
-        """What the detector and its calibration make of images.
-
-        Parameters
-        ----------
-        images : ndarray
-            Radiance in W/(m² sr) as `form_image` gives it, shape (time, y, x).
-        starts : ndarray
-            When the integration of each began in s, shape (time,).
-
-        Returns
-        -------
-        radiance : ndarray
-            As the camera reads it; without a detector the images themselves.
-        flags : ndarray or None
-            Sums of `Flag`, uint8, of the same shape; None without a detector.
+        Without a detector the images themselves, and None.
         """
         calibration = self.calibration(images.shape[1:])
         if self.detector is None or calibration is None:
@@ -628,34 +449,40 @@ class Camera(Part):
         return calibration.radiance(counts)
 
     def _generator(self, start: float) -> np.random.Generator:
-        """Noise of the frame that begins then, however many others are read with it."""
+        """Return the noise of the frame that begins then, however many others are read with it."""
         return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
 
-    def _measurement(
-        self, images: NDArray[np.float64], starts: NDArray[np.float64], sensors: Raster
-    ) -> Measurement:
-        radiance, flags = self.read(images, starts)
-        return Measurement.from_radiance(
-            radiance,
-            self.band,
-            starts,
-            sensors,
-            self.lower_limit,
-            flags,
-            attributes=self._attributes(sensors.shape),
-        )
-
-    def _warnings(self, starts: NDArray[np.float64]) -> Iterator[str]:
-        """What to know of frames by when they begin, a sentence each."""
+    def _lag_warning(self, starts: Array) -> Iterator[str]:
+        """Warn where no frame follows another, so that there is no lag."""
         lags = self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms)
         if lags and not follows(starts, 1 / self.frame_rate).any():
             yield (
-                "Lag: no frame comes one time between frames after another, so the frame before is "
-                "taken to be as the frame itself: there is no lag in them."
+                "Lag: no two frames are one frame period apart, so each frame is taken as its own "
+                "predecessor: there is no lag in them."
             )
 
+    def _border_warning(self, images: Array, alike: Array, scene: Raster) -> Iterator[str]:
+        """Warn how far another assumption about what is beyond the scene changes temperatures."""
+        kelvins = self.band.temperature(images)
+        change = np.abs(kelvins - self.band.temperature(alike))
+        change[~(kelvins >= (self.lower_limit or 0.0))] = np.nan
+        changed = change > BORDER_TOLERANCE
+        if not changed.any():
+            return
+        pixels, (left, right, bottom, top) = self.pixels(scene), scene.extent
+        across = np.minimum(pixels.x - left, right - pixels.x)
+        down = np.minimum(top - pixels.y, pixels.y - bottom)
+        reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
+        yield (
+            "The border of the scene: beyond it the surface is taken to be as at the edge. If the "
+            "surroundings instead resembled what each pixel sees within the scene, "
+            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
+            f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
+            "most."
+        )
+
     def _attributes(self, shape: tuple[int, int]) -> dict[str, float | str]:
-        """What a measurement does not state of the camera by itself; SI, without what is None."""
+        """Return the camera's attributes of a measurement, in SI, without those that are None."""
         attributes: dict[str, float | str | None] = {
             "offset_right": self.offset[0],
             "offset_down": self.offset[1],
@@ -678,24 +505,3 @@ class Camera(Part):
                 "netd_temperature": calibration.half_temperature,
             }
         return {name: value for name, value in attributes.items() if value is not None}
-
-
-def _border_warning(
-    measured: Measurement, other: NDArray[np.float64], scene: Raster
-) -> Iterator[str]:
-    """What the border of the scene may change, beside temperatures under another assumption."""
-    change = np.abs(measured.radiance_temperature() - other)
-    changed = change > BORDER_TOLERANCE
-    if not changed.any():
-        return
-    (left, right, bottom, top), at = scene.extent, measured.raster
-    across = np.minimum(at.x - left, right - at.x)
-    down = np.minimum(top - at.y, at.y - bottom)
-    reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
-    yield (
-        "The border of the scene: beyond it the surface is taken to be as at the edge. With "
-        "the like of what each pixel sees within the scene there instead, "
-        f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
-        f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
-        "most."
-    )

@@ -1,4 +1,4 @@
-"""The exposure: a scene's radiance, summed over the integration time in one pass."""
+"""Exposures: a scene's radiance, summed over the integration time in one pass."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Check, Sums
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Frame, Raster, Scene, is_gap
@@ -21,40 +22,23 @@ _ROUNDING: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """What a scene sent toward the camera during one integration time, on the scene's samples.
-
-    Parameters
-    ----------
-    start, duration : float
-        When the integration began and how long it lasted, in s.
-    raster : Raster
-        The scene's samples.
-    mean_radiance : ndarray
-        Mean over time of the apparent radiance in W/(m² sr), float64, shape (y, x).
-    peak_radiance : ndarray
-        Largest apparent radiance of any sub-frame in W/(m² sr), float32, shape (y, x).
-    peak_temperature : ndarray
-        Highest true temperature of any sub-frame in K, float32, shape (y, x); NaN where no
-        sub-frame had material.
-    centre_radiance : ndarray
-        Apparent radiance at the middle of the integration in W/(m² sr), float64, shape (y, x).
-    effects : mapping
-        What a measurement of it states of the surface: `Surface.effects`. Nothing by default.
-
-    Raises
-    ------
-    ValueError
-        If an array is not of the raster's shape.
-    """
+    """A scene's radiance during one integration time, on the scene's samples; W/(m² sr), (y, x)."""
 
     start: float
+    """Start of the integration in s."""
     duration: float
+    """Integration time in s."""
     raster: Raster
-    mean_radiance: NDArray[np.float64]
+    mean_radiance: Array
+    """Mean over time of the apparent radiance."""
     peak_radiance: NDArray[np.float32]
+    """Largest apparent radiance of any sub-frame."""
     peak_temperature: NDArray[np.float32]
-    centre_radiance: NDArray[np.float64]
+    """Highest true temperature of any sub-frame in K; NaN without material."""
+    centre_radiance: Array
+    """Apparent radiance at the middle of the integration."""
     effects: Mapping[str, str] = field(default_factory=dict)
+    """Attributes of its measurements about the surface: `Surface.effects`."""
 
     def __post_init__(self) -> None:
         for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
@@ -67,17 +51,7 @@ class Exposure:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A surface as a camera of one band looks at it.
-
-    Parameters
-    ----------
-    emissivity : EmissivityField
-        The surface, laid on the scene: what it is in this band.
-    band : Band
-        The band.
-    reflected : float, optional
-        Temperature in K of surroundings that the surface reflects; none by default.
-    """
+    """A surface, laid on a scene, in a band, with the temperature in K of surroundings."""
 
     emissivity: EmissivityField
     band: Band
@@ -91,114 +65,22 @@ class View:
 
 def expose(
     scene: Scene,
-    emissivity: EmissivityField,
-    band: Band,
-    start: float,
-    duration: float,
-    reflected: float | None = None,
-    delays: NDArray[np.float64] | None = None,
-) -> Exposure:
-    """Sum a scene's apparent radiance over an integration time.
-
-    Parameters
-    ----------
-    scene : Scene
-        The true temperature over time.
-    emissivity : EmissivityField
-        The surface, laid on the scene.
-    band : Band
-        The camera's spectral band.
-    start, duration : float
-        When the integration begins and how long it lasts, in s.
-    reflected : float, optional
-        Temperature in K of surroundings that the surface reflects; none by default.
-    delays : ndarray, optional
-        How much later than `start` the integration of each row of samples begins in s, 0 or more,
-        shape (y,): a rolling shutter's (`Camera.row_delays`). All at once by default.
-
-    Returns
-    -------
-    Exposure
-
-    Raises
-    ------
-    ValueError
-        If the integration reaches beyond the scene or into a gap between its frames, or a
-        temperature is outside the range of the camera's tables or an emissivity outside 0 to 1.
-
-    Notes
-    -----
-    Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
-    (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
-    between values 1/32 K apart, within 6e-7 of it from 250 K on.
-    """
-    return expose_all(scene, (emissivity,), band, start, duration, reflected, delays)[0]
-
-
-def expose_all(
-    scene: Scene,
-    emissivities: Sequence[EmissivityField],
-    band: Band,
-    start: float,
-    duration: float,
-    reflected: float | None = None,
-    delays: NDArray[np.float64] | None = None,
-    check: Check | None = None,
-) -> tuple[Exposure, ...]:
-    """Exposures of a scene with several surfaces: each of its frames is read once.
-
-    Parameters
-    ----------
-    scene, band, start, duration, reflected, delays
-        As for `expose`.
-    emissivities : sequence of EmissivityField
-        The surfaces, laid on the scene; one or more.
-    check : callable, optional
-        Called now and then meanwhile; what it raises ends the pass.
-
-    Returns
-    -------
-    tuple of Exposure
-        One for each surface, the same as `expose` makes.
-
-    Raises
-    ------
-    ValueError
-        As for `expose`.
-    """
-    views = [View(emissivity, band, reflected) for emissivity in emissivities]
-    return expose_views(scene, views, start, duration, delays, check)
-
-
-def expose_views(
-    scene: Scene,
     views: Sequence[View],
     start: float,
     duration: float,
-    delays: NDArray[np.float64] | None = None,
+    delays: Array | None = None,
     check: Check | None = None,
 ) -> tuple[Exposure, ...]:
-    """Exposures of a scene with several surfaces in several bands: each frame is read once.
+    """Sum a scene's apparent radiance from `start` on over a duration, in s, for some views.
 
-    A surface that is seen in several bands, and a band in which several surfaces are seen, are
-    computed once for each frame.
+    Each frame is read once. A surface that is seen in several bands, and a band in which several
+    surfaces are seen, are computed once for each frame. `delays` are how much later than `start`
+    each row of samples begins in s, of a rolling shutter; an error that `check`, called now and
+    then, raises ends the pass.
 
-    Parameters
-    ----------
-    scene, start, duration, delays, check
-        As for `expose_all`.
-    views : sequence of View
-        What is looked at, and in which band; one or more.
-
-    Returns
-    -------
-    tuple of Exposure
-        One for each view, the same as `expose` makes.
-
-    Raises
-    ------
-    ValueError
-        As for `expose`.
+    Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
+    (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
+    between values 1/32 K apart, within 6e-7 of it from 250 K on.
     """
     if delays is None:
         delays = np.zeros(scene.raster.rows)
@@ -207,13 +89,13 @@ def expose_views(
     bands = list(dict.fromkeys(view.band for view in views))
     places = {id(one): number for number, one in enumerate(fields)}
     stack = fields[0].beside(fields[1:])
-    sums = Sums.zero(
+    sums = Sums(
         np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
         np.stack([_fine_table(band) for band in bands]),
         np.array([view.environment for view in views], np.float32),
         stack.most,
         scene.raster.shape,
-        check or _nothing,
+        check,
     )
     _sweep(scene, stack, indices, weights, middles, sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
@@ -238,39 +120,14 @@ def expose_views(
     )
 
 
-def _nothing() -> None:
-    pass
-
-
 def frame_weights(
-    times: NDArray[np.float64], frame_spacing: float, start: float, duration: float
-) -> tuple[range, NDArray[np.float64]]:
-    """Fraction of an integration time that each sub-frame stands for.
+    times: Array, frame_spacing: float, start: float, duration: float
+) -> tuple[range, Array]:
+    """Return the sub-frames that an integration covers, and their weights, of sum 1.
 
-    A sub-frame stands for the time from its own to the next one's, the last one and those before
-    a gap for `frame_spacing`: 10 µs that begin with a sub-frame hold fifty of 0.2 µs, all of one
-    weight. A scene of one frame does not change, and stands for all times.
-
-    Parameters
-    ----------
-    times : ndarray
-        Times of the scene's frames in s, ascending, shape (n,).
-    frame_spacing : float
-        Usual time between frames in s.
-    start, duration : float
-        When the integration begins and how long it lasts, in s.
-
-    Returns
-    -------
-    indices : range
-        The sub-frames that the integration covers.
-    weights : ndarray
-        Their weights, of sum 1.
-
-    Raises
-    ------
-    ValueError
-        If the integration reaches beyond the scene, or into a gap between its frames.
+    A sub-frame stands for the time until the next one, the last one and those before a gap for
+    `frame_spacing`: 10 µs that begin with a sub-frame hold fifty of 0.2 µs, all of one weight. A
+    scene of one frame does not change, and stands for all times.
     """
     if times.size == 1:
         return range(1), np.ones(1)
@@ -297,9 +154,9 @@ def frame_weights(
 
 
 def _row_weights(
-    scene: Scene, start: float, duration: float, delays: NDArray[np.float64]
-) -> tuple[range, NDArray[np.float64], NDArray[np.intp]]:
-    """Sub-frames of an exposure, their weights in each row, and which is in a row's middle."""
+    scene: Scene, start: float, duration: float, delays: Array
+) -> tuple[range, Array, NDArray[np.intp]]:
+    """Return an exposure's sub-frames, their weights in each row, and each row's middle one."""
     times, spacing = scene.times, scene.frame_spacing
     different, row_of = np.unique(delays, return_inverse=True)
     starts = start + different
@@ -322,7 +179,7 @@ def _row_weights(
 
 
 def _frame_at(scene: Scene, time: float, indices: range) -> int:
-    """The one of these frames that stands for a time."""
+    """Return the frame of these that stands for a time."""
     rounded = time + _ROUNDING * scene.frame_spacing
     index = int(np.searchsorted(scene.times, rounded, side="right")) - 1
     return min(max(index, indices[0]), indices[-1])
@@ -332,30 +189,25 @@ def _sweep(
     scene: Scene,
     stack: EmissivityStack,
     indices: range,
-    weights: NDArray[np.float64],
+    weights: Array,
     middles: NDArray[np.intp],
     sums: Sums,
 ) -> None:
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
     features = stack if isinstance(stack, FeatureFields) else None
     if features is not None and (splines := _splines(scene, indices)):
-        shifts = np.stack([features.shifts(frame.time) for frame in splines])
-        textures, fixed = features.textures, features.fixed_positions
-        sums.add_splines(splines, fixed, shifts, textures, weights, middles)
+        sums.add_splines(splines, features, weights, middles)
         return
     for begin, frames in _batches(scene, indices, stack.needs):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
-        inside = middles - begin
         if features is None:
-            sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
+            sums.add_given(frames, stack, part, middles - begin)
         else:
-            positions = [features.positions(frame) for frame in frames]
-            shifts = np.stack([features.shifts(frame.time) for frame in frames])
-            sums.add_features(frames, positions, shifts, features.textures, part, inside)
+            sums.add_features(frames, features, part, middles - begin)
 
 
 def _splines(scene: Scene, indices: range) -> list[SplineFrame]:
-    """The splines of these frames; none for a scene of samples."""
+    """Return the splines of these frames; none for a scene of samples."""
     found = (scene.splines(index) for index in indices)
     return [splines for splines in found if splines is not None]
 
@@ -363,7 +215,7 @@ def _splines(scene: Scene, indices: range) -> list[SplineFrame]:
 def _batches(
     scene: Scene, indices: range, needs: Collection[str] | None
 ) -> Iterator[tuple[int, list[Frame]]]:
-    """Frames, a few at a time, with the place of the first; the next are read meanwhile."""
+    """Yield the place of the first and a few frames, while the next ones are read."""
 
     def read(begin: int) -> list[Frame]:
         return [scene.frame(index, needs) for index in indices[begin : begin + BATCH]]
@@ -380,7 +232,7 @@ def _batches(
 
 @lru_cache(maxsize=8)
 def _fine_table(band: Band) -> NDArray[np.float32]:
-    """Radiance at steps so fine that a straight line between them is exact enough, and fast."""
+    """Return radiance at steps so fine that a straight line between them is exact enough."""
     count = round((TABLE_HOTTEST - TABLE_COLDEST) * STEPS_PER_KELVIN) + 1
     values = np.asarray(band.radiance(TABLE_COLDEST + np.arange(count) / STEPS_PER_KELVIN))
     return np.stack([values, np.diff(values, append=values[-1])], axis=1).astype(np.float32)

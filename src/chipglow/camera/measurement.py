@@ -1,4 +1,4 @@
-"""What a camera saw: frames of radiance temperature, simulated or real."""
+"""Frames of radiance temperature, simulated or real."""
 
 from collections.abc import Mapping
 from enum import IntFlag
@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
+from chipglow.quantities import Array
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
 from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
@@ -26,7 +27,7 @@ MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1
 
 
 class Flag(IntFlag):
-    """What is wrong with a pixel; it has a radiance temperature only if it was `REPLACED`."""
+    """Faults of a pixel; only a `REPLACED` one has a radiance temperature."""
 
     UNDER_RANGE = 1
     """Colder than the camera measures at its integration time, or without any radiance."""
@@ -81,34 +82,16 @@ class Measurement:
         cls,
         radiance: NDArray[np.floating],
         band: Band,
-        times: NDArray[np.float64],
+        times: Array,
         raster: Raster,
         lower_limit: float | None = None,
         flags: NDArray[np.uint8] | None = None,
         calibration_errors: CalibrationErrors | None = None,
         attributes: Mapping[str, float | str] | None = None,
     ) -> "Measurement":
-        """Frames from their radiance.
+        """Return a measurement from frames of radiance in W/(m² sr), shape (time, y, x).
 
-        Parameters
-        ----------
-        radiance : ndarray
-            In-band radiance in W/(m² sr), shape (time, y, x).
-        band : Band
-            The camera's band.
-        times : ndarray
-            When each integration began in s, shape (time,).
-        raster : Raster
-            The grid of the pixels.
-        lower_limit : float, optional
-            Lowest radiance temperature in K that the camera measures; what is under it, or has no
-            radiance, is flagged.
-        flags : ndarray, optional
-            Sums of `Flag` that are known already, uint8, shape (time, y, x).
-        calibration_errors : CalibrationErrors, optional
-            What the errors of the calibration change in the radiance.
-        attributes : mapping, optional
-            What else is known of the camera.
+        Pixels under `lower_limit` in K, or without radiance, are flagged besides those in `flags`.
         """
         temperature = band.temperature(radiance)
         below = ~(temperature >= (lower_limit or 0.0))
@@ -157,13 +140,7 @@ class Measurement:
 
     @cached_property
     def band(self) -> Band:
-        """The camera's band.
-
-        Raises
-        ------
-        ValueError
-            If the attributes do not tell it, or it is not possible.
-        """
+        """The camera's band; a ValueError if the attributes do not state it."""
         for name in ("band_lower", "band_upper"):
             if name not in self.data.attrs:
                 raise ValueError(
@@ -181,8 +158,8 @@ class Measurement:
         return Band(*limits, TabulatedResponse(wavelengths, values))
 
     @property
-    def times(self) -> NDArray[np.float64]:
-        """When each frame's integration began, in s."""
+    def times(self) -> Array:
+        """Start of each frame's integration in s."""
         return np.asarray(self.data["time"].values, dtype=np.float64)
 
     @cached_property
@@ -193,23 +170,11 @@ class Measurement:
 
     @property
     def tool(self) -> Tool | None:
-        """The tool in the measurement's coordinates, if it is stated.
-
-        Raises
-        ------
-        ValueError
-            If what is stated is no tool that can be.
-        """
+        """The tool in the measurement's coordinates, if it is stated."""
         return stored_tool(self.data.attrs)
 
     def with_tool(self, tool: Tool) -> "Measurement":
-        """The same frames, telling the tool.
-
-        Parameters
-        ----------
-        tool : Tool
-            The tool in the measurement's coordinates.
-        """
+        """Return the same frames with the attributes of a tool, in their coordinates."""
         other = {k: v for k, v in self.data.attrs.items() if not str(k).startswith("tool_")}
         data = self.data.copy(deep=False)
         data.attrs = {**other, **tool_attributes(tool)}
@@ -226,76 +191,36 @@ class Measurement:
         return np.asarray(self.flags & UNUSABLE == 0, np.bool_)
 
     @property
-    def radiance(self) -> NDArray[np.float64]:
+    def radiance(self) -> Array:
         """Radiance in W/(m² sr), shape (time, y, x)."""
         return np.asarray(self.data["radiance"].values, dtype=np.float64)
 
-    def radiance_temperature(self, flagged: bool = False) -> NDArray[np.float64]:
-        """Radiance temperature.
+    def radiance_temperature(self, flagged: bool = False) -> Array:
+        """Return the radiance temperature in K, shape (time, y, x); NaN where flagged.
 
-        Parameters
-        ----------
-        flagged : bool
-            Whether to give flagged pixels the temperature of their radiance, instead of NaN.
-
-        Returns
-        -------
-        ndarray
-            Radiance temperature in K, shape (time, y, x).
-
-        Raises
-        ------
-        ValueError
-            If flagged pixels are asked for and the attributes do not tell the camera's band.
+        With `flagged`, unusable pixels have the temperature of their radiance.
         """
         stored = np.asarray(self.data["radiance_temperature"].values, dtype=np.float64)
         if not flagged:
             return stored
         return np.where(self.usable, stored, self.band.temperature(self.radiance))
 
-    def celsius(self, frame: int = 0) -> NDArray[np.float64]:
-        """Radiance temperature of one frame in °C.
-
-        Parameters
-        ----------
-        frame : int
-            Number of the frame.
-
-        Returns
-        -------
-        ndarray
-            Shape (y, x), NaN where flagged as unusable.
-        """
+    def celsius(self, frame: int = 0) -> Array:
+        """Return the radiance temperature of one frame in °C, shape (y, x); NaN where flagged."""
         kelvin = self.data["radiance_temperature"][frame].values
         return np.asarray(kelvin, np.float64) - ZERO_CELSIUS
 
     def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
         """Draw one frame's radiance temperature in °C over x and y in µm, with the tool's outline.
 
-        Parameters
-        ----------
-        frame : int
-            Number of the frame.
-        axes : matplotlib.axes.Axes, optional
-            Where to draw; a new figure by default.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture; grey where a pixel has no radiance temperature.
+        Grey where a pixel has no radiance temperature; on new axes by default.
         """
         time, label = float(self.times[frame]), "radiance temperature / °C"
         return plot_image(self.celsius(frame), self.raster, self.tool, label, time, axes)
 
     @cached_property
     def calibration_errors(self) -> CalibrationErrors | None:
-        """What the errors of the calibration change in the radiance, if that is known.
-
-        Raises
-        ------
-        ValueError
-            If what is stated of them cannot be.
-        """
+        """Effects of the calibration's errors on the radiance, if they are known."""
         if "calibration_errors" not in self.data:
             return None
         table = self.data["calibration_errors"]
@@ -304,7 +229,7 @@ class Measurement:
         return CalibrationErrors(table[_ERRORS[1]].values, table.values)
 
     @property
-    def calibration_uncertainty(self) -> NDArray[np.float64] | None:
+    def calibration_uncertainty(self) -> Array | None:
         """Standard uncertainty of the radiance from the calibration in W/(m² sr), if known.
 
         Of shape (time, y, x), and common to all pixels and frames: it does not fall in a mean.
@@ -312,19 +237,10 @@ class Measurement:
         errors = self.calibration_errors
         return None if errors is None else errors.standard_uncertainty(self.radiance)
 
-    def calibration_effects(self, frame: int) -> NDArray[np.float64]:
-        """What each independent error of the calibration changes in the radiance temperature.
+    def calibration_effects(self, frame: int) -> Array:
+        """Return the change of a frame's temperatures in K by each error of the calibration.
 
-        Parameters
-        ----------
-        frame : int
-            Number of the frame.
-
-        Returns
-        -------
-        ndarray
-            In K with its sign, by an error of one standard uncertainty, shape (errors, y, x); NaN
-            where flagged as unusable. Without errors if none is known.
+        By an error of one standard uncertainty, with its sign, (errors, y, x); NaN where flagged.
         """
         kelvins = np.asarray(self.data["radiance_temperature"][frame].values, np.float64)
         if self.calibration_errors is None:
@@ -332,21 +248,11 @@ class Measurement:
         slope = self.band.slope(kelvins)
         return self.calibration_errors.at(self.data["radiance"][frame].values) / slope
 
-    def estimate(self, values: NDArray[np.float64], effects: ArrayLike) -> Estimate:
-        """What was computed of radiance temperatures, with the component ``calibration``.
+    def estimate(self, values: Array, effects: ArrayLike) -> Estimate:
+        """Return results in K of the frames with the component ``calibration``.
 
-        Parameters
-        ----------
-        values : ndarray
-            Results of the frames in K, shape (frames, ...); NaN where there is none.
-        effects : array_like
-            What became of `calibration_effects`, shape (frames, errors, ...).
-
-        Returns
-        -------
-        Estimate
-            Without that component, but with a remark that it is not evaluated, where nothing is
-            known of the calibration.
+        `values` (frames, ...) are NaN where there is none; `effects` (frames, errors, ...) are what
+        became of `calibration_effects`. Without errors the component is stated as not evaluated.
         """
         if self.calibration_errors is None:
             return Estimate(values).with_unevaluated(CALIBRATION)
@@ -358,14 +264,14 @@ _ERRORS: Final = ("calibration_error", "calibration_radiance")
 
 
 def _errors(errors: CalibrationErrors) -> dict[str, xr.DataArray]:
-    """What a file states of the errors of a calibration."""
+    """Return the calibration's errors as a file states them."""
     units = {"units": MEASUREMENT_UNITS["radiance"]}
     coords = {_ERRORS[1]: (_ERRORS[1], errors.radiance, units)}
     return {"calibration_errors": xr.DataArray(errors.effects, coords, _ERRORS, attrs=units)}
 
 
 def _response(band: Band) -> dict[str, xr.DataArray]:
-    """A band's response where it counts, so that a file states the same integral."""
+    """Return a band's response at its quadrature nodes, so that a file states the same integral."""
     assert band.response is not None
     wavelength = ("wavelength", band.wavelengths, {"units": "m"})
     values = np.asarray(band.response(band.wavelengths), np.float64)

@@ -1,4 +1,4 @@
-"""What a real camera's file holds, before a calibration makes a measurement of it."""
+"""Contents of a real camera's file, before a calibration makes a measurement of it."""
 
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, TypeAlias
@@ -6,6 +6,7 @@ from typing import Any, Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes
 
@@ -15,19 +16,9 @@ QUANTITIES: Final = ("counts", "radiance", "temperature")
 
 @dataclass(frozen=True)
 class PlanckConversion:
-    """A factory conversion between counts and the temperature of a blackbody.
+    """A factory conversion between counts S and the temperature of a blackbody in K.
 
-    T = b / ln(r1 / (r2 (S + o)) + f): counts S, temperature T in K.
-
-    Parameters
-    ----------
-    r1, r2, b, f, o : float
-        The maker's constants; b in K.
-
-    Raises
-    ------
-    ValueError
-        If r1, r2 or b is not positive, or a constant is not finite.
+    T = b / ln(r1 / (r2 (S + o)) + f); r1, r2 and b, in K, are over 0.
     """
 
     r1: float
@@ -42,8 +33,8 @@ class PlanckConversion:
             if not possible:
                 raise ValueError(f"Planck conversion: {name} is {value!r}, expected over 0")
 
-    def temperature(self, counts: NDArray[Any]) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def temperature(self, counts: NDArray[Any]) -> Array:
+        """Return the temperature in K of the blackbody that gives these counts, or NaN."""
         signal = np.asarray(counts, np.float64) + self.o
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithm = np.log(self.r1 / (self.r2 * signal) + self.f)
@@ -53,58 +44,33 @@ class PlanckConversion:
 
 @dataclass(frozen=True)
 class Recording:
-    """Frames as a camera wrote them.
-
-    Parameters
-    ----------
-    signal : ndarray
-        Frames, shape (time, y, x), of any real type; row 0 at the top.
-    quantity : {"counts", "radiance", "temperature"}
-        What the numbers are: counts of the detector, in-band radiance in W/(m² sr), or temperature
-        in K. Radiance and temperature are as the file has them: its object parameters included.
-    times : ndarray
-        When each frame was taken in s, shape (time,).
-    camera : str
-        Which camera, for people.
-    integration_time : float, optional
-        In s.
-    saturation : float, optional
-        The greatest signal that is not saturated.
-    band : Band, optional
-        The camera's band.
-    pitch : float, optional
-        Distance between pixels on the object in m.
-    conversion : PlanckConversion, optional
-        The factory conversion of counts.
-    object_parameters : ObjectParameters, optional
-        What was set in the camera of the object. Temperatures were computed with them; counts do
-        not depend on them.
-    range_name : str, optional
-        The measuring range that was chosen, as the maker calls it.
-    fill_factor : float, optional
-        Portion of a pixel's square that takes light.
-    notes : Notes
-        Assumptions and warnings of reading the file, and what else the file states.
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit or a value is impossible.
-    """
+    """Frames as a camera wrote them."""
 
     signal: NDArray[Any]
+    """Frames, shape (time, y, x), of any real type; row 0 at the top."""
     quantity: Quantity
-    times: NDArray[np.float64]
+    """Counts, in-band radiance in W/(m² sr) or K, the file's object parameters included."""
+    times: Array
+    """Time of each frame in s, shape (time,)."""
     camera: str
+    """Name of the camera."""
     integration_time: float | None = None
+    """In s."""
     saturation: float | None = None
+    """The greatest signal that is not saturated."""
     band: Band | None = None
     pitch: float | None = None
+    """Distance between pixels on the object in m."""
     conversion: PlanckConversion | None = None
+    """Factory conversion of counts."""
     object_parameters: ObjectParameters | None = None
+    """Those set in the camera; temperatures depend on them, counts do not."""
     range_name: str | None = None
+    """Measuring range, as the maker calls it."""
     fill_factor: float | None = None
+    """Fraction of a pixel's square that takes light."""
     notes: Notes = field(default_factory=Notes)
+    """Assumptions and warnings of reading the file, and what else the file states."""
 
     def __post_init__(self) -> None:
         if self.signal.ndim != 3 or 0 in self.signal.shape:

@@ -8,18 +8,22 @@ The kernels are functions of arrays alone and work on one block each: a graphics
 take them block by block, with the loops over columns as its threads.
 """
 
+# Kernels have no types: Numba finds them.
+# mypy: allow-untyped-defs
+
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
-from chipglow.surface.blend import SCRATCH, Textures, blend_row
+from chipglow.surface import EmissivityStack, FeatureFields
+from chipglow.surface.blend import SCRATCH, blend_row
 from chipglow.surface.blocks import in_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
@@ -35,177 +39,92 @@ _STRAIN, _RATE, _X, _Y = (
 )
 _MEAN: Final = 3
 _VIEWS: Final = 7
-"""Places of the mean and of the views among what the kernels get of their sums: `Sums._own`."""
+"""Places of the mean and of the views among what the kernels get of their sums: `Sums`."""
 
+Indices: TypeAlias = NDArray[np.intp]
 Check: TypeAlias = Callable[[], None]
 """Called now and then in a long pass, which it ends by raising an error."""
 
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
 
-@dataclass(frozen=True, eq=False)
 class Sums:
-    """What is summed over the sub-frames; see `Exposure`.
+    """Sums over the sub-frames; see `Exposure`.
 
-    Parameters
-    ----------
-    views : ndarray
-        Numbers of the surface and of the band of every view, int64 of shape (view, 2).
-    tables : ndarray
-        Radiance in every band from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the
-        next value; float32 of shape (band, n, 2).
-    environments : ndarray
-        Radiance of every view's surroundings in W/(m² sr), float32 of shape (view,).
-    most : float
-        Largest emissivity that is possible.
-    mean, centre : ndarray
-        Float64 of shape (view, y, x), zero to start with.
-    peak : ndarray
-        Float32 of the same shape.
-    hottest : ndarray
-        Float32 of shape (y, x).
-    check : callable
-        Called before every block of rows; what it raises ends the pass.
+    `views` are numbers of the surface and of the band of every view, shape (view, 2); `tables` hold
+    radiance in every band from 200 K on and its change to the next value, (band, n, 2);
+    `environments` is the radiance of every view's surroundings in W/(m² sr). `mean`, `centre` and
+    `peak` are of shape (view, y, x), `hottest` of (y, x).
     """
 
-    views: NDArray[np.int64]
-    tables: NDArray[np.float32]
-    environments: NDArray[np.float32]
-    most: float
-    mean: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    peak: NDArray[np.float32]
-    hottest: NDArray[np.float32]
-    check: Check
-
-    @classmethod
-    def zero(
-        cls,
+    def __init__(
+        self,
         views: NDArray[np.int64],
         tables: NDArray[np.float32],
         environments: NDArray[np.float32],
-        most: float,
+        max_emissivity: float,
         shape: tuple[int, int],
-        check: Check,
-    ) -> "Sums":
-        """Sums of nothing."""
-        mean, centre = (np.zeros((len(views), *shape)) for _ in range(2))
-        peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
-        return cls(views, tables, environments, most, mean, centre, peak, hottest, check)
+        check: Check | None,
+    ) -> None:
+        self.mean, self.centre = (np.zeros((len(views), *shape)) for _ in range(2))
+        self.peak, self.hottest = (np.zeros(of, np.float32) for of in (self.mean.shape, shape))
+        sums = self.mean, self.centre, self.peak, self.hottest
+        self._own = tables, environments, np.float32(max_emissivity), *sums, views
+        self._check = check
 
     def add_given(
-        self,
-        frames: Sequence[Frame],
-        emissivities: Sequence[NDArray[np.float32]],
-        weights: NDArray[np.float64],
-        middles: NDArray[np.intp],
+        self, frames: Sequence[Frame], stack: EmissivityStack, weights: Array, middles: Indices
     ) -> None:
-        """Add frames with the emissivities of all surfaces, each of shape (surface, y, x).
+        """Add up to `BATCH` frames.
 
-        Parameters
-        ----------
-        frames : sequence of Frame
-            Up to `BATCH` of them.
-        emissivities : sequence of ndarray
-            One of each frame.
-        weights : ndarray
-            Fraction of each row's exposure that each frame stands for, shape (row, frame); 0 where
-            the row is not exposed.
-        middles : ndarray
-            Which of them is in the middle of each row's exposure, if any of them is, shape (row,).
+        `weights` (row, frame) are fractions of each row's exposure; `middles` (row,) is the frame
+        in the middle of each row's exposure, if any is.
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
+        emissivities = [stack.emissivities(frame) for frame in frames]
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
-
-        def add(first: int, last: int) -> None:
-            _add_given(temperature, material, given, weights, middles, first, last, self._own)
-
-        self._in_blocks(add)
+        self._add(_add_given, temperature, material, given, weights, middles)
 
     def add_features(
-        self,
-        frames: Sequence[Frame],
-        positions: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]],
-        shifts: NDArray[np.float32],
-        textures: Textures,
-        weights: NDArray[np.float64],
-        middles: NDArray[np.intp],
+        self, frames: Sequence[Frame], stack: FeatureFields, weights: Array, middles: Indices
     ) -> None:
-        """Add frames with the emissivities that their features have.
-
-        Parameters
-        ----------
-        frames, weights, middles
-            As for `add_given`.
-        positions : sequence of tuple of ndarray
-            Where each frame's samples are looked up in the textures.
-        shifts : ndarray
-            Shifts of the textures, shape (frame, feature, 2).
-        textures : Textures
-            The surfaces.
-        """
+        """Add frames as `add_given`, whose emissivities are stored nowhere."""
         temperature, material, strain, rate = (
             _batch(frames, name)
             for name in ("temperature", "material", "plastic_strain", "plastic_strain_rate")
         )
+        positions = [stack.positions(frame) for frame in frames]
         x, y = (_filled([np.ascontiguousarray(p[k]) for p in positions]) for k in (0, 1))
         fields = (temperature, material, strain, rate, x, y)
-
-        def add(first: int, last: int) -> None:
-            _add_features(fields, shifts, tuple(textures), weights, middles, first, last, self._own)
-
-        self._in_blocks(add)
+        shifts = np.stack([stack.shifts(frame.time) for frame in frames])
+        self._add(_add_features, fields, shifts, tuple(stack.textures), weights, middles)
 
     def add_splines(
-        self,
-        frames: Sequence[SplineFrame],
-        positions: tuple[NDArray[np.float32], NDArray[np.float32]] | None,
-        shifts: NDArray[np.float32],
-        textures: Textures,
-        weights: NDArray[np.float64],
-        middles: NDArray[np.intp],
+        self, frames: Sequence[SplineFrame], stack: FeatureFields, weights: Array, middles: Indices
     ) -> None:
-        """Add frames of splines: their samples are never written anywhere.
-
-        Parameters
-        ----------
-        frames : sequence of SplineFrame
-            Any number, of one lattice.
-        positions : tuple of ndarray, optional
-            Where the samples are looked up in the textures; by their material coordinates if left
-            out.
-        shifts, textures, weights, middles
-            As for `add_features`.
-        """
+        """Add any number of frames of splines on one lattice: their samples are stored nowhere."""
         lattice = frames[0].lattice
         nodes = np.stack([frame.nodes for frame in frames])
         limits = np.stack([frame.limits for frame in frames])
-        fixed = positions or (np.empty((0, 0), np.float32),) * 2
+        # Without fixed positions textures are looked up by the material coordinates.
+        fixed = stack.fixed_positions or (np.empty((0, 0), np.float32),) * 2
         grid = (*lattice.down, *lattice.across, lattice.in_tool)
+        shifts, textures = np.stack([stack.shifts(frame.time) for frame in frames]), stack.textures
+        self._add(
+            _add_splines, nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles
+        )
 
+    def _add(self, kernel: Callable[..., None], *arguments: Any) -> None:
         def add(first: int, last: int) -> None:
-            _add_splines(
-                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles, first, last,
-                self._own,
-            )  # fmt: skip
+            if self._check is not None:
+                self._check()
+            kernel(*arguments, first, last, self._own)
 
-        self._in_blocks(add)
-
-    @property
-    def _own(self) -> tuple[Any, ...]:
-        sums = self.mean, self.centre, self.peak, self.hottest
-        return self.tables, self.environments, np.float32(self.most), *sums, self.views
-
-    def _in_blocks(self, add: Callable[[int, int], None]) -> None:
-        def checked(first: int, last: int) -> None:
-            self.check()
-            add(first, last)
-
-        in_blocks(len(self.hottest), checked)
+        in_blocks(len(self.hottest), add)
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
-    """As many arrays as a kernel was compiled for; those at the end count for nothing."""
+    """Return as many arrays as a kernel was compiled for; those at the end count for nothing."""
     return tuple((arrays + [arrays[-1]] * BATCH)[:BATCH])
 
 
@@ -217,8 +136,8 @@ def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
 
 
 @njit(**_FAST)
-def _find(temperature, last, number, past):  # type: ignore[no-untyped-def]
-    """Entry of the table before a temperature, and how far past it that is; NaN off the table."""
+def _find(temperature, last, number, past):
+    """Find the table's entry before a temperature, and how far past it that is, or NaN."""
     for i in range(temperature.size):
         position = (temperature[i] - np.float32(TABLE_COLDEST)) * np.float32(STEPS_PER_KELVIN)
         inside = min(max(position, np.float32(0.0)), np.float32(last))
@@ -229,21 +148,21 @@ def _find(temperature, last, number, past):  # type: ignore[no-untyped-def]
 
 
 @njit(**_FAST)
-def _look_up(table, number, past, black):  # type: ignore[no-untyped-def]
+def _look_up(table, number, past, black):
     for i in range(black.size):
         k = np.uint32(number[i])
         black[i] = table[k, 0] + past[i] * table[k, 1]
 
 
 @njit(**_FAST)
-def _heat(temperature, kind, hottest):  # type: ignore[no-untyped-def]
+def _heat(temperature, kind, hottest):
     for i in range(hottest.size):
         there = temperature[i] if kind[i] != _VOID else np.float32(0.0)
         hottest[i] = max(hottest[i], there)
 
 
 @njit(**_FAST)
-def _apparent(emissivity, black, kind, environment, most, apparent):  # type: ignore[no-untyped-def]
+def _apparent(emissivity, black, kind, environment, most, apparent):
     for i in range(apparent.size):
         e = emissivity[i]
         radiance = environment + e * (black[i] - environment)
@@ -252,21 +171,19 @@ def _apparent(emissivity, black, kind, environment, most, apparent):  # type: ig
 
 
 @njit(**_FAST)
-def _sum(apparent, weight, mean):  # type: ignore[no-untyped-def]
+def _sum(apparent, weight, mean):
     for i in range(mean.size):
         mean[i] += weight * np.float64(apparent[i])
 
 
 @njit(**_FAST)
-def _raise(apparent, peak):  # type: ignore[no-untyped-def]
+def _raise(apparent, peak):
     for i in range(peak.size):
         peak[i] = max(peak[i], apparent[i])
 
 
 @njit(**_FAST)
-def _add_row(  # type: ignore[no-untyped-def]
-    temperature, kind, emissivity, weight, is_middle, row, work, number, own
-):
+def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number, own):
     """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
     tables, environments, most, mean, centre, peak, hottest, views = own
     past, black, apparent = work[0], work[1], work[2]
@@ -286,16 +203,7 @@ def _add_row(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, **_FAST)
-def _add_given(  # type: ignore[no-untyped-def]
-    temperature,
-    material,
-    emissivities,
-    weights,
-    middles,
-    first,
-    last,
-    own,
-):
+def _add_given(temperature, material, emissivities, weights, middles, first, last, own):
     columns = own[_MEAN].shape[2]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
@@ -310,16 +218,7 @@ def _add_given(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, **_FAST)
-def _add_features(  # type: ignore[no-untyped-def]
-    fields,
-    shifts,
-    textures,
-    weights,
-    middles,
-    first,
-    last,
-    own,
-):
+def _add_features(fields, shifts, textures, weights, middles, first, last, own):
     temperature, material, strain, rate, x, y = fields
     surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
@@ -342,49 +241,37 @@ def _add_features(  # type: ignore[no-untyped-def]
 
 
 @njit(**_FAST)
-def _weighted(upper, middle, lower, u, v, w, result):  # type: ignore[no-untyped-def]
+def _weighted(upper, middle, lower, u, v, w, result):
     for i in range(result.size):
         result[i] = u * upper[i] + v * middle[i] + w * lower[i]
 
 
 @njit(**_FAST)
-def _combine(wide, base, u, v, w, result):  # type: ignore[no-untyped-def]
+def _combine(wide, base, u, v, w, result):
     _weighted(wide[base], wide[base + 1], wide[base + 2], u, v, w, result)
 
 
 @njit(**_FAST)
-def _tell(filled, in_tool, kind):  # type: ignore[no-untyped-def]
+def _tell(filled, in_tool, kind):
     for i in range(kind.size):
         seen = np.uint8(_WORKPIECE) if filled[i] > np.float32(0.5) else np.uint8(_VOID)
         kind[i] = np.uint8(_TOOL) if in_tool[i] else seen
 
 
 @njit(**_FAST)
-def _keep_within(values, least, most):  # type: ignore[no-untyped-def]
+def _keep_within(values, least, most):
     for i in range(values.size):
         values[i] = min(max(values[i], least), most)
 
 
 @njit(**_FAST)
-def _take(tool, kind, temperature):  # type: ignore[no-untyped-def]
+def _take(tool, kind, temperature):
     for i in range(kind.size):
         temperature[i] = tool[i] if kind[i] == _TOOL else temperature[i]
 
 
 @njit(cache=True, **_FAST)
-def _add_splines(  # type: ignore[no-untyped-def]
-    nodes,
-    limits,
-    grid,
-    fixed,
-    shifts,
-    textures,
-    weights,
-    middles,
-    first,
-    last,
-    own,
-):
+def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles, first, last, own):
     first_down, down, first_across, across, in_tool = grid
     surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)

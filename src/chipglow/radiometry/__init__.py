@@ -6,10 +6,4 @@ from chipglow.radiometry.planck import spectral_radiance
 from chipglow.radiometry.ratio import RatioThermometer
 from chipglow.radiometry.response import TabulatedResponse
 
-__all__ = [
-    "Band",
-    "ObjectParameters",
-    "RatioThermometer",
-    "TabulatedResponse",
-    "spectral_radiance",
-]
+__all__ = ["Band", "ObjectParameters", "RatioThermometer", "TabulatedResponse", "spectral_radiance"]

@@ -1,5 +1,8 @@
 """A camera's spectral band: in-band radiance (Equation 1) and its inverse, radiance temperature."""
 
+# Kernels have no types: Numba finds them.
+# mypy: allow-untyped-defs
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,13 +15,14 @@ import scipy
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.quantities import Array
 from chipglow.radiometry.planck import (
     FIRST_RADIATION_CONSTANT,
     SECOND_RADIATION_CONSTANT,
     spectral_radiance,
 )
 
-Response: TypeAlias = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Response: TypeAlias = Callable[[Array], Array]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
 
 TABLE_COLDEST: Final = 200.0
@@ -80,18 +84,9 @@ class Band:
             raise ValueError("band: response must be finite, 0 or more, and not 0 everywhere")
 
     def radiance(self, temperature: ArrayLike) -> NDArray[np.floating]:
-        """In-band radiance of a blackbody.
+        """Return the in-band radiance of a blackbody in W/(m² sr).
 
-        Parameters
-        ----------
-        temperature : array_like
-            Temperature in K, of any shape.
-
-        Returns
-        -------
-        ndarray
-            Radiance in W/(m² sr), of the same shape, float32 for float32 and else float64;
-            NaN where the temperature is not positive.
+        float32 for float32 temperatures in K, else float64; NaN where they are not positive.
         """
         values = _as_floats(temperature)
         result = np.empty_like(values)
@@ -101,18 +96,10 @@ class Band:
         return result
 
     def temperature(self, radiance: ArrayLike) -> NDArray[np.floating]:
-        """Radiance temperature: that of the blackbody which gives this in-band radiance.
+        """Return the radiance temperature in K: that of the blackbody with this in-band radiance.
 
-        Parameters
-        ----------
-        radiance : array_like
-            In-band radiance in W/(m² sr), of any shape.
-
-        Returns
-        -------
-        ndarray
-            Radiance temperature in K, of the same shape, float32 for float32 and else float64;
-            NaN where the radiance is not positive and finite.
+        float32 for float32 radiance in W/(m² sr), else float64; NaN where it is not positive and
+        finite.
 
         Notes
         -----
@@ -130,54 +117,24 @@ class Band:
             result[outside] = self._invert(values[outside].astype(np.float64))
         return result
 
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the in-band radiance with the temperature, dL/dT.
+    def slope(self, temperature: ArrayLike) -> Array:
+        """Return the change of the in-band radiance with the temperature, dL/dT, in W/(m² sr K).
 
-        Parameters
-        ----------
-        temperature : array_like
-            Temperature in K, of any shape.
-
-        Returns
-        -------
-        ndarray
-            In W/(m² sr K), of the same shape, by straight lines between values 0.25 K apart, within
-            1e-5 of it; NaN outside 200 K to 6000 K.
+        By straight lines between values 0.25 K apart, within 1e-5 of it; NaN outside 200 K to
+        6000 K.
         """
         values = np.asarray(temperature, np.float64)
         position = (values - TABLE_COLDEST) / _TEMPERATURE_STEP
         slopes = self.radiance_table[:, 1]
         return np.interp(position, np.arange(slopes.size), slopes, left=np.nan, right=np.nan)
 
-    def spectrum(
-        self, temperature: float, count: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Wavelengths that stand for the in-band radiance of a blackbody.
+    def spectrum(self, temperature: float, count: int) -> tuple[Array, Array]:
+        """Return up to 15 wavelengths that stand for a blackbody's in-band radiance.
 
-        Parameters
-        ----------
-        temperature : float
-            Temperature of the blackbody in K.
-        count : int
-            Number of wavelengths, 1 to 15.
-
-        Returns
-        -------
-        wavelengths : ndarray
-            In m, ascending, shape (count,).
-        weights : ndarray
-            Their fractions of the radiance, of sum 1.
-
-        Raises
-        ------
-        ValueError
-            If the number is another.
-
-        Notes
-        -----
-        The Gauss quadrature of the weight R(λ) L(λ, T), exact for polynomials in λ up to degree
-        2 `count` − 1, from the eigenvalues of its Jacobi matrix (Golub and Welsch, Math. Comp. 23
-        (1969) 221), which Lanczos' recurrence finds of the nodes of the band's own integral.
+        Ascending, in m, with their fractions of the radiance, of sum 1. The Gauss quadrature of the
+        weight R(λ) L(λ, T), exact for polynomials in λ up to degree 2 `count` − 1, from the
+        eigenvalues of its Jacobi matrix (Golub and Welsch, Math. Comp. 23 (1969) 221), which
+        Lanczos' recurrence finds of the nodes of the band's own integral.
         """
         if not 1 <= count < _NODES_PER_PANEL:
             raise ValueError(f"band: count is {count}, expected 1 to {_NODES_PER_PANEL - 1}")
@@ -201,38 +158,28 @@ class Band:
         return middle + half * found, vectors[0] ** 2
 
     @cached_property
-    def wavelengths(self) -> NDArray[np.float64]:
+    def wavelengths(self) -> Array:
         """Wavelengths in m, ascending, at which the response counts: the nodes of the integral."""
         return np.sort(self._quadrature[0])
 
-    def weights(self, temperature: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Parts of the in-band radiance by their wavelength.
+    def weights(self, temperature: ArrayLike) -> tuple[Array, Array]:
+        """Return the nodes of the integral in m and their parts of the in-band radiance.
 
-        Parameters
-        ----------
-        temperature : array_like
-            Temperature of a blackbody in K, shape (...).
-
-        Returns
-        -------
-        wavelengths : ndarray
-            Nodes of the integral in m, shape (wavelength,).
-        radiance : ndarray
-            In W/(m² sr), shape (..., wavelength); their sum is `radiance`.
+        In W/(m² sr), shape (..., wavelength) for temperatures (...) in K.
         """
         wavelength, weights = self._quadrature
         kelvins = np.asarray(temperature, np.float64)[..., None]
         return wavelength, spectral_radiance(wavelength, kelvins) * weights
 
     @cached_property
-    def radiance_table(self) -> NDArray[np.float64]:
+    def radiance_table(self) -> Array:
         """Radiance and its derivative at every 0.25 K from 200 K to 6000 K, shape (n, 2)."""
         count = round((TABLE_HOTTEST - TABLE_COLDEST) / _TEMPERATURE_STEP) + 1
         temperature = TABLE_COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
         return np.stack(self._with_slope(temperature), axis=1)
 
     @cached_property
-    def _quadrature(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _quadrature(self) -> tuple[Array, Array]:
         """Wavelengths and weights (response included), in panels over which Planck is smooth."""
         fall = SECOND_RADIATION_CONSTANT / TABLE_COLDEST * (1 / self.lower - 1 / self.upper)
         panels = max(1, ceil(fall / 10.0))
@@ -249,7 +196,7 @@ class Band:
         return wavelength, weights
 
     @cached_property
-    def _inverse_table(self) -> tuple[int, NDArray[np.float64]]:
+    def _inverse_table(self) -> tuple[int, Array]:
         """Place of the first node, as the high bits of its radiance, and cubics, shape (n, 4)."""
         ends = self._integrate(np.array([TABLE_COLDEST, TABLE_HOTTEST]))
         first, last = np.maximum(ends, ends[1] * 0.5**_POWERS).view(np.int64) >> _SHIFT
@@ -261,13 +208,11 @@ class Band:
         cubics = [begin, left, 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise]
         return int(first), np.stack(cubics, axis=1)
 
-    def _integrate(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _integrate(self, temperature: Array) -> Array:
         return self._with_slope(temperature)[0]
 
-    def _with_slope(
-        self, temperature: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """In-band radiance, and its derivative in W/(m² sr K)."""
+    def _with_slope(self, temperature: Array) -> tuple[Array, Array]:
+        """Return in-band radiance, and its derivative in W/(m² sr K)."""
         wavelength, weights = self._quadrature
         radiance, slope = np.empty_like(temperature), np.empty_like(temperature)
         for at in range(0, temperature.size, _BLOCK):
@@ -281,8 +226,8 @@ class Band:
             slope[part] = (spectral @ weights) / temperature[part] ** 2
         return radiance, slope
 
-    def _invert(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Newton's method on ln L over 1/T, which is nearly straight."""
+    def _invert(self, radiance: Array) -> Array:
+        """Invert by Newton's method on ln L over 1/T, which is nearly straight."""
         target = np.log(radiance)
         inverse = np.full_like(target, 1e-3)
         for _ in range(60):
@@ -303,8 +248,8 @@ def _as_floats(values: ArrayLike) -> NDArray[np.floating]:
 
 
 @njit(inline="always")
-def table_radiance(temperature, table):  # type: ignore[no-untyped-def]
-    """Cubic Hermite look-up of in-band radiance, for kernels; NaN outside the table."""
+def table_radiance(temperature, table):
+    """Look up in-band radiance by cubic Hermite interpolation; NaN outside the table."""
     position = (temperature - TABLE_COLDEST) / _TEMPERATURE_STEP
     if not (0.0 <= position <= table.shape[0] - 1):
         return np.nan
@@ -319,8 +264,8 @@ def table_radiance(temperature, table):  # type: ignore[no-untyped-def]
 # These run on the caller's thread: threads that wait for work by spinning would take the processor
 # from others, for what lasts a few microseconds a frame.
 @njit(**_KERNEL)
-def _look_up_radiance(temperature, table, radiance):  # type: ignore[no-untyped-def]
-    """Fill in radiances, NaN where the table has none; how many are NaN."""
+def _look_up_radiance(temperature, table, radiance):
+    """Fill in radiances, NaN where the table has none; return how many are NaN."""
     missing = 0
     for i in range(temperature.size):
         value = table_radiance(temperature[i], table)
@@ -330,8 +275,8 @@ def _look_up_radiance(temperature, table, radiance):  # type: ignore[no-untyped-
 
 
 @njit(**_KERNEL)
-def _look_up_temperature(radiance, first, cubics, temperature):  # type: ignore[no-untyped-def]
-    """Fill in temperatures, NaN where the table has none; how many are NaN."""
+def _look_up_temperature(radiance, first, cubics, temperature):
+    """Fill in temperatures, NaN where the table has none; return how many are NaN."""
     block = np.empty(_BLOCK)
     missing = 0
     for begin in range(0, radiance.size, _BLOCK):

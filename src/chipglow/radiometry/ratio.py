@@ -2,28 +2,24 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST, Band
 
 
 @dataclass(frozen=True)
-class RatioThermometer:
+class RatioThermometer(Part):
     """The temperature at which two bands send radiances of a given ratio.
 
     Parameters
     ----------
     first, second : Band
         The bands, that of the shorter wavelengths first.
-    emissivity_ratio : float
-        Emissivity in the first band over that in the second; 1 for a grey body.
-    emissivity_ratio_uncertainty : float
-        Its standard uncertainty.
 
     Raises
     ------
@@ -41,19 +37,18 @@ class RatioThermometer:
 
     first: Band
     second: Band
-    emissivity_ratio: float = 1.0
-    emissivity_ratio_uncertainty: float = 0.0
+    emissivity_ratio: Annotated[
+        float,
+        Parameter(
+            "Emissivity in the first band over that in the second; 1 for a grey body.", over=0.0
+        ),
+    ] = 1.0
+    emissivity_ratio_uncertainty: Annotated[
+        float, Parameter("Its standard uncertainty.", least=0.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.emissivity_ratio < inf:
-            raise ValueError(
-                f"emissivity_ratio: {self.emissivity_ratio!r}, expected over 0, such as 1"
-            )
-        if not 0.0 <= self.emissivity_ratio_uncertainty < inf:
-            raise ValueError(
-                f"emissivity_ratio_uncertainty: {self.emissivity_ratio_uncertainty!r}, expected 0 "
-                "or more"
-            )
+        super().__post_init__()
         if self._rising.stop - self._rising.start < 2:
             raise ValueError(
                 "bands: the ratio of their radiances does not rise with the temperature, expected "
@@ -62,35 +57,21 @@ class RatioThermometer:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest temperature in K that are told."""
+        """Least and greatest temperature in K that can be measured."""
         known = self._temperatures[self._rising]
         return float(known[0]), float(known[-1])
 
-    def ratio(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Radiance of the first band over that of the second.
-
-        Parameters
-        ----------
-        temperature : array_like
-            True temperature in K, of any shape.
-        """
+    def ratio(self, temperature: ArrayLike) -> Array:
+        """Return the radiance of the first band over that of the second."""
         kelvins = np.asarray(temperature, np.float64)
         black = self.first.radiance(kelvins) / self.second.radiance(kelvins)
         return np.asarray(self.emissivity_ratio * black, np.float64)
 
-    def temperature(self, first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
-        """Ratio temperature.
+    def temperature(self, first: ArrayLike, second: ArrayLike) -> Array:
+        """Return the ratio temperature in K of radiances in W/(m² sr) in either band.
 
-        Parameters
-        ----------
-        first, second : array_like
-            Radiances in W/(m² sr) in either band, of shapes that broadcast.
-
-        Returns
-        -------
-        ndarray
-            In K; NaN where a radiance is not positive and finite, and where the ratio is one that
-            no temperature of `range` has.
+        NaN where a radiance is not positive and finite, and where no temperature of `range` has
+        their ratio.
         """
         upper, lower = np.asarray(first, np.float64), np.asarray(second, np.float64)
         possible = (upper > 0) & (lower > 0) & np.isfinite(upper) & np.isfinite(lower)
@@ -100,14 +81,8 @@ class RatioThermometer:
         inverse = self._inverse(logarithm)
         return np.asarray(np.where(possible, 1.0 / inverse, np.nan), np.float64)
 
-    def sensitivity(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Relative change of the ratio with the temperature, d ln r / dT, in 1/K.
-
-        Parameters
-        ----------
-        temperature : array_like
-            True temperature in K, of any shape; NaN where it is beyond 200 K to 6000 K.
-        """
+    def sensitivity(self, temperature: ArrayLike) -> Array:
+        """Return the relative change of the ratio with the temperature, d ln r / dT, in 1/K."""
         kelvins = np.asarray(temperature, np.float64)
         return np.asarray(
             self.first.slope(kelvins) / self.first.radiance(kelvins)
@@ -115,18 +90,9 @@ class RatioThermometer:
             np.float64,
         )
 
-    def emissivity_error(self, temperature: ArrayLike, ratio: ArrayLike) -> NDArray[np.float64]:
-        """Error of the ratio temperature where the emissivities have another ratio, in K.
+    def emissivity_error(self, temperature: ArrayLike, ratio: ArrayLike) -> Array:
+        """Return the error in K where the emissivities have another ratio than assumed.
 
-        Parameters
-        ----------
-        temperature : array_like
-            True temperature in K.
-        ratio : array_like
-            True emissivity in the first band over that in the second.
-
-        Notes
-        -----
         In Wien's limit and narrow bands 1/T_r − 1/T = Λ ln(x) / c2 with x the assumed over the true
         ratio of the emissivities and 1/Λ = 1/λ₁ − 1/λ₂.
         """
@@ -134,24 +100,18 @@ class RatioThermometer:
         seen = self.first.radiance(kelvins) * np.asarray(ratio, np.float64)
         return self.temperature(seen, self.second.radiance(kelvins)) - kelvins
 
-    def uncertainty(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Standard uncertainty in K that the ratio of the emissivities makes.
-
-        Parameters
-        ----------
-        temperature : array_like
-            Temperature in K.
-        """
+    def uncertainty(self, temperature: ArrayLike) -> Array:
+        """Return the standard uncertainty in K by that of the emissivities' ratio."""
         relative = self.emissivity_ratio_uncertainty / self.emissivity_ratio
         return relative / self.sensitivity(temperature)
 
     @property
-    def _temperatures(self) -> NDArray[np.float64]:
+    def _temperatures(self) -> Array:
         """Nodes of the bands' tables in K."""
         return np.linspace(TABLE_COLDEST, TABLE_HOTTEST, len(self.first.radiance_table))
 
     @cached_property
-    def _slopes(self) -> NDArray[np.float64]:
+    def _slopes(self) -> Array:
         """Relative change of the ratio with the temperature at the nodes, in 1/K."""
         with np.errstate(invalid="ignore", divide="ignore"):
             upper, lower = (

@@ -3,28 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chipglow.quantities import Array
 
 
 @dataclass(frozen=True)
 class TabulatedResponse:
-    """Relative spectral response by straight lines between the points of a table.
-
-    Parameters
-    ----------
-    wavelengths : tuple of float
-        In m, ascending.
-    values : tuple of float
-        Relative response, 0 or more; outside the table it is 0.
-
-    Raises
-    ------
-    ValueError
-        If the table has less than two points, does not ascend, or a value is impossible.
-    """
+    """Relative spectral response by straight lines between the points of a table; 0 outside it."""
 
     wavelengths: tuple[float, ...]
+    """In m, ascending."""
     values: tuple[float, ...]
+    """Relative response, 0 or more."""
 
     def __post_init__(self) -> None:
         wavelengths, values = np.asarray(self.wavelengths), np.asarray(self.values)
@@ -43,6 +33,6 @@ class TabulatedResponse:
         """First and last wavelength in m."""
         return self.wavelengths[0], self.wavelengths[-1]
 
-    def __call__(self, wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Response at these wavelengths in m."""
+    def __call__(self, wavelengths: Array) -> Array:
+        """Return the response at these wavelengths in m."""
         return np.interp(wavelengths, self.wavelengths, self.values, left=0.0, right=0.0)

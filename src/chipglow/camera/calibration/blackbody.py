@@ -1,64 +1,41 @@
-"""What a blackbody radiates that is not quite one."""
+"""Radiation of a blackbody that is not quite one."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities.units import TEMPERATURE
 from chipglow.radiometry import Band
 
 
 @dataclass(frozen=True)
-class Blackbody:
-    """The source of a calibration.
+class Blackbody(Part):
+    """The source of a calibration."""
 
-    Parameters
-    ----------
-    emissivity : float
-        Its emissivity in the camera's band.
-    emissivity_uncertainty : float
-        Standard uncertainty of it, which all points have in common.
-    surroundings : float
-        Temperature in K of what it reflects.
+    emissivity: Annotated[
+        float, Parameter("Emissivity in the camera's band.", over=0.0, most=1.0)
+    ] = 1.0
+    emissivity_uncertainty: Annotated[
+        float,
+        Parameter("Its standard uncertainty, common to all points.", least=0.0, under=1.0),
+    ] = 0.0
+    surroundings: Annotated[float, Parameter("What it reflects.", TEMPERATURE, over=0.0)] = 293.15
 
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
-    """
-
-    emissivity: float = 1.0
-    emissivity_uncertainty: float = 0.0
-    surroundings: float = 293.15
-
-    def __post_init__(self) -> None:
-        if not 0 < self.emissivity <= 1:
-            raise ValueError(f"emissivity: is {self.emissivity!r}, expected over 0 to 1")
-        if not 0 <= self.emissivity_uncertainty < 1:
-            raise ValueError(
-                f"emissivity_uncertainty: is {self.emissivity_uncertainty!r}, expected 0 to 1"
-            )
-        if not 0 < self.surroundings < np.inf:
-            raise ValueError(f"surroundings: is {self.surroundings!r} K, expected over 0 K")
-
-    def radiance_temperatures(
-        self, kelvins: NDArray[np.float64], band: Band
-    ) -> NDArray[np.float64]:
-        """Temperatures in K of the blackbodies of emissivity 1 that radiate as much."""
+    def radiance_temperatures(self, kelvins: Array, band: Band) -> Array:
+        """Return the temperatures in K of the ideal blackbodies that radiate as much."""
         if self.emissivity == 1.0:
             return kelvins
-        return np.asarray(band.temperature(self._radiance(kelvins, band)), np.float64)
+        own = self.emissivity * np.asarray(band.radiance(kelvins), np.float64)
+        radiance = own + (1 - self.emissivity) * self._reflected(band)
+        return np.asarray(band.temperature(radiance), np.float64)
 
-    def sensitivity(
-        self, kelvins: NDArray[np.float64], band: Band
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Change of `radiance_temperatures` with the temperature and, in K, with the emissivity."""
+    def sensitivity(self, kelvins: Array, band: Band) -> tuple[Array, Array]:
+        """Return the change of `radiance_temperatures` with temperature and with emissivity."""
         slope = band.slope(self.radiance_temperatures(kelvins, band))
-        by_temperature = self.emissivity * np.asarray(band.slope(kelvins)) / slope
-        reflected = float(band.radiance(np.array(self.surroundings)))
-        return np.asarray(by_temperature), np.asarray((band.radiance(kelvins) - reflected) / slope)
+        by_temperature = self.emissivity * band.slope(kelvins) / slope
+        return by_temperature, np.asarray((band.radiance(kelvins) - self._reflected(band)) / slope)
 
-    def _radiance(self, kelvins: NDArray[np.float64], band: Band) -> NDArray[np.float64]:
-        reflected = float(band.radiance(np.array(self.surroundings)))
-        own = np.asarray(band.radiance(kelvins), np.float64)
-        return self.emissivity * own + (1 - self.emissivity) * reflected
+    def _reflected(self, band: Band) -> float:
+        return float(band.radiance(self.surroundings))

@@ -1,6 +1,7 @@
-"""From a camera's counts to radiance: calibrations, and how far they can be trusted."""
+"""Calibrations from a camera's counts to radiance, with their uncertainty."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
 from chipglow.camera.recording import PlanckConversion
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
@@ -22,97 +24,49 @@ _NODES: Final = 513
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Calibration(ABC):
-    """What a camera's counts mean.
+    """Meaning of a camera's counts; `description` says what it is."""
 
-    Parameters
-    ----------
-    band : Band
-        The camera's band.
-    lowest, highest : float
-        Radiance temperatures in K between which it holds; unlimited by default.
-    integration_time : float, optional
-        Integration time in s for which it holds.
-    range_name : str, optional
-        The camera's measuring range for which it holds, as its maker calls it.
-    warnings : tuple of str
-        Why it may not be relied on, a sentence each.
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
-    """
-
+    description: ClassVar[str]
     band: Band
     lowest: float = 0.0
+    """Radiance temperature in K from which on it holds."""
     highest: float = inf
+    """Radiance temperature in K up to which it holds."""
     integration_time: float | None = None
+    """Integration time in s for which it holds."""
     range_name: str | None = None
+    """The camera's measuring range for which it holds, as its maker calls it."""
     warnings: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.lowest < self.highest:
-            raise ValueError(
-                f"calibration: lowest is {self.lowest!r} K and highest {self.highest!r} K, "
-                "expected 0 K or more, in order"
-            )
-        if self.integration_time is not None and not 0 < self.integration_time < inf:
-            raise ValueError(
-                f"calibration: integration_time is {self.integration_time!r}, expected over 0 s"
-            )
+    """Why it may not be relied on, a sentence each."""
 
     @abstractmethod
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+    def radiance(self, counts: ArrayLike) -> Array:
+        """Return the in-band radiance in W/(m² sr) of counts; NaN where there is none."""
 
     @property
-    @abstractmethod
     def errors(self) -> CalibrationErrors | None:
-        """What its errors change in the radiance; None if that is not known."""
-
-    @property
-    @abstractmethod
-    def description(self) -> str:
-        """What it is, for people."""
+        """Effects of its errors on the radiance; None if they are not known."""
+        return None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedCalibration(Calibration):
-    """A calibration whose parameters were fitted to blackbodies.
-
-    Parameters
-    ----------
-    parameters : ndarray
-        As `NAMES` says, shape (n,).
-    covariance : ndarray
-        Their covariance, shape (n, n): of the fit, and of what the blackbodies have in common.
-    **others
-        As `Calibration` has them.
-
-    Attributes
-    ----------
-    kind : str
-        Name of the model, in files and commands.
-
-    Raises
-    ------
-    ValueError
-        If shapes do not fit or a value is impossible.
-    """
+    """A calibration whose parameters were fitted to blackbodies; `kind` is its name in files."""
 
     kind: ClassVar[str] = ""
     NAMES: ClassVar[tuple[str, ...]] = ()
     UNITS: ClassVar[tuple[str, ...]] = ()
 
-    parameters: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    parameters: Array
+    """As `NAMES` says, shape (n,)."""
+    covariance: Array
+    """Of the fit and of what the blackbodies have in common, shape (n, n)."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        if not (self.lowest >= TABLE_COLDEST and self.highest <= TABLE_HOTTEST):
+        if not TABLE_COLDEST <= self.lowest < self.highest <= TABLE_HOTTEST:
             raise ValueError(
                 f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "
-                f"expected the temperatures of blackbodies, {TABLE_COLDEST:g} to "
+                f"expected temperatures of blackbodies in order, {TABLE_COLDEST:g} to "
                 f"{TABLE_HOTTEST:g} K"
             )
         count = len(self.NAMES)
@@ -126,21 +80,26 @@ class FittedCalibration(Calibration):
         if (np.diag(self.covariance) < 0).any():
             raise ValueError("calibration: a variance is negative, expected 0 or more")
 
+    @classmethod
     @abstractmethod
-    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a blackbody of this temperature in K."""
+    def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
+        """Return parameters to start a fit from, the last of which is over 0 where counts rise."""
 
     @abstractmethod
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with the temperature, in 1/K."""
+    def counts(self, temperature: ArrayLike) -> Array:
+        """Return the counts of a blackbody of this temperature in K."""
 
     @abstractmethod
-    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with each parameter, shape (n, ...) for temperatures (...)."""
+    def slope(self, temperature: ArrayLike) -> Array:
+        """Return the change of the counts with the temperature, in 1/K."""
 
     @abstractmethod
-    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def gradient(self, temperature: ArrayLike) -> Array:
+        """Return the change of the counts with each parameter, shape (n, ...)."""
+
+    @abstractmethod
+    def temperature(self, counts: ArrayLike) -> Array:
+        """Return the temperature in K of the blackbody that gives these counts, or NaN."""
 
     @property
     def rises(self) -> bool:
@@ -149,28 +108,27 @@ class FittedCalibration(Calibration):
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return bool((self.slope(kelvins) > 0).all())
 
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+    def radiance(self, counts: ArrayLike) -> Array:
         return np.asarray(self.band.radiance(self.temperature(counts)), np.float64)
 
-    def uncertainty(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Standard uncertainty of `radiance` in W/(m² sr), of the same shape."""
+    def uncertainty(self, counts: ArrayLike) -> Array:
+        """Return the standard uncertainty of `radiance` in W/(m² sr)."""
         return np.asarray(np.sqrt((self._effects(self.temperature(counts)) ** 2).sum(axis=0)))
 
     @cached_property
     def errors(self) -> CalibrationErrors:
-        """What its errors change in the radiance, from the coldest to the hottest blackbody.
+        """Effects of its errors on the radiance, from the coldest to the hottest blackbody.
 
-        What the calibration makes wrong at one radiance it makes wrong at others, too: ratios and
-        differences are known better, or worse, than that.
+        An error at one radiance is one at others, too: ratios and differences are known better, or
+        worse, than that.
         """
         coldest, hottest = self.counts([self.lowest, self.highest]).tolist()
         kelvins = self.temperature(np.linspace(coldest, hottest, _NODES))
         radiance = np.asarray(self.band.radiance(kelvins), np.float64)
         return CalibrationErrors(radiance, self._effects(kelvins))
 
-    def _effects(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Changes of the radiance by independent errors of the parameters, shape (n, ...).
+    def _effects(self, temperature: Array) -> Array:
+        """Return changes of the radiance by independent errors of the parameters, shape (n, ...).
 
         Each is of one standard uncertainty; together they have the covariance of the parameters
         (JCGM 100, Equation 13): at given counts S a change of the parameters moves the radiance by
@@ -179,8 +137,8 @@ class FittedCalibration(Calibration):
         errors = factor(self.covariance, CALIBRATION)
         return np.tensordot(errors.T, self._sensitivity(temperature), 1)
 
-    def _sensitivity(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Change of the radiance with each parameter at given counts, shape (n, ...)."""
+    def _sensitivity(self, temperature: Array) -> Array:
+        """Return the change of the radiance with each parameter at given counts, shape (n, ...)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = self.band.slope(temperature) / self.slope(temperature)
             return np.asarray(-self.gradient(temperature) * slope)
@@ -189,15 +147,10 @@ class FittedCalibration(Calibration):
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearCalibration(FittedCalibration):
-    """Counts that are a straight line over the in-band radiance: S = offset + gain L(T).
-
-    Parameters
-    ----------
-    **all
-        As `FittedCalibration` has them; offset in counts, gain in counts per W/(m² sr).
-    """
+    """Counts that are a straight line over the in-band radiance: S = offset + gain L(T)."""
 
     kind: ClassVar[str] = "linear"
+    description: ClassVar[str] = "straight line over the in-band radiance"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "gain")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "counts m² sr/W")
 
@@ -206,31 +159,26 @@ class LinearCalibration(FittedCalibration):
         if not self.parameters[1] > 0:
             raise ValueError(f"calibration: gain is {self.parameters[1]:g}, expected over 0")
 
-    @property
-    def description(self) -> str:
-        """What it is, for people."""
-        return "straight line over the in-band radiance"
+    @classmethod
+    def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
+        gain, offset = np.polyfit(np.asarray(band.radiance(kelvins), np.float64), counts, 1)
+        return np.array([offset, gain])
 
-    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a blackbody of this temperature in K."""
+    def counts(self, temperature: ArrayLike) -> Array:
         offset, gain = self.parameters
         return np.asarray(offset + gain * self.band.radiance(_floats(temperature)))
 
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with the temperature, in 1/K."""
+    def slope(self, temperature: ArrayLike) -> Array:
         return np.asarray(self.parameters[1] * self.band.slope(temperature))
 
-    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with offset and gain, shape (2, ...)."""
+    def gradient(self, temperature: ArrayLike) -> Array:
         radiance = self.band.radiance(_floats(temperature))
         return np.stack([np.ones_like(radiance), radiance])
 
-    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def temperature(self, counts: ArrayLike) -> Array:
         return np.asarray(self.band.temperature(self.radiance(counts)), np.float64)
 
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape."""
+    def radiance(self, counts: ArrayLike) -> Array:
         offset, gain = self.parameters
         return np.asarray((_floats(counts) - offset) / gain)
 
@@ -240,56 +188,57 @@ class LinearCalibration(FittedCalibration):
 class SakumaHattori(FittedCalibration):
     """Counts by the Planckian form of Sakuma and Hattori: S = offset + C / (exp(c2/(A T + B)) − 1).
 
-    Parameters
-    ----------
-    **all
-        As `FittedCalibration` has them; offset and C in counts, A in m, B in m K.
-
-    Notes
-    -----
     F. Sakuma and S. Hattori, Temperature: Its Measurement and Control in Science and Industry 5
     (1982) 421; recommended by the CIPM's consultative committee for thermometry (CCT-WG5, 2008).
     Their signal has no offset; the counts of a camera have one.
     """
 
     kind: ClassVar[str] = "sakuma-hattori"
+    description: ClassVar[str] = "Planckian form of Sakuma and Hattori"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "A", "B", "C")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "m", "m K", "counts")
 
-    @property
-    def description(self) -> str:
-        """What it is, for people."""
-        return "Planckian form of Sakuma and Hattori"
+    @classmethod
+    def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
+        """Return that of a narrow band of mean wavelength λ and standard deviation σ.
 
-    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a blackbody of this temperature in K."""
+        A = λ (1 − 6 σ²/λ²) and B = c2 σ²/(2 λ²) (P. Saunders and D. R. White, Metrologia 40 (2003)
+        195).
+        """
+        wavelengths = np.linspace(band.lower, band.upper, 501)
+        weights = np.ones_like(wavelengths) if band.response is None else band.response(wavelengths)
+        mean = float(np.average(wavelengths, weights=weights))
+        relative = float(np.average((wavelengths / mean - 1) ** 2, weights=weights))
+        a, b = mean * (1 - 6 * relative), SECOND_RADIATION_CONSTANT * relative / 2
+        form = _occupation(SECOND_RADIATION_CONSTANT / (a * kelvins + b))
+        scale, offset = np.polyfit(form, counts, 1)
+        return np.array([offset, a, b, scale])
+
+    def counts(self, temperature: ArrayLike) -> Array:
         offset, _, _, scale = self.parameters
         return np.asarray(offset + scale * _occupation(self._exponent(temperature)))
 
-    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with the temperature, in 1/K."""
+    def slope(self, temperature: ArrayLike) -> Array:
         return np.asarray(self.parameters[1] * self._by_stretched(temperature))
 
-    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with offset, A, B and C, shape (4, ...)."""
+    def gradient(self, temperature: ArrayLike) -> Array:
         kelvins, stretched = _floats(temperature), self._by_stretched(temperature)
         occupation = _occupation(self._exponent(temperature))
         return np.stack([np.ones_like(kelvins), kelvins * stretched, stretched, occupation])
 
-    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
+    def temperature(self, counts: ArrayLike) -> Array:
         offset, a, b, scale = self.parameters
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithm = np.log1p(scale / (_floats(counts) - offset))
             kelvins = (SECOND_RADIATION_CONSTANT / logarithm - b) / a
         return np.where(kelvins > 0, kelvins, np.nan)
 
-    def _exponent(self, temperature: ArrayLike) -> NDArray[np.float64]:
+    def _exponent(self, temperature: ArrayLike) -> Array:
         _, a, b, _ = self.parameters
         return np.asarray(SECOND_RADIATION_CONSTANT / (a * _floats(temperature) + b))
 
-    def _by_stretched(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Change of the counts with A T + B."""
+    def _by_stretched(self, temperature: ArrayLike) -> Array:
+        """Return the change of the counts with A T + B."""
         exponent = self._exponent(temperature)
         occupation = _occupation(exponent)
         growth = occupation * (1 + occupation) * exponent**2 / SECOND_RADIATION_CONSTANT
@@ -299,37 +248,26 @@ class SakumaHattori(FittedCalibration):
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FactoryCalibration(Calibration):
-    """The conversion that a camera's maker stored in the file; its uncertainty is not known.
+    """The conversion that a camera's maker stored in the file; its uncertainty is not known."""
 
-    Parameters
-    ----------
-    conversion : PlanckConversion
-        From counts to the temperature of a blackbody.
-    **others
-        As `Calibration` has them.
-    """
-
+    description: ClassVar[str] = "the maker's, from the file; its uncertainty is not known"
     conversion: PlanckConversion
 
-    @property
-    def description(self) -> str:
-        """What it is, for people."""
-        return "the maker's, from the file; its uncertainty is not known"
-
-    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+    def radiance(self, counts: ArrayLike) -> Array:
         kelvins = self.conversion.temperature(np.asarray(counts))
         return np.asarray(self.band.radiance(kelvins), np.float64)
-
-    @property
-    def errors(self) -> None:
-        """None: makers do not store them."""
 
 
 def _floats(values: ArrayLike) -> NDArray[Any]:
     return np.asarray(values, np.float64)
 
 
-def _occupation(exponent: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 / (exp(x) − 1), without overflow at large x."""
+def _occupation(exponent: Array) -> Array:
+    """Return 1 / (exp(x) − 1), without overflow at large x."""
     return np.asarray(np.exp(-exponent) / -np.expm1(-exponent))
+
+
+MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
+    one.kind: one for one in (LinearCalibration, SakumaHattori)
+}
+"""Fitted calibrations by name."""

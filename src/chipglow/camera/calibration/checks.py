@@ -1,11 +1,12 @@
-"""Whether the residuals of a calibration look as the stated uncertainties say."""
+"""Tests whether the residuals of a calibration agree with the stated uncertainties."""
 
 from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri, stdtr, stdtrit
+
+from chipglow.quantities import Array
 
 _UNLIKELY: Final = 0.01
 _ALIKE: Final = 0.05
@@ -18,23 +19,13 @@ _LEAST_FALL: Final = 0.5
 
 
 def residual_warnings(
-    residuals: NDArray[np.float64],
-    design: NDArray[np.float64],
-    kelvins: NDArray[np.float64],
-    stated: bool,
+    residuals: Array, design: Array, kelvins: Array, stated: bool
 ) -> Iterator[str]:
-    """What residuals say against a calibration, a sentence each.
+    """Yield what residuals say against a calibration, a sentence each.
 
-    Parameters
-    ----------
-    residuals : ndarray
-        Over their standard uncertainties, in the order of the measurement, shape (n,).
-    design : ndarray
-        Change of the points with the parameters over the same uncertainties, shape (n, p).
-    kelvins : ndarray
-        Radiance temperatures of the points in K, shape (n,).
-    stated : bool
-        Whether the uncertainties were stated; if not, only the order of the residuals is judged.
+    `residuals` (n,), in the order of the measurement, and `design` (n, parameters), the change of
+    the points with the parameters, are over the standard uncertainties. Unless these are `stated`,
+    only the order of the residuals is judged.
     """
     free = residuals.size - design.shape[1]
     total = float(residuals @ residuals)
@@ -60,11 +51,8 @@ def residual_warnings(
         )
 
 
-def alike(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> bool:
-    """Whether residuals of successive points are more alike than chance makes them.
-
-    Parameters are those of `residual_warnings`.
-    """
+def alike(residuals: Array, design: Array) -> bool:
+    """Return whether residuals of successive points are more alike than chance makes them."""
     free = residuals.size - design.shape[1]
     # What is far within the uncertainties does no harm, however alike it is.
     if free < _LEAST_FREEDOM or float(residuals @ residuals) < _FAR_WITHIN * free:
@@ -74,26 +62,21 @@ def alike(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> bool:
     return min(test(residuals, design) for test in tests) < _ALIKE / len(tests)
 
 
-def drift_shift(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far an even drift of the counts, fitted with the rest, moves the parameters.
-
-    Parameters are those of `residual_warnings`; the drift is 0 at the first point.
-    """
+def drift_shift(residuals: Array, design: Array) -> Array:
+    """Return how far a drift of the counts, even from the first point on, moves the parameters."""
     lengths = np.linalg.norm(design, axis=0)
     columns = np.column_stack([design / lengths, _drift(design)])
     with_drift = np.linalg.lstsq(columns, residuals, rcond=None)[0]
     return np.asarray(with_drift[:-1] / lengths)
 
 
-def _outlier(
-    residuals: NDArray[np.float64], design: NDArray[np.float64], stated: bool
-) -> int | None:
-    """The point without which chi-squared falls most, if it is far from what the others say.
+def _outlier(residuals: Array, design: Array, stated: bool) -> int | None:
+    """Return the point without which chi-squared falls most, if it is far from the others.
 
     By the residual that is studentised with the others' scatter (Cook and Weisberg, Residuals and
     Influence in Regression, 1982); its square is chi-squared's fall.
     """
-    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    orthogonal = _orthonormal(design)
     left = np.maximum(1 - np.sum(orthogonal**2, axis=1), 1e-9)
     total, fall = float(residuals @ residuals), residuals**2 / left
     point = int(np.argmax(fall))
@@ -109,29 +92,29 @@ def _student_limit(free: int) -> float:
     return float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
 
 
-def _serial_probability(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> float:
-    """How often independent errors leave residuals that are so much alike from point to point.
+def _serial_probability(residuals: Array, design: Array) -> float:
+    """Return how often independent errors leave residuals so much alike from point to point.
 
     The statistic of J. Durbin and G. S. Watson, Biometrika 37 (1950) 409, with its distribution by
     draws of independent errors that the same fit is subtracted from.
     """
-    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    orthogonal = _orthonormal(design)
     draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, residuals.size))
     draws -= (draws @ orthogonal) @ orthogonal.T
 
-    def ratio(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ratio(values: Array) -> Array:
         squares = np.maximum(np.sum(values**2, axis=-1), 1e-300)
         return np.asarray(np.sum(np.diff(values, axis=-1) ** 2, axis=-1) / squares)
 
     return float(np.mean(ratio(draws) <= ratio(residuals)))
 
 
-def _drift_probability(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> float:
-    """How often independent errors look as much like a drift, even from point to point.
+def _drift_probability(residuals: Array, design: Array) -> float:
+    """Return how often independent errors look as much like a drift, even from point to point.
 
     Student's t of one more parameter, the number of the point, with the scatter that is left.
     """
-    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    orthogonal = _orthonormal(design)
     drift = _drift(design)
     drift = drift - orthogonal @ (orthogonal.T @ drift)
     length = float(drift @ drift)
@@ -143,6 +126,11 @@ def _drift_probability(residuals: NDArray[np.float64], design: NDArray[np.float6
     return float(2 * stdtr(free, -np.sqrt(square / rest)))
 
 
-def _drift(design: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Counts that rise from point to point, over the deviations; all forms begin with an offset."""
+def _orthonormal(design: Array) -> Array:
+    """Return a basis of the columns, which are of very different lengths."""
+    return np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+
+
+def _drift(design: Array) -> Array:
+    """Return counts that rise from point to point, over the deviations."""
     return np.asarray(np.linspace(0.0, 1.0, len(design)) * design[:, 0])

@@ -1,4 +1,4 @@
-"""What the errors of a calibration change in the radiance that is measured by it."""
+"""Effects of a calibration's errors on the radiance that is measured by it."""
 
 import hashlib
 from dataclasses import dataclass
@@ -6,8 +6,9 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chipglow.quantities import Array
 from chipglow.uncertainty import Cause, Component, Estimate
 
 CALIBRATION: Final = "calibration"
@@ -20,23 +21,12 @@ class CalibrationErrors:
 
     They are the same in all pixels, frames and files that were measured by the calibration: none
     falls in a mean.
-
-    Parameters
-    ----------
-    radiance : ndarray
-        In-band radiance in W/(m² sr), rising, shape (k,).
-    effects : ndarray
-        Change of the radiance there in W/(m² sr) by each error of one standard uncertainty, with
-        its sign, shape (errors, k). Straight lines between; beyond the ends as there.
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit, the radiance does not rise or a number is not finite.
     """
 
-    radiance: NDArray[np.float64]
-    effects: NDArray[np.float64]
+    radiance: Array
+    """In-band radiance in W/(m² sr), rising, shape (k,)."""
+    effects: Array
+    """Change there by each error of one standard uncertainty, signed, shape (errors, k)."""
 
     def __post_init__(self) -> None:
         for name in ("radiance", "effects"):
@@ -54,25 +44,25 @@ class CalibrationErrors:
 
     @cached_property
     def identity(self) -> str:
-        """Tells these errors from those of another calibration, and is the same in a file."""
+        """Digest that is the same for these errors read from a file."""
         content = self.radiance.tobytes() + self.effects.tobytes()
         return hashlib.sha256(content).hexdigest()[:16]
 
-    def at(self, radiance: ArrayLike) -> NDArray[np.float64]:
-        """Effects at radiances in W/(m² sr) of any shape, shape (errors, ...)."""
+    def at(self, radiance: ArrayLike) -> Array:
+        """Return effects at radiances in W/(m² sr), (errors, ...); beyond the ends as there."""
         places = np.asarray(radiance, np.float64)
         return np.stack([np.interp(places, self.radiance, one) for one in self.effects])
 
-    def standard_uncertainty(self, radiance: ArrayLike) -> NDArray[np.float64]:
-        """Standard uncertainty of radiances in W/(m² sr), of the same shape."""
+    def standard_uncertainty(self, radiance: ArrayLike) -> Array:
+        """Return the standard uncertainty of radiances in W/(m² sr)."""
         whole = np.sqrt((self.effects**2).sum(axis=0))
         return np.asarray(np.interp(np.asarray(radiance, np.float64), self.radiance, whole))
 
     def component(self, effects: ArrayLike) -> Component:
-        """The component of a result, by its change with each error, shape (errors, ...)."""
+        """Return a result's component, from its change with each error, shape (errors, ...)."""
         columns = np.asarray(effects, np.float64).reshape(len(self.effects), -1).T.copy()
         return Component(Cause(CALIBRATION, self.identity, len(self.effects)), columns)
 
     def estimate(self, radiance: ArrayLike) -> Estimate:
-        """Radiances in W/(m² sr), of any shape, with the component ``calibration``."""
+        """Return radiances in W/(m² sr) with the component ``calibration``."""
         return Estimate(np.asarray(radiance), (self.component(self.at(radiance)),))

@@ -1,24 +1,19 @@
-"""Calibrations fitted to what a camera shows of blackbodies."""
+"""Calibrations fitted to blackbodies."""
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration.blackbody import Blackbody
-from chipglow.camera.calibration.calibration import (
-    FittedCalibration,
-    LinearCalibration,
-    SakumaHattori,
-)
+from chipglow.camera.calibration.calibration import FittedCalibration
 from chipglow.camera.calibration.checks import alike, drift_shift, residual_warnings
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
-from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
 
 Kind = TypeVar("Kind", bound=FittedCalibration)
 
@@ -31,33 +26,23 @@ _IDEAL: Final = Blackbody()
 
 @dataclass(frozen=True, eq=False)
 class CalibrationFit(Generic[Kind]):
-    """A calibration, and how well it meets the points that it was fitted to.
-
-    Parameters
-    ----------
-    calibration : FittedCalibration
-        The calibration.
-    temperatures, counts : ndarray
-        The points: radiance temperature of the blackbody in K and counts, shape (n,).
-    residuals : ndarray
-        Counts minus those of the calibration, shape (n,).
-    standard_uncertainties : ndarray
-        Standard uncertainty of each residual in counts, the temperature's included, shape (n,).
-    stated : bool
-        Whether the points' uncertainties were stated. If not, these are the scatter of
-        the residuals themselves, which then prove nothing of the form of the calibration.
-    """
+    """A calibration, and how well it fits its n points."""
 
     calibration: Kind
-    temperatures: NDArray[np.float64]
-    counts: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    standard_uncertainties: NDArray[np.float64]
+    temperatures: Array
+    """Radiance temperatures of the blackbody in K, shape (n,)."""
+    counts: Array
+    """Shape (n,)."""
+    residuals: Array
+    """Counts minus those of the calibration, shape (n,)."""
+    standard_uncertainties: Array
+    """Of the residuals in counts, the temperatures' included, shape (n,)."""
     stated: bool
+    """Whether the uncertainties were stated; otherwise they are the residuals' scatter."""
 
     @property
-    def residuals_temperature(self) -> NDArray[np.float64]:
-        """The residuals as differences of temperature in K, shape (n,)."""
+    def residuals_temperature(self) -> Array:
+        """Residuals as differences of temperature in K, shape (n,)."""
         return self.residuals / self.calibration.slope(self.temperatures)
 
     @property
@@ -72,7 +57,7 @@ class CalibrationFit(Generic[Kind]):
 
     @property
     def probability(self) -> float | None:
-        """Probability of a chi-squared as large as this or larger; None unless `stated`.
+        """Probability of a chi-squared as large or larger; None unless `stated`.
 
         Where it is small, the form of the calibration or the stated uncertainties are wrong.
         """
@@ -82,10 +67,9 @@ class CalibrationFit(Generic[Kind]):
 
     @property
     def information_criterion(self) -> float:
-        """Akaike's, corrected for few points: the form with the least is to be preferred.
+        """Akaike's, corrected for few points; infinite where there are too few of them.
 
-        Infinite where there are too few points to say. Only of use between fits to the same
-        points, with the same `stated`.
+        Only of use between fits to the same points, with the same `stated`.
         """
         points, parameters = self.counts.size, self.calibration.parameters.size
         estimated = parameters if self.stated else parameters + 1
@@ -102,7 +86,7 @@ class CalibrationFit(Generic[Kind]):
         Of stated ones the root of the reduced chi-squared where it is over 1 (R. T. Birge, Physical
         Review 40 (1932) 207). Where the scatter of the points is all that is known, Student's
         factor for 95 % over the normal distribution's (JCGM 100, G.3): with few points it is large,
-        and twice the standard uncertainty holds the truth as often as it says.
+        and twice the standard uncertainty holds the truth as often as stated.
         """
         free = self.degrees_of_freedom
         if not self.stated:
@@ -110,112 +94,51 @@ class CalibrationFit(Generic[Kind]):
         return max(float(np.sqrt(self.chi_squared / free)), 1.0) if free else 1.0
 
     def coverage_factor(self) -> float:
-        """Factor on the standard uncertainty that gives an interval of 95 %: the normal one's."""
+        """Return the normal distribution's factor of an interval of 95 %."""
         return float(ndtri(_QUANTILE))
 
 
-def fit_linear(
+def fit_calibration(
+    kind: type[Kind],
     temperatures: ArrayLike,
     counts: ArrayLike,
     band: Band,
     count_uncertainty: ArrayLike | None = None,
     temperature_uncertainty: ArrayLike | None = None,
     common_uncertainty: float = 0.0,
+    *,
     integration_time: float | None = None,
     range_name: str | None = None,
     blackbody: Blackbody = _IDEAL,
-) -> CalibrationFit[LinearCalibration]:
-    """Fit counts = offset + gain L(T), L the integral over the band, to blackbodies.
+) -> CalibrationFit[Kind]:
+    """Fit a `LinearCalibration` or `SakumaHattori` to blackbodies of temperatures in K.
 
-    Parameters
-    ----------
-    temperatures : array_like
-        Temperatures of the blackbody in K, shape (n,).
-    counts : array_like
-        Counts, shape (n,).
-    band : Band
-        The camera's band.
-    count_uncertainty, temperature_uncertainty : array_like, optional
-        Standard uncertainties in counts and in K of each point, independent of those of the other
-        points; of shape (n,) or one for all. If neither is given, all points weigh the same, and
-        the scatter of the residuals gives the uncertainty.
-    common_uncertainty : float
-        Standard uncertainty in K of the blackbody's temperature that all points have in common,
-        as of its certificate.
-    integration_time : float, optional
-        In s.
-    range_name : str, optional
-        The camera's measuring range.
-    blackbody : Blackbody
-        Emissivity of the blackbody and what it reflects; an ideal one by default.
+    Uncertainties of the points are standard ones in counts and K, of each or of all. If neither is
+    given, all points weigh the same, and the scatter of the residuals gives the uncertainty.
 
-    Raises
-    ------
-    ValueError
-        If there are too few points, a value is impossible, or the counts do not rise with the
-        temperature.
-
-    Notes
-    -----
     Weights are by the effective variance u²(S) + (dS/dT)² u²(T) at the fitted slope, iterated
-    (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters is that of the weighted
-    fit, times the square of `CalibrationFit.enlargement`; a common error of the temperatures or of
-    the blackbody's emissivity moves all points at once, and what it does to the parameters is
-    added to their covariance as one more term (JCGM 100, Equation 13).
+    (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters is that of the
+    weighted fit, times the square of `CalibrationFit.enlargement`; a common error of the
+    temperatures or of the blackbody's emissivity moves all points at once, and what it does to
+    the parameters is added to their covariance as one more term (JCGM 100, Equation 13).
     """
     points = _Points.checked(
-        temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty, 2
-    ).seen_in(band, blackbody)
-    radiance = np.asarray(band.radiance(points.temperatures), np.float64)
-    gain, offset = np.polyfit(radiance, points.counts, 1)
-    _expect_rising(gain > 0)
-
-    build = points.builder(LinearCalibration, band, integration_time, range_name)
-    return _fit(points, np.array([offset, gain]), build)
-
-
-def fit_sakuma_hattori(
-    temperatures: ArrayLike,
-    counts: ArrayLike,
-    band: Band,
-    count_uncertainty: ArrayLike | None = None,
-    temperature_uncertainty: ArrayLike | None = None,
-    common_uncertainty: float = 0.0,
-    integration_time: float | None = None,
-    range_name: str | None = None,
-    blackbody: Blackbody = _IDEAL,
-) -> CalibrationFit[SakumaHattori]:
-    """Fit counts = offset + C / (exp(c2/(A T + B)) − 1) to blackbodies.
-
-    Parameters, weights and errors are those of `fit_linear`. The band is needed to compute the
-    radiance of a temperature, and for a first guess of A and B.
-
-    Notes
-    -----
-    The first guess is that of a narrow band of mean wavelength λ and standard deviation σ,
-    A = λ (1 − 6 σ²/λ²) and B = c2 σ²/(2 λ²) (P. Saunders and D. R. White, Metrologia 40 (2003)
-    195).
-    """
-    points = _Points.checked(
-        temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty, 4
-    ).seen_in(band, blackbody)
-
-    build = points.builder(SakumaHattori, band, integration_time, range_name)
-    return _fit(points, _first_guess(points, band, build), build)
-
-
-def _first_guess(
-    points: "_Points", band: Band, build: Callable[..., SakumaHattori]
-) -> NDArray[np.float64]:
-    wavelengths = np.linspace(band.lower, band.upper, 501)
-    weights = np.ones_like(wavelengths) if band.response is None else band.response(wavelengths)
-    mean = float(np.average(wavelengths, weights=weights))
-    relative = float(np.average((wavelengths / mean - 1) ** 2, weights=weights))
-    a, b = mean * (1 - 6 * relative), SECOND_RADIATION_CONSTANT * relative / 2
-    form = build(np.array([0.0, a, b, 1.0]), np.zeros((4, 4))).counts(points.temperatures)
-    scale, offset = np.polyfit(form, points.counts, 1)
-    _expect_rising(scale > 0)
-    return np.array([offset, a, b, scale])
+        temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty
+    )
+    points.expect_enough(len(kind.NAMES))
+    points = points.seen_in(band, blackbody)
+    start = kind.first_guess(points.temperatures, points.counts, band)
+    _expect_rising(start[-1] > 0)
+    calibration = kind(
+        band=band,
+        lowest=float(points.temperatures.min()),
+        highest=float(points.temperatures.max()),
+        integration_time=integration_time,
+        range_name=range_name,
+        parameters=start,
+        covariance=np.zeros((start.size, start.size)),
+    )
+    return _fit(points, calibration)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,11 +148,11 @@ class _Points:
     What all points have in common is a list of errors in K by the point, each of one deviation.
     """
 
-    temperatures: NDArray[np.float64]
-    counts: NDArray[np.float64]
-    count_uncertainty: NDArray[np.float64]
-    temperature_uncertainty: NDArray[np.float64]
-    common: tuple[NDArray[np.float64], ...]
+    temperatures: Array
+    counts: Array
+    count_uncertainty: Array
+    temperature_uncertainty: Array
+    common: tuple[Array, ...]
     stated: bool
 
     @classmethod
@@ -240,7 +163,6 @@ class _Points:
         count_uncertainty: ArrayLike | None,
         temperature_uncertainty: ArrayLike | None,
         common_uncertainty: float,
-        parameters: int,
     ) -> "_Points":
         kelvins, signal = np.asarray(temperatures, np.float64), np.asarray(counts, np.float64)
         if kelvins.ndim != 1 or kelvins.shape != signal.shape:
@@ -258,7 +180,7 @@ class _Points:
                 f"{TABLE_HOTTEST:g} K"
             )
         _expect_unsaturated(kelvins, signal)
-        points = cls(
+        return cls(
             kelvins,
             signal,
             _uncertainty("count_uncertainty", count_uncertainty, kelvins.shape),
@@ -266,35 +188,19 @@ class _Points:
             (_uncertainty("common_uncertainty", common_uncertainty, kelvins.shape),),
             count_uncertainty is not None or temperature_uncertainty is not None,
         )
-        needed = parameters if points.stated else parameters + 1
-        different = np.unique(kelvins).size
-        if different < parameters or kelvins.size < needed:
+
+    def expect_enough(self, parameters: int) -> None:
+        """Raise a ValueError if there are too few points for so many parameters."""
+        needed = parameters if self.stated else parameters + 1
+        different = np.unique(self.temperatures).size
+        if different < parameters or self.counts.size < needed:
             raise ValueError(
-                f"calibration: {kelvins.size} points at {different} temperatures, expected "
+                f"calibration: {self.counts.size} points at {different} temperatures, expected "
                 f"{needed} points or more at {parameters} temperatures or more"
             )
-        return points
-
-    def builder(
-        self, kind: type[Kind], band: Band, integration_time: float | None, range_name: str | None
-    ) -> Callable[[NDArray[np.float64], NDArray[Any]], Kind]:
-        """What makes a calibration that holds over the points, of parameters and covariance."""
-
-        def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> Kind:
-            return kind(
-                band=band,
-                lowest=float(self.temperatures.min()),
-                highest=float(self.temperatures.max()),
-                integration_time=integration_time,
-                range_name=range_name,
-                parameters=parameters,
-                covariance=covariance,
-            )
-
-        return build
 
     def seen_in(self, band: Band, blackbody: Blackbody) -> "_Points":
-        """The points with the radiance temperatures of a blackbody of this emissivity."""
+        """Return the points with the radiance temperatures of a blackbody of this emissivity."""
         if blackbody == _IDEAL:
             return self
         by_temperature, by_emissivity = blackbody.sensitivity(self.temperatures, band)
@@ -308,14 +214,14 @@ class _Points:
             ),
         )
 
-    def deviations(self, slope: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Effective standard uncertainties in counts; 1 if none are stated."""
+    def deviations(self, slope: Array) -> Array:
+        """Return effective standard uncertainties in counts; 1 if none are stated."""
         if not self.stated:
             return np.ones_like(self.counts)
         return np.hypot(self.count_uncertainty, slope * self.temperature_uncertainty)
 
 
-def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
     try:
         values = np.broadcast_to(np.asarray(0.0 if value is None else value, np.float64), shape)
     except ValueError:
@@ -325,7 +231,7 @@ def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> 
     return values
 
 
-def _expect_unsaturated(kelvins: NDArray[np.float64], counts: NDArray[np.float64]) -> None:
+def _expect_unsaturated(kelvins: Array, counts: Array) -> None:
     """Refuse points whose greatest counts are the same at several temperatures."""
     greatest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
     if greatest.size > 1 and np.unique(counts).size > 1:
@@ -343,38 +249,34 @@ def _expect_rising(rises: bool) -> None:
         )
 
 
-def _fit(
-    points: _Points,
-    start: NDArray[np.float64],
-    build: Callable[[NDArray[np.float64], NDArray[Any]], Kind],
-) -> CalibrationFit[Kind]:
-    """Least squares by the effective variance, iterated until the weights stay."""
-    nothing = np.zeros((start.size, start.size))
-    calibration = build(start, nothing)
+def _fit(points: _Points, calibration: Kind) -> CalibrationFit[Kind]:
+    """Fit by least squares with the effective variance, iterated until the weights stay."""
     deviations = points.deviations(calibration.slope(points.temperatures))
     if not deviations.all():
         raise ValueError(
             "calibration: a point's uncertainties are both 0, expected one over 0, or none stated"
         )
     for _ in range(_MOST_ROUNDS):
-        calibration = build(_least_squares(points, calibration, deviations, build), nothing)
+        calibration = _least_squares(points, calibration, deviations)
         before = deviations
         deviations = points.deviations(calibration.slope(points.temperatures))
         if np.allclose(deviations, before, rtol=_SETTLED, atol=0.0):
             break
     else:
-        raise ValueError("calibration: the fit does not settle, expected smoother points")
+        raise ValueError("calibration: the reweighted fit did not converge; check for outliers")
     _expect_rising(calibration.rises)
     residuals = points.counts - calibration.counts(points.temperatures)
     if not points.stated:
-        free = points.counts.size - start.size
+        free = points.counts.size - calibration.parameters.size
         rounding = _EXACT * np.abs(points.counts).max()
         deviations = np.full_like(residuals, max(np.sqrt(np.sum(residuals**2) / free), rounding))
     fit = CalibrationFit(
         calibration, points.temperatures, points.counts, residuals, deviations, points.stated
     )
-    scaled, design = residuals / deviations, _design(points, calibration, deviations)
-    covariance = _covariance(points, calibration, deviations, fit.enlargement)
+    scaled = residuals / deviations
+    design = (calibration.gradient(points.temperatures) / deviations).T
+    slope = calibration.slope(points.temperatures) / deviations
+    covariance = _covariance(design, [slope * one for one in points.common], fit.enlargement)
     if alike(scaled, design):
         shift = drift_shift(scaled, design)
         covariance = covariance + np.outer(shift, shift)
@@ -382,32 +284,20 @@ def _fit(
     return replace(fit, calibration=replace(calibration, covariance=covariance, warnings=warnings))
 
 
-def _least_squares(
-    points: _Points,
-    calibration: Kind,
-    deviations: NDArray[np.float64],
-    build: Callable[[NDArray[np.float64], NDArray[Any]], Kind],
-) -> NDArray[np.float64]:
-    nothing = calibration.covariance
-
-    def misfit(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        model = build(parameters, nothing).counts(points.temperatures)
+def _least_squares(points: _Points, calibration: Kind, deviations: Array) -> Kind:
+    def misfit(parameters: Array) -> Array:
+        model = replace(calibration, parameters=parameters).counts(points.temperatures)
         return np.asarray((model - points.counts) / deviations)
 
-    def jacobian(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        return (build(parameters, nothing).gradient(points.temperatures) / deviations).T
+    def jacobian(parameters: Array) -> Array:
+        model = replace(calibration, parameters=parameters)
+        return (model.gradient(points.temperatures) / deviations).T
 
+    exact = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
             found = scipy.optimize.least_squares(
-                misfit,
-                calibration.parameters,
-                jacobian,
-                method="lm",
-                x_scale="jac",
-                xtol=1e-12,
-                ftol=1e-12,
-                gtol=1e-12,
+                misfit, calibration.parameters, jacobian, method="lm", x_scale="jac", **exact
             )
     except FloatingPointError:
         found = None
@@ -416,69 +306,14 @@ def _least_squares(
             "calibration: the fit does not converge, expected counts that rise as the band's "
             "radiance does"
         )
-    return np.asarray(found.x)
+    return replace(calibration, parameters=np.asarray(found.x))
 
 
-def _design(
-    points: _Points, calibration: FittedCalibration, deviations: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Change of the points with the parameters over the deviations, shape (point, parameter)."""
-    return np.asarray((calibration.gradient(points.temperatures) / deviations).T)
-
-
-def _covariance(
-    points: _Points,
-    calibration: FittedCalibration,
-    deviations: NDArray[np.float64],
-    enlargement: float,
-) -> NDArray[np.float64]:
-    """Covariance of the fit, enlarged, and of what the points have in common."""
-    design = _design(points, calibration, deviations)
+def _covariance(design: Array, common: list[Array], enlargement: float) -> Array:
+    """Return the covariance of the fit, enlarged, and of errors that the points have in common."""
     lengths = np.linalg.norm(design, axis=0)
     # Columns of one length: parameters are of very different sizes.
     solution = np.linalg.pinv(design / lengths) / lengths[:, None]
-    slope = calibration.slope(points.temperatures) / deviations
-    common = [solution @ (slope * error) for error in points.common]
     random = enlargement**2 * solution @ solution.T
-    return np.asarray(random + sum(np.outer(moved, moved) for moved in common))
-
-
-MODELS: Final[Mapping[str, Callable[..., CalibrationFit[Any]]]] = {
-    LinearCalibration.kind: fit_linear,
-    SakumaHattori.kind: fit_sakuma_hattori,
-}
-"""Models of a calibration by name."""
-
-
-def fit_models(
-    temperatures: ArrayLike,
-    counts: ArrayLike,
-    band: Band,
-    models: Sequence[str] = tuple(MODELS),
-    **known: Any,
-) -> dict[str, CalibrationFit[Any]]:
-    """Fit several models to the same points; `preferred` is one of them.
-
-    Parameters
-    ----------
-    temperatures, counts, band
-        As `fit_linear` takes them.
-    models : sequence of str
-        Names of `MODELS`.
-    **known
-        What else is known, as `fit_linear` takes it.
-
-    Raises
-    ------
-    ValueError
-        As `fit_linear`, or if there is no such model.
-    """
-    for name in models:
-        if name not in MODELS:
-            raise ValueError(f"model: {name!r}, expected one of {', '.join(MODELS)}")
-    return {name: MODELS[name](temperatures, counts, band, **known) for name in models}
-
-
-def preferred(fits: Mapping[str, CalibrationFit[Any]]) -> str:
-    """Name of the model with the least information criterion (Akaike's, corrected)."""
-    return min(fits, key=lambda name: fits[name].information_criterion)
+    moved = [solution @ error for error in common]
+    return np.asarray(random + sum(np.outer(one, one) for one in moved))

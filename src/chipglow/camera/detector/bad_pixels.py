@@ -1,4 +1,4 @@
-"""Pixels that do not answer to light as others do: finding them, and standing in for them."""
+"""Detection and replacement of pixels that do not answer to light as others do."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from chipglow.camera.detector.nonuniformity import mean_frame, response, size_text
+from chipglow.quantities import Array
 
 LEAST_FRAMES: Final = 8
 """Frames from which the noise of a pixel can be told."""
@@ -30,21 +31,14 @@ _FEWEST_NEIGHBOURS: Final = 3
 
 @dataclass(frozen=True, eq=False)
 class BadPixels:
-    """Pixels that do not answer to light as others do, each an array of bool of shape (y, x).
-
-    Parameters
-    ----------
-    stuck : ndarray
-        The value never changes, while that of others does.
-    noisy : ndarray
-        The value changes much more than that of others.
-    unresponsive : ndarray
-        The gain is out of limits, or, of one flat-field source, the value is far from all others.
-    """
+    """Pixels that do not answer to light as others do, each an array of bool of shape (y, x)."""
 
     stuck: NDArray[np.bool_]
+    """The value never changes, while that of others does."""
     noisy: NDArray[np.bool_]
+    """The value changes much more than that of others."""
     unresponsive: NDArray[np.bool_]
+    """The gain is out of limits or, of one flat-field source, the value is far off."""
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -53,22 +47,10 @@ class BadPixels:
 
 
 def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> BadPixels:
-    """Find pixels that do not answer to light as others do.
+    """Find bad pixels in the signal (time, y, x) of one flat-field source, or of two.
 
-    Noise is judged by `NOISE_LIMIT`, from `LEAST_FRAMES` frames on; of two objects the gain by
+    Noise is judged by `NOISE_LIMIT`, from `LEAST_FRAMES` frames on; of two sources the gain by
     `GAIN_LIMITS`, of one the level by `LEVEL_LIMIT`.
-
-    Parameters
-    ----------
-    frames : ndarray
-        Signal of a flat-field source, shape (time, y, x).
-    hot : ndarray, optional
-        Signal of a brighter flat-field source: tells the gain of every pixel.
-
-    Raises
-    ------
-    ValueError
-        If frames are of different sizes, or the second are not brighter.
     """
     level = mean_frame(frames)
     stuck, noisy = _by_noise(frames)
@@ -82,7 +64,7 @@ def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> Ba
 
 
 def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Pixels without any noise, and with too much."""
+    """Return pixels without any noise, and with too much."""
     none = np.zeros(frames.shape[1:], np.bool_)
     if len(frames) < LEAST_FRAMES:
         return none, none
@@ -93,36 +75,18 @@ def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_
     return noise == 0, noise > NOISE_LIMIT * usual
 
 
-def _far_off(level: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _far_off(level: Array) -> NDArray[np.bool_]:
     distance = np.abs(level - np.median(level))
     spread = 1.4826 * float(np.median(distance))
     return ~(distance <= LEVEL_LIMIT * spread) if spread > 0 else distance > 0
 
 
-def replace_bad_pixels(
-    signal: NDArray[np.float64], bad: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Put the median of the good neighbours in the place of bad pixels.
+def replace_bad_pixels(signal: Array, bad: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+    """Replace bad pixels of frames (time, y, x) by the median of their good neighbours.
 
-    Parameters
-    ----------
-    signal : ndarray
-        Frames, shape (time, y, x).
-    bad : ndarray
-        Which pixels are bad, shape (y, x).
-
-    Returns
-    -------
-    signal : ndarray
-        The frames; NaN where a pixel is bad and not replaced: in clusters of more than
-        `LARGEST_CLUSTER`, and where less than three of the eight neighbours are good.
-    replaced : ndarray
-        Which pixels were replaced, shape (y, x).
-
-    Raises
-    ------
-    ValueError
-        If `bad` is of another size.
+    Returns the frames, NaN where a pixel is bad and not replaced, and which pixels were replaced.
+    Not replaced are clusters of more than `LARGEST_CLUSTER`, and pixels of whose eight neighbours
+    less than three are good.
     """
     if bad.shape != signal.shape[1:]:
         raise ValueError(

@@ -11,7 +11,7 @@ from chipglow.camera.detector.response import RESPONSES, DetectorResponse, Opera
 from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout, Stage
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import TEMPERATURE
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 
@@ -52,8 +52,7 @@ class Detector(Part):
         ),
     ] = ()
     correction: Annotated[
-        Correction,
-        Parameter("How pixels are made alike: two-point, one-point or none."),
+        Correction, Parameter("How pixels are made alike: two-point, one-point or none.")
     ] = "two-point"
     frames: Annotated[int, Parameter("Frames of each source for that.", least=2, most=10_000)] = 32
     cold: Annotated[
@@ -125,7 +124,7 @@ class Detector(Part):
         return min(self._top, round(full)) - 1
 
     def per_radiance(self, point: OperationPoint) -> float:
-        """Electrons that 1 W/(m² sr) makes in an element in one frame."""
+        """Return the electrons that 1 W/(m² sr) makes in an element in one frame."""
         return self.response.electrons(point, self.capacity)
 
     def counts(
@@ -133,26 +132,20 @@ class Detector(Part):
         radiance: NDArray[np.floating],
         generator: np.random.Generator | Sequence[np.random.Generator],
         point: OperationPoint | None = None,
-        times: NDArray[np.float64] | None = None,
+        times: Array | None = None,
     ) -> NDArray[np.uint32]:
-        """Counts of frames.
+        """Return counts of frames.
 
         Parameters
         ----------
         radiance : ndarray
             In-band radiance in W/(m² sr), shape (time, y, x).
         generator : numpy.random.Generator or sequence of it
-            Where the noise comes from, of all frames or one for each: the same state gives the same
-            counts.
+            Source of the noise, one for all frames or for each.
         point : OperationPoint, optional
             How the camera uses the detector; the paper's by default.
         times : ndarray, optional
             When the integration of each frame began in s; at the frame rate by default.
-
-        Returns
-        -------
-        ndarray
-            Counts, of the same shape.
         """
         point, count = point or OperationPoint(), len(radiance)
         if isinstance(generator, np.random.Generator):
@@ -173,25 +166,7 @@ class Detector(Part):
         return np.clip(np.rint(signal), 0, self._top).astype(np.uint32)
 
     def record(self, measurement: Measurement, generator: np.random.Generator) -> Recording:
-        """What a camera with this detector writes of what an ideal detector measured.
-
-        Parameters
-        ----------
-        measurement : Measurement
-            Frames without noise, such as those of `Camera.measure`.
-        generator : numpy.random.Generator
-            Where the noise comes from.
-
-        Returns
-        -------
-        Recording
-            Counts, with the camera's band, pitch and integration time.
-
-        Raises
-        ------
-        ValueError
-            If the measurement is that of a detector already.
-        """
+        """Return the recording that a camera with this detector writes of an ideal measurement."""
         attributes = measurement.data.attrs
         if "detector" in attributes:
             raise ValueError("detector: the measurement has one already, expected one without")

@@ -15,6 +15,7 @@ from chipglow.camera.detector.detector import BRIGHTER_SOURCE, DARKER_SOURCE, De
 from chipglow.camera.detector.nonuniformity import NonUniformity, mean_frame
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
+from chipglow.quantities import Array
 from chipglow.radiometry.band import TABLE_COLDEST
 
 HALF: Final = 0.5
@@ -39,75 +40,30 @@ _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
 
 @dataclass(frozen=True, eq=False)
 class FlatFieldCalibration:
-    """From a detector's counts to radiance: what a camera does with its own counts.
+    """A camera's conversion of its own detector's counts to radiance.
 
     Pixels are made alike by the detector's `correction`. Two sources, blackbodies of known
     radiance, give the straight line from the median pixel's counts to radiance. So what remains in
     the radiance is noise, rounding, what the pixels differ in besides, the frames of the sources
     being few, and non-linearity.
-
-    Parameters
-    ----------
-    detector : Detector
-        The detector.
-    point : OperationPoint
-        How the camera uses it.
-    uniformity : NonUniformity
-        What makes the pixels alike.
-    bad : ndarray of bool
-        Pixels that do not answer to light as others do, or that the brighter source saturates,
-        shape (y, x).
-    saturated : ndarray
-        Counts from which on each pixel is saturated, shape (y, x).
-    sources : tuple of float
-        Radiance of the darker and of the brighter source in W/(m² sr).
-    levels : tuple of float
-        The median pixel's counts of them.
     """
 
     detector: Detector
     point: OperationPoint
+    """How the camera uses the detector."""
     uniformity: NonUniformity
     bad: NDArray[np.bool_]
-    saturated: NDArray[np.float64]
+    """Pixels that do not answer as others do, or that the brighter source saturates, (y, x)."""
+    saturated: Array
+    """Counts from which on each pixel is saturated, shape (y, x)."""
     sources: tuple[float, float]
+    """Radiance of the darker and of the brighter source in W/(m² sr)."""
     levels: tuple[float, float]
-
-    @classmethod
-    def of(
-        cls, detector: Detector, point: OperationPoint, shape: tuple[int, int]
-    ) -> "FlatFieldCalibration":
-        """Let the detector see its sources.
-
-        Parameters
-        ----------
-        detector, point
-            As above.
-        shape : tuple of int
-            Rows and columns.
-
-        Raises
-        ------
-        ValueError
-            If the second source is not the brighter, or saturates the detector.
-        """
-        dark, bright = sources = _sources(detector, point)
-        cold = _frames(detector, point, shape, dark, detector.frames, "cold")
-        hot = _frames(detector, point, shape, bright, detector.frames, "hot")
-        uniformity = _uniformity(detector, cold, hot)
-        light = _BEYOND * full_light(detector, point)
-        full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
-        saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
-        bad = find_bad_pixels(cold, hot).unresponsive
-        bad |= mean_frame(hot) >= saturated
-        low, high = (
-            float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
-        )
-        return cls(detector, point, uniformity, bad, saturated, sources, (low, high))
+    """The median pixel's counts of them."""
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """What a measurement states of detector and calibration, in SI."""
+        """Attributes of a measurement about detector and calibration, in SI."""
         made, kelvins = self.detector, self.point.band.temperature(np.array(self.sources))
         well = "" if made.full_well is None else f", full well {made.full_well:g} e-"
         low, high = kelvins.tolist()
@@ -124,20 +80,10 @@ class FlatFieldCalibration:
             ),
         }
 
-    def radiance(self, counts: NDArray[np.uint32]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-        """Radiance and flags of frames.
+    def radiance(self, counts: NDArray[np.uint32]) -> tuple[Array, NDArray[np.uint8]]:
+        """Return radiance in W/(m² sr) and flags of counts (time, y, x).
 
-        Parameters
-        ----------
-        counts : ndarray
-            Shape (time, y, x).
-
-        Returns
-        -------
-        radiance : ndarray
-            In W/(m² sr); NaN where a pixel is dead and not replaced by its neighbours.
-        flags : ndarray
-            Sums of `Flag`, uint8, of the same shape.
+        Radiance is NaN where a pixel is dead and not replaced by its neighbours.
         """
         signal, replaced = replace_bad_pixels(self.uniformity.apply(counts), self.bad)
         dead = np.where(replaced, Flag.REPLACED, np.where(self.bad, Flag.DEAD, 0))
@@ -148,7 +94,7 @@ class FlatFieldCalibration:
         return dark + (signal - low) * (bright - dark) / (high - low), flags
 
     def netd(self, temperature: float) -> float:
-        """Noise-equivalent temperature difference in K, of a blackbody of this temperature in K.
+        """Return the noise-equivalent temperature difference in K of a blackbody in K.
 
         The standard deviation over time of the calibrated radiance, root mean square over the
         pixels, over dL/dT: noise of frames that the detector makes, as a laboratory measures it.
@@ -177,12 +123,12 @@ class FlatFieldCalibration:
 
     @cached_property
     def half_netd(self) -> float:
-        """NETD in K there."""
+        """NETD in K at that temperature."""
         return self.netd(self.half_temperature)
 
 
 def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
-    """Radiance of the darker and of the brighter source."""
+    """Return the radiance of the darker and of the brighter source."""
     band, full = point.band, full_light(detector, point)
     dark, bright = (
         part * full if kelvins is None else float(band.radiance(kelvins))
@@ -202,16 +148,6 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
     return dark, bright
 
 
-def _uniformity(
-    detector: Detector, cold: NDArray[np.uint32], hot: NDArray[np.uint32]
-) -> NonUniformity:
-    if detector.correction == "two-point":
-        return NonUniformity.two_point(cold, hot)
-    if detector.correction == "one-point":
-        return NonUniformity.one_point(cold)
-    return NonUniformity(np.ones(cold.shape[1:]), np.zeros(cold.shape[1:]))
-
-
 def _frames(
     detector: Detector,
     point: OperationPoint,
@@ -220,7 +156,7 @@ def _frames(
     count: int,
     stream: str,
 ) -> NDArray[np.uint32]:
-    """Frames of a flat-field source."""
+    """Return frames of a flat-field source."""
     generator = np.random.default_rng([detector.seed, _STREAMS[stream]])
     return detector.counts(np.full((count, *shape), radiance), generator, point)
 
@@ -229,19 +165,30 @@ def _frames(
 def flat_field_calibration(
     detector: Detector, point: OperationPoint, shape: tuple[int, int]
 ) -> FlatFieldCalibration:
-    """The calibration of a detector in a camera, see `FlatFieldCalibration.of`: made once."""
-    return FlatFieldCalibration.of(detector, point, shape)
+    """Return the calibration of a detector in a camera, by frames of its sources."""
+    dark, bright = sources = _sources(detector, point)
+    cold = _frames(detector, point, shape, dark, detector.frames, "cold")
+    hot = _frames(detector, point, shape, bright, detector.frames, "hot")
+    if detector.correction == "two-point":
+        uniformity = NonUniformity.two_point(cold, hot)
+    elif detector.correction == "one-point":
+        uniformity = NonUniformity.one_point(cold)
+    else:
+        uniformity = NonUniformity(np.ones(shape), np.zeros(shape))
+    light = _BEYOND * full_light(detector, point)
+    full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
+    saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
+    bad = find_bad_pixels(cold, hot).unresponsive
+    bad |= mean_frame(hot) >= saturated
+    low, high = (
+        float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
+    )
+    return FlatFieldCalibration(detector, point, uniformity, bad, saturated, sources, (low, high))
 
 
 @lru_cache(maxsize=32)
 def full_light(detector: Detector, point: OperationPoint) -> float:
-    """Radiance in W/(m² sr) that fills a detector, beside what is in it in the dark.
-
-    Raises
-    ------
-    ValueError
-        If the dark fills it.
-    """
+    """Return the radiance in W/(m² sr) that fills a detector, beside its electrons in the dark."""
     dark = _seen(detector, point, 0.0)[0] - detector.offset
     electrons = detector.capacity - max(dark, 0.0) / detector.conversion_gain
     if not electrons > 0:
@@ -251,26 +198,11 @@ def full_light(detector: Detector, point: OperationPoint) -> float:
 
 @lru_cache(maxsize=32)
 def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
-    """Lowest radiance temperature that a detector tells at its exposure.
+    """Return the lowest radiance temperature in K that a detector measures at its exposure.
 
-    Parameters
-    ----------
-    detector : Detector
-        The detector.
-    point : OperationPoint
-        How the camera uses it.
-
-    Returns
-    -------
-    float
-        Temperature in K of the blackbody whose mean signal over the dark is `least_signal` times
-        its noise: the standard deviation over time, or that of rounding where it is larger. At
-        least the 200 K from which on a band's tables go.
-
-    Raises
-    ------
-    ValueError
-        If no blackbody that does not saturate it is so bright.
+    That of the blackbody whose mean signal over the dark is `least_signal` times its noise: the
+    standard deviation over time, or that of rounding where it is larger. At least the 200 K from
+    which on a band's tables go.
     """
 
     def excess(logarithm: float) -> float:
@@ -290,7 +222,7 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
 
 
 def _seen(detector: Detector, point: OperationPoint, radiance: float) -> tuple[float, float]:
-    """Mean count of a flat-field source and its standard deviation over time."""
+    """Return the mean count of a flat-field source and its standard deviation over time."""
     counts = _frames(detector, point, _SMALL, radiance, detector.frames, "netd")
     noise = float(np.sqrt(counts.var(axis=0, ddof=1).mean()))
     return float(counts.mean()), max(noise, _QUANTISATION)

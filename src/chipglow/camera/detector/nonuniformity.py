@@ -1,4 +1,4 @@
-"""Pixels that answer differently to the same light: one- and two-point corrections."""
+"""One- and two-point corrections of pixels that answer differently to the same light."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,24 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
+
 
 @dataclass(frozen=True, eq=False)
 class NonUniformity:
-    """What makes every pixel answer like the median pixel: gain × signal + offset.
+    """Makes every pixel answer like the median pixel: gain × signal + offset, each of shape (y, x).
 
-    Parameters
-    ----------
-    gain, offset : ndarray
-        Shape (y, x); NaN where a pixel does not answer to light.
-
-    Raises
-    ------
-    ValueError
-        If shapes differ.
+    NaN where a pixel does not answer to light.
     """
 
-    gain: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    gain: Array
+    offset: Array
 
     def __post_init__(self) -> None:
         if self.gain.ndim != 2 or self.gain.shape != self.offset.shape:
@@ -34,31 +28,15 @@ class NonUniformity:
 
     @classmethod
     def one_point(cls, frames: NDArray[Any]) -> "NonUniformity":
-        """Offsets from frames of a flat-field source.
-
-        Parameters
-        ----------
-        frames : ndarray
-            Signal, shape (time, y, x). Right at the radiance of that object; elsewhere as far as
-            the pixels' gains are equal.
-        """
+        """Find offsets from frames (time, y, x) of a flat-field source, right at its radiance."""
         level = mean_frame(frames)
         return cls(np.ones_like(level), float(np.median(level)) - level)
 
     @classmethod
     def two_point(cls, cold: NDArray[Any], hot: NDArray[Any]) -> "NonUniformity":
-        """Gains and offsets from frames of two flat-field sources.
+        """Find gains and offsets from frames (time, y, x) of two flat-field sources.
 
-        Parameters
-        ----------
-        cold, hot : ndarray
-            Signal of the darker and of the brighter object, shape (time, y, x). Right at both, and
-            at all other radiances as far as the pixels are linear.
-
-        Raises
-        ------
-        ValueError
-            If the frames are of different sizes, or the second object is not brighter.
+        Right at both, and at all other radiances as far as the pixels are linear.
         """
         low, high = mean_frame(cold), mean_frame(hot)
         rise = response(low, high)
@@ -66,14 +44,8 @@ class NonUniformity:
             gain = np.where(rise > 0, np.median(rise) / rise, np.nan)
         return cls(gain, float(np.median(low)) - gain * low)
 
-    def apply(self, signal: NDArray[Any]) -> NDArray[np.float64]:
-        """Corrected signal of frames of shape (time, y, x); NaN where a pixel does not answer.
-
-        Raises
-        ------
-        ValueError
-            If the frames are of another size.
-        """
+    def apply(self, signal: NDArray[Any]) -> Array:
+        """Return the corrected signal of frames (time, y, x); NaN where a pixel does not answer."""
         if signal.shape[1:] != self.gain.shape:
             raise ValueError(
                 f"non-uniformity: is of {size_text(self.gain.shape)} pixels, the frames of "
@@ -82,14 +54,8 @@ class NonUniformity:
         return np.asarray(self.gain * signal + self.offset, np.float64)
 
 
-def mean_frame(frames: NDArray[Any]) -> NDArray[np.float64]:
-    """Mean over time of frames of shape (time, y, x), shape (y, x).
-
-    Raises
-    ------
-    ValueError
-        If there is no frame.
-    """
+def mean_frame(frames: NDArray[Any]) -> Array:
+    """Return the mean over time of frames of shape (time, y, x), shape (y, x)."""
     if frames.ndim != 3 or 0 in frames.shape:
         raise ValueError(
             f"uniform frames: have shape {frames.shape}, expected (time, y, x) with 1 frame or more"
@@ -97,14 +63,8 @@ def mean_frame(frames: NDArray[Any]) -> NDArray[np.float64]:
     return np.asarray(frames.mean(axis=0, dtype=np.float64))
 
 
-def response(cold: NDArray[np.float64], hot: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much more each pixel gives of the brighter of two flat-field sources, shape (y, x).
-
-    Raises
-    ------
-    ValueError
-        If sizes differ or the second is not brighter.
-    """
+def response(cold: Array, hot: Array) -> Array:
+    """Return how much more each pixel gives of the brighter of two flat-field sources, (y, x)."""
     if cold.shape != hot.shape:
         raise ValueError(
             f"uniform frames: are of {size_text(cold.shape)} and {size_text(hot.shape)} pixels, "
@@ -119,5 +79,5 @@ def response(cold: NDArray[np.float64], hot: NDArray[np.float64]) -> NDArray[np.
 
 
 def size_text(shape: tuple[int, ...]) -> str:
-    """Columns and rows, as people say them."""
+    """Return columns and rows as text."""
     return f"{shape[1]} x {shape[0]}"

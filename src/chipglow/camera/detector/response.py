@@ -1,15 +1,15 @@
-"""How many electrons light makes in an element of the detector."""
+"""Electrons that light makes in an element of the detector."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from math import isfinite, pi
+from math import pi
 from typing import Annotated, ClassVar, Final, final
 
 import numpy as np
 from scipy.constants import c, h
 
 from chipglow.quantities import Family, Parameter, Part
-from chipglow.quantities.units import LENGTH, TEMPERATURE, WAVELENGTH
+from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, WAVELENGTH
 from chipglow.radiometry import Band
 
 RESPONSES: Final = Family("detector_response")
@@ -17,36 +17,16 @@ RESPONSES: Final = Family("detector_response")
 
 
 @dataclass(frozen=True)
-class OperationPoint:
-    """How a camera uses its detector (EMVA 1288: the operation point).
-
-    Parameters
-    ----------
-    band : Band
-        Spectral band, with the relative spectral response.
-    integration_time : float
-        In s.
-    frame_rate : float
-        Frames a second.
-    fill_factor : float
-        Fraction of an element's square that takes light.
-
-    Raises
-    ------
-    ValueError
-        If a number is not positive and finite.
-    """
+class OperationPoint(Part):
+    """How a camera uses its detector (EMVA 1288: the operation point)."""
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
-    integration_time: float = 10e-6
-    frame_rate: float = 600.0
-    fill_factor: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name in ("integration_time", "frame_rate", "fill_factor"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value > 0):
-                raise ValueError(f"operation point: {name} is {value!r}, expected over 0")
+    """With the relative spectral response."""
+    integration_time: Annotated[float, Parameter("Exposure.", TIME, over=0.0)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
+    fill_factor: Annotated[
+        float, Parameter("Fraction of an element's square that takes light.", over=0.0)
+    ] = 1.0
 
     @property
     def frame_time(self) -> float:
@@ -55,14 +35,14 @@ class OperationPoint:
 
 
 class DetectorResponse(Part, ABC):
-    """How many electrons light makes. They are proportional to the in-band radiance.
+    """Electrons that light makes, proportional to the in-band radiance.
 
-    What counts at each wavelength is said once, by the band's relative spectral response.
+    The spectral dependence is stated once, by the band's relative spectral response.
     """
 
     @abstractmethod
     def electrons(self, point: OperationPoint, capacity: float) -> float:
-        """Electrons that 1 W/(m² sr) makes in an element in one frame.
+        """Return the electrons that 1 W/(m² sr) makes in an element in one frame.
 
         Parameters
         ----------
@@ -96,8 +76,7 @@ class PhotonResponse(DetectorResponse):
         float, Parameter("Side of an element's square, on the detector.", LENGTH, over=0.0)
     ]
     f_number: Annotated[
-        float,
-        Parameter("Of the cone of light at the detector, as of its cold stop.", least=0.5),
+        float, Parameter("Of the cone of light at the detector, as of its cold stop.", least=0.5)
     ]
     transmittance: Annotated[
         float, Parameter("Fraction of the light that optics and filter pass.", over=0.0, most=1.0)
@@ -112,7 +91,6 @@ class PhotonResponse(DetectorResponse):
     ] = None
 
     def electrons(self, point: OperationPoint, capacity: float) -> float:
-        """Electrons by photons; see `DetectorResponse.electrons`."""
         band = point.band
         wavelength = self.wavelength or (band.lower + band.upper) / 2
         relative = 1.0 if band.response is None else float(band.response(np.array([wavelength]))[0])
@@ -139,7 +117,6 @@ class EnergyResponse(DetectorResponse):
     ]
 
     def electrons(self, point: OperationPoint, capacity: float) -> float:
-        """Electrons as they are given; see `DetectorResponse.electrons`."""
         return self.per_radiance
 
 
@@ -154,5 +131,4 @@ class RangeResponse(DetectorResponse):
     hottest: Annotated[float, Parameter("Upper end of the range.", TEMPERATURE)]
 
     def electrons(self, point: OperationPoint, capacity: float) -> float:
-        """Electrons by the range; see `DetectorResponse.electrons`."""
         return capacity / float(point.band.radiance(self.hottest))

@@ -1,4 +1,4 @@
-"""What happens between light and counts: each effect a small term, chosen by its kind."""
+"""Effects between light and counts: each a small term, chosen by its kind."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.detector.response import OperationPoint
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Array, Family, Parameter, Part
 from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME, Quantity
 
 DETECTOR_TERMS: Final = Family("detector_term")
@@ -28,7 +28,7 @@ _SAME_INTERVAL: Final = 0.01
 
 
 class Stage(IntEnum):
-    """Where between light and counts a term acts; terms of one stage in the order they stand in."""
+    """Place between light and counts where a term acts; terms of one stage act in their order."""
 
     LIGHT = 0
     """On the electrons that light makes."""
@@ -44,55 +44,39 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Readout:
-    """Frames that are read from a detector, as terms see them.
+    """Frames that are read from a detector, as terms see them."""
 
-    Parameters
-    ----------
-    times : ndarray
-        When the integration of each began in s, shape (time,).
-    point : OperationPoint
-        How the camera uses the detector.
-    per_radiance : float
-        Electrons that 1 W/(m² sr) makes in a frame.
-    capacity : float
-        Electrons that fill the detector or its digitiser.
-    generators : sequence of numpy.random.Generator
-        Where the noise of each frame comes from.
-    seed : int
-        Of what is fixed in the detector.
-    """
-
-    times: NDArray[np.float64]
+    times: Array
+    """Start of each integration in s, shape (time,)."""
     point: OperationPoint
+    """How the camera uses the detector."""
     per_radiance: float
+    """Electrons that 1 W/(m² sr) makes in a frame."""
     capacity: float
+    """Electrons that fill the detector or its digitiser."""
     generators: Sequence[np.random.Generator]
+    """Source of each frame's noise."""
     seed: int
+    """Of what is fixed in the detector."""
 
-    def normal(self, rows: int, columns: int) -> NDArray[np.float64]:
-        """Standard normal deviates of all frames, shape (time, rows, columns)."""
+    def normal(self, rows: int, columns: int) -> Array:
+        """Return standard normal deviates of all frames, shape (time, rows, columns)."""
         return np.stack([one.standard_normal((rows, columns)) for one in self.generators])
 
 
 def fixed_generator(seed: int, kind: str) -> np.random.Generator:
-    """Where a pattern comes from: the same for the same detector and the kind of the term."""
+    """Return the generator of a pattern: the same for one detector and kind of term."""
     return np.random.default_rng([seed, crc32(kind.encode())])
 
 
 class DetectorTerm(Part, ABC):
-    """An effect of the detector.
-
-    Attributes
-    ----------
-    stage : Stage
-        Where it acts.
-    """
+    """An effect of the detector, at its `stage`."""
 
     stage: ClassVar[Stage]
 
     @abstractmethod
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """What it makes of the electrons.
+    def apply(self, electrons: Array, readout: Readout) -> Array:
+        """Return the electrons with the effect.
 
         Parameters
         ----------
@@ -125,8 +109,7 @@ class GainPattern(DetectorTerm):
         float, Parameter("Of the elements' gains, as a fraction of their mean.", least=0.0)
     ]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Electrons times each element's own gain; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         deviates = fixed_generator(readout.seed, self.kind).standard_normal(electrons.shape[1:])
         return np.asarray(electrons * (1 + self.standard_deviation * deviates))
 
@@ -143,11 +126,10 @@ class DeadElements(DetectorTerm):
     fraction: Annotated[float, Parameter("Of all elements.", least=0.0, under=1.0)]
 
     def mask(self, shape: tuple[int, ...], seed: int) -> NDArray[np.bool_]:
-        """Which elements they are, of a detector with this seed and shape (y, x)."""
+        """Return the dead elements of a detector with this seed and shape (y, x)."""
         return np.asarray(fixed_generator(seed, self.kind).random(shape) < self.fraction)
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """No electrons where an element is dead; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         return np.where(self.mask(electrons.shape[1:], readout.seed), 0.0, electrons)
 
 
@@ -168,16 +150,15 @@ class Lag(DetectorTerm):
     stage: ClassVar[Stage] = Stage.LIGHT
     fraction: Annotated[float, Parameter("Of the frame before.", least=0.0, under=1.0)]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Electrons with those of the frames before; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         result = electrons.copy()
         for i in np.flatnonzero(follows(readout.times, readout.point.frame_time)):
             result[i] += self.fraction * (result[i - 1] - electrons[i])
         return result
 
 
-def follows(times: NDArray[np.float64], frame_time: float) -> NDArray[np.bool_]:
-    """Which frames come one time between frames after the one before them, shape (time,)."""
+def follows(times: Array, frame_time: float) -> NDArray[np.bool_]:
+    """Return which frames come one frame time after the one before them, shape (time,)."""
     off = np.abs(np.diff(times, prepend=np.nan) - frame_time)
     return np.asarray(off <= _SAME_INTERVAL * frame_time)
 
@@ -195,8 +176,7 @@ class DarkCurrent(DetectorTerm):
         float, Parameter("Electrons a second and element.", ELECTRON_RATE, least=0.0)
     ]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Electrons and those of the dark; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         return electrons + self.current * readout.point.integration_time
 
 
@@ -213,8 +193,7 @@ class ShotNoise(DetectorTerm):
     example: ClassVar[str] = "{kind: shot-noise}"
     stage: ClassVar[Stage] = Stage.CHARGE
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Electrons with their noise; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         noise = readout.normal(*electrons.shape[1:])
         return np.asarray(electrons + np.sqrt(np.maximum(electrons, 0.0)) * noise)
 
@@ -238,8 +217,7 @@ class NonLinearity(DetectorTerm):
         ),
     ]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Signal in electrons; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         filled = np.minimum(electrons / readout.capacity, 1.0)
         return np.asarray(electrons * (1 - self.fraction * filled))
 
@@ -257,8 +235,7 @@ class OffsetPattern(DetectorTerm):
         float, Parameter("Of the elements' offsets, in electrons.", least=0.0)
     ]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Signal and each element's own offset; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         deviates = fixed_generator(readout.seed, self.kind).standard_normal(electrons.shape[1:])
         return np.asarray(electrons + self.standard_deviation * deviates)
 
@@ -274,8 +251,7 @@ class ReadNoise(DetectorTerm):
     stage: ClassVar[Stage] = Stage.READOUT
     standard_deviation: Annotated[float, Parameter("In electrons.", least=0.0)]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Signal and noise; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         return electrons + self.standard_deviation * readout.normal(*electrons.shape[1:])
 
 
@@ -290,8 +266,7 @@ class ColumnNoise(DetectorTerm):
     stage: ClassVar[Stage] = Stage.READOUT
     standard_deviation: Annotated[float, Parameter("In electrons.", least=0.0)]
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Signal and noise; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         return electrons + self.standard_deviation * readout.normal(1, electrons.shape[2])
 
 
@@ -320,8 +295,7 @@ class FlickerNoise(DetectorTerm):
         float, Parameter("Time since pixels were corrected.", TIME, over=0.0)
     ] = 100.0
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Signal and noise; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         constants = self.time_constants(readout.point.frame_time)
         intervals = np.abs(np.diff(readout.times, prepend=-np.inf))
         state = np.zeros((constants.size, *electrons.shape[1:]))
@@ -333,8 +307,8 @@ class FlickerNoise(DetectorTerm):
             result[i] = state.sum(axis=0)
         return np.asarray(electrons + self.standard_deviation / np.sqrt(_PER_DECADE) * result)
 
-    def time_constants(self, frame_time: float) -> NDArray[np.float64]:
-        """Time constants of the processes in s."""
+    def time_constants(self, frame_time: float) -> Array:
+        """Return the time constants of the processes in s."""
         decades = max(log10(self.since_correction / (2 * frame_time)), 0.0)
         count = ceil(_PER_DECADE * decades) + 1
         return self.since_correction / (2 * pi) * 10 ** (-np.arange(count) / _PER_DECADE)
@@ -360,8 +334,7 @@ class EquivalentNoise(DetectorTerm):
         float, Parameter("Of the blackbody.", TEMPERATURE, least=200.0, most=6000.0)
     ] = 303.15
 
-    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
-        """Signal and noise; see `DetectorTerm.apply`."""
+    def apply(self, electrons: Array, readout: Readout) -> Array:
         radiance = self.netd * float(readout.point.band.slope(self.temperature))
         noise = readout.per_radiance * radiance * readout.normal(*electrons.shape[1:])
         return np.asarray(electrons + noise)

@@ -1,4 +1,4 @@
-"""What spreads light besides the optics: charge that diffuses, and a camera that moves."""
+"""Blurs besides the optics: charge that diffuses, and a camera that moves."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -7,21 +7,19 @@ from math import ceil, cos, pi, sin
 from typing import Annotated, ClassVar, Final, final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import j0
 
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
-    half_maximum_width,
     half_size,
+    kernel_fwhm,
     normalised,
-    peak,
     resized,
 )
 from chipglow.camera.optics.psf import PointSpreadFunction
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Array, Family, Parameter, Part
 from chipglow.quantities.units import ANGLE, LENGTH
 from chipglow.radiometry import Band
 
@@ -41,31 +39,21 @@ class BlurTerm(Part, ABC):
     """An effect that moves the light of a point about, the same wherever it is.
 
     Lengths are on the scene, as those of a point spread function.
-
-    Attributes
-    ----------
-    reach : float
-        How far it carries light in m.
     """
 
     @property
     @abstractmethod
     def reach(self) -> float:
-        """How far it carries light in m."""
+        """Distance in m over which it carries light."""
 
     @abstractmethod
-    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transfer function.
+    def transfer(self, across: Array, up: Array) -> Array:
+        """Return the transfer function, 1 at zero frequency.
 
         Parameters
         ----------
         across, up : ndarray
             Spatial frequencies to the right and upwards in 1/m, broadcast against each other.
-
-        Returns
-        -------
-        ndarray
-            1 at no frequency.
         """
 
 
@@ -88,8 +76,7 @@ class _RandomBlur(BlurTerm):
         """Eight standard deviations: beyond them there is 1e-15 of the light."""
         return 8 * self.standard_deviation
 
-    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-        """exp(−2π² σ² f²)."""
+    def transfer(self, across: Array, up: Array) -> Array:
         return np.asarray(np.exp(-2 * (pi * self.standard_deviation) ** 2 * (across**2 + up**2)))
 
 
@@ -101,7 +88,6 @@ class ChargeDiffusion(_RandomBlur):
 
     kind: ClassVar[str] = "charge-diffusion"
     example: ClassVar[str] = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
-    standard_deviation: Deviation
 
 
 @final
@@ -112,24 +98,12 @@ class Jitter(_RandomBlur):
 
     kind: ClassVar[str] = "jitter"
     example: ClassVar[str] = "{kind: jitter, standard_deviation: 1 um}"
-    standard_deviation: Deviation
-
-
-@dataclass(frozen=True)
-class _DirectedBlur(BlurTerm):
-    """Displacements along one line."""
-
-    def _along(
-        self, across: NDArray[np.float64], up: NDArray[np.float64], direction: float
-    ) -> NDArray[np.float64]:
-        """Frequency along a direction in 1/m."""
-        return across * cos(direction) + up * sin(direction)
 
 
 @final
 @BLURS.part
 @dataclass(frozen=True)
-class LinearMotion(_DirectedBlur):
+class LinearMotion(BlurTerm):
     """Camera and scene that move against each other, evenly, while the camera integrates."""
 
     kind: ClassVar[str] = "linear-motion"
@@ -141,18 +115,16 @@ class LinearMotion(_DirectedBlur):
 
     @property
     def reach(self) -> float:
-        """Half the way."""
         return self.distance / 2
 
-    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-        """sin(π d f) / (π d f), f along the direction."""
-        return np.asarray(np.sinc(self.distance * self._along(across, up, self.direction)))
+    def transfer(self, across: Array, up: Array) -> Array:
+        return np.asarray(np.sinc(self.distance * _along(self.direction, across, up)))
 
 
 @final
 @BLURS.part
 @dataclass(frozen=True)
-class Vibration(_DirectedBlur):
+class Vibration(BlurTerm):
     """Sinusoidal vibration along a line with many periods in an integration time."""
 
     kind: ClassVar[str] = "vibration"
@@ -164,13 +136,16 @@ class Vibration(_DirectedBlur):
 
     @property
     def reach(self) -> float:
-        """The amplitude."""
         return self.amplitude
 
-    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-        """J0(2π A f), f along the direction."""
-        along = self._along(across, up, self.direction)
+    def transfer(self, across: Array, up: Array) -> Array:
+        along = _along(self.direction, across, up)
         return np.asarray(j0(2 * pi * self.amplitude * along))
+
+
+def _along(direction: float, across: Array, up: Array) -> Array:
+    """Return the frequency along a direction in 1/m."""
+    return across * cos(direction) + up * sin(direction)
 
 
 @final
@@ -221,7 +196,7 @@ class BlurredPSF(PointSpreadFunction):
 
     @property
     def includes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """What is in it besides the optics."""
+        """Kinds of effects in it besides the optics."""
         return (*self.psf.includes, *(one.kind for one in self.blurs))
 
     @cached_property
@@ -231,23 +206,18 @@ class BlurredPSF(PointSpreadFunction):
         half = ceil((self.psf.fwhm + self._reach) / spacing)
         kernel = self.view_kernel(spacing, half, half)
         kernel = kernel[1:-1, 1:-1]  # the outermost squares hold what goes farther
-        row, column = peak(kernel)
-        widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
-        return float(np.mean(widths)) * spacing
+        return kernel_fwhm(kernel, spacing)
 
     def in_band(self, band: Band) -> "BlurredPSF":
-        """The optics' own in that band, with the same blurs; see `PointSpreadFunction.in_band`."""
         return replace(self, psf=self.psf.in_band(band))
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Blur the kernel; see `PointSpreadFunction.kernel`."""
+    def kernel(self, spacing: float) -> Array:
         check_length("spacing", spacing)
         kernel, change = self.psf.kernel(spacing), self._change(spacing)
         half = max(kernel.shape[0], change.shape[0]) // 2
         return np.maximum(resized(kernel, half, half) + resized(change, half, half), 0.0)
 
-    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
-        """Blur all the light of the view; see `PointSpreadFunction.view_kernel`."""
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
         check_length("spacing", spacing)
         kernel, change = self.psf.view_kernel(spacing, rows, columns), self._change(spacing)
         change = folded(change, rows, columns)
@@ -255,8 +225,8 @@ class BlurredPSF(PointSpreadFunction):
         sum_of_both = resized(kernel, rows, columns) + resized(change, rows, columns)
         return normalised(np.maximum(sum_of_both, 0.0))
 
-    def _change(self, spacing: float) -> NDArray[np.float64]:
-        """What the blurs change in the fractions on squares, of sum 0."""
+    def _change(self, spacing: float) -> Array:
+        """Return what the blurs change in the fractions on squares, of sum 0."""
         half = half_size(_NEAR * self.psf.fwhm + self._reach, spacing)
         parts = 1 + 2 * ceil(max(_SQUARES_PER_WIDTH * spacing / self.psf.fwhm - 1, 0) / 2)
         fine = spacing / parts
@@ -271,8 +241,8 @@ class BlurredPSF(PointSpreadFunction):
         count = 2 * half + 1
         return np.asarray(blurred.reshape(count, parts, count, parts).sum(axis=(1, 3)))
 
-    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Transfer function of the blurs without the point spread function's; see `BlurTerm`."""
+    def transfer(self, across: Array, up: Array) -> Array:
+        """Return the transfer function of the blurs alone; see `BlurTerm`."""
         return reduce(np.multiply, (one.transfer(across, up) for one in self.blurs))
 
     @property

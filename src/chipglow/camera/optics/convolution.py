@@ -1,7 +1,7 @@
 """Convolution with a point spread function."""
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,10 +11,14 @@ from scipy import fft, sparse
 from chipglow.camera.optics.kernel import resized
 from chipglow.camera.optics.psf import PointSpreadFunction
 from chipglow.camera.optics.sampling import line_weights
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 from chipglow.surface.blocks import in_blocks
 
-_Kernel: TypeAlias = tuple[NDArray[np.float64], tuple[NDArray[np.float64], ...]]
+Beyond: TypeAlias = Literal["edge", "nothing"]
+"""What is taken to be beyond the edges of a field."""
+
+_Kernel: TypeAlias = tuple[Array, tuple[Array, ...]]
 """A kernel, and its sums over all that is beyond the left, right, upper and lower edge."""
 
 _ROUNDING: Final = 1e-13
@@ -24,166 +28,42 @@ _FARTHEST: Final = 2048
 
 
 def blur(
-    radiance: NDArray[np.float64], psf: PointSpreadFunction, spacing: float
-) -> NDArray[np.float64]:
-    """Image of a field of radiance behind a point spread function.
+    radiance: Array, psf: PointSpreadFunction, spacing: float, beyond: Beyond = "edge"
+) -> Array:
+    """Return the image of a field of radiance (y, x) behind a point spread function.
 
-    Parameters
-    ----------
-    radiance : ndarray
-        Radiance in W/(m² sr), shape (y, x).
-    psf : PointSpreadFunction
-        How a point is spread.
-    spacing : float
-        Distance between the values in m.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape (y, x).
-
-    Notes
-    -----
-    Beyond its edges the field goes on with the value at the nearest edge, however far; nothing
-    wraps around, and no tail of the point spread function is left out. What truly is there is not
-    known: `light_from_beyond` says how much of the light it decides, and `blur_of_like` gives the
-    image under another assumption.
+    Beyond its edges the field goes on with the value at the nearest edge, however far, or there is
+    nothing. Nothing wraps around, and no tail of the point spread function is left out.
     """
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    return _without_rounding(within + _edges(psf, spacing, radiance.shape).light(radiance))
-
-
-def blur_of_like(
-    radiance: NDArray[np.float64], psf: PointSpreadFunction, spacing: float
-) -> NDArray[np.float64]:
-    """The same where beyond the field there is, for each value, the like of what it sees within.
-
-    Parameters
-    ----------
-    radiance, psf, spacing
-        As `blur`.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape (y, x): the light from within the field, over its fraction.
-    """
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    return _without_rounding(within / (1 - light_from_beyond(psf, spacing, radiance.shape)))
-
-
-def both_borders(
-    radiance: NDArray[np.float64], psf: PointSpreadFunction, spacing: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Images by `blur` and by `blur_of_like`: the light from within the field is computed once.
-
-    Parameters
-    ----------
-    radiance, psf, spacing
-        As `blur`.
-
-    Returns
-    -------
-    tuple of ndarray
-        Radiance in W/(m² sr), each of shape (y, x).
-    """
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    like = within / (1 - light_from_beyond(psf, spacing, radiance.shape))
-    within += _edges(psf, spacing, radiance.shape).light(radiance)
-    return _without_rounding(within), _without_rounding(like)
+    image = _transfer(psf, spacing, radiance.shape).within(radiance)
+    if beyond == "edge":
+        image += _edges(psf, spacing, radiance.shape).light(radiance)
+    return _without_rounding(image)
 
 
 def image_on_pixels(
-    radiance: NDArray[np.float64],
+    radiance: Array,
     psf: PointSpreadFunction,
     scene: Raster,
     sensors: Raster,
     fill_factor: float,
-) -> NDArray[np.float64]:
-    """What pixels integrate of the image by `blur`, which is formed nowhere but on them.
-
-    Parameters
-    ----------
-    radiance : ndarray
-        Radiance of the scene's samples in W/(m² sr), shape `scene.shape`.
-    psf : PointSpreadFunction
-        How a point is spread.
-    scene, sensors : Raster
-        Where the samples and the pixels are.
-    fill_factor : float
-        Fraction of a pixel's square that is sensitive: a square in its middle.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape `sensors.shape`.
-    """
+    beyond: Beyond = "edge",
+) -> Array:
+    """Return what pixels integrate of the image by `blur`, formed on the pixels alone."""
     seen = _seen(psf, scene, sensors, fill_factor)
-    return _without_rounding(seen.within(radiance) + seen.from_edges(radiance))
-
-
-def both_images_on_pixels(
-    radiance: NDArray[np.float64],
-    psf: PointSpreadFunction,
-    scene: Raster,
-    sensors: Raster,
-    fill_factor: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same, and the image if beyond the scene there is for each pixel the like of within.
-
-    Parameters
-    ----------
-    radiance, psf, scene, sensors, fill_factor
-        As `image_on_pixels`.
-
-    Returns
-    -------
-    tuple of ndarray
-        Radiance in W/(m² sr), each of shape `sensors.shape`.
-    """
-    seen = _seen(psf, scene, sensors, fill_factor)
-    within = seen.within(radiance)
-    image = _without_rounding(within + seen.from_edges(radiance))
-    return image, _without_rounding(within / seen.own_light)
-
-
-@lru_cache(maxsize=2)
-def light_from_beyond(
-    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]
-) -> NDArray[np.float64]:
-    """Fraction of the light of each value that comes from beyond the field.
-
-    Parameters
-    ----------
-    psf : PointSpreadFunction
-        How a point is spread.
-    spacing : float
-        Distance between the values in m.
-    shape : tuple of int
-        Rows and columns of the field.
-
-    Returns
-    -------
-    ndarray
-        From 0 to under 1, of this shape, read-only.
-    """
-    fraction = 1 - _transfer(psf, spacing, shape).within(np.ones(shape))
-    fraction = np.where(fraction > _ROUNDING, fraction, 0.0)
-    fraction.flags.writeable = False
-    return fraction
+    image = seen.within(radiance)
+    if beyond == "edge":
+        image += seen.from_edges(radiance)
+    return _without_rounding(image)
 
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
     """What the values of one edge of a field, which go on beyond it, send into the field.
 
-    Parameters
-    ----------
-    spectrum : ndarray
-        Transform along the edge of the kernel's sums over all that is beyond, shape (n, frequency),
-        for the n lines of the field beside the edge that its light reaches, or n means of them.
-    length, reach : int
-        Of what is transformed, and of the kernel to either side.
+    `spectrum` (n, frequency) is the transform along the edge of the kernel's sums over all that is
+    beyond, for the n lines of the field beside the edge that its light reaches, or n means of them;
+    `length` is that of what is transformed, and `reach` that of the kernel to either side.
     """
 
     spectrum: NDArray[np.complex128]
@@ -191,31 +71,29 @@ class _Strip:
     reach: int
 
     @classmethod
-    def of(cls, lines: NDArray[np.float64], count: int) -> "_Strip":
-        """That of an edge of so many values, from the kernel's sums (n, place along the edge)."""
+    def of(cls, lines: Array, count: int) -> "_Strip":
+        """Make that of an edge of so many values, from the kernel's sums (n, along the edge)."""
         reach = lines.shape[1] // 2
         length = fft.next_fast_len(count + 2 * reach, real=True)
         return cls(fft.rfft(lines, n=length), length, reach)
 
-    def light(
-        self, edge: NDArray[np.float64], beyond: Literal["edge", "constant"]
-    ) -> NDArray[np.float64]:
-        """Light of an edge that goes on at its ends, or does not, shape (n, edge.size)."""
+    def light(self, edge: Array, beyond: Literal["edge", "constant"]) -> Array:
+        """Return the light of an edge that goes on at its ends, or not, shape (n, edge.size)."""
         line = fft.rfft(np.pad(edge, self.reach, mode=beyond), n=self.length)
         sent = fft.irfft(line * self.spectrum, n=self.length, overwrite_x=True)
         return np.asarray(sent[:, 2 * self.reach :][:, : edge.size])
 
 
 class _Edges(NamedTuple):
-    """What comes from beyond each edge of a field."""
+    """Light from beyond each edge of a field."""
 
     left: _Strip
     right: _Strip
     top: _Strip
     bottom: _Strip
 
-    def light(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light from beyond a field that goes on with the value at the nearest edge."""
+    def light(self, field: Array) -> Array:
+        """Return the light from beyond a field that goes on with the value at the nearest edge."""
         light = np.zeros(field.shape)
         left, right, top, bottom = self.strips(field)
         for towards, sent in (
@@ -227,8 +105,8 @@ class _Edges(NamedTuple):
             towards[: len(sent)] += sent
         return light
 
-    def strips(self, field: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """The light by the edges that it comes over, each (lines away from the edge, along it)."""
+    def strips(self, field: Array) -> tuple[Array, ...]:
+        """Return the light by the edge it comes over, (lines away from the edge, along it)."""
         # Above and below the field the left and the right edge go on as its corners.
         return (
             self.left.light(field[:, 0], "edge"),
@@ -240,24 +118,13 @@ class _Edges(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Transfer:
-    """Transform of a kernel for fields of one shape.
-
-    Parameters
-    ----------
-    spectrum : ndarray
-        The transform.
-    shape : tuple of int
-        Shape of what is transformed: so much larger than the field that what wraps around falls
-        beside it.
-    """
+    """Transform of a kernel, `shape` so large that what wraps around falls beside the field."""
 
     spectrum: NDArray[np.complex128]
     shape: tuple[int, int]
 
-    def within(
-        self, field: NDArray[np.float64], down: sparse.csr_array | None = None
-    ) -> NDArray[np.float64]:
-        """The convolution of a field with nothing beyond it, or weighted sums `down` its rows."""
+    def within(self, field: Array, down: sparse.csr_array | None = None) -> Array:
+        """Return the convolution of a field with nothing beyond, or weighted sums of its rows."""
         rows, columns = field.shape
         # Rows beyond the field hold nothing: they are transformed in one direction only.
         lines = fft.rfft(field, n=self.shape[1], axis=1)
@@ -276,17 +143,10 @@ class _Transfer:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What pixels see of a scene behind a point spread function.
+    """What pixels see of a scene: weights `down` and `across` of the samples in the pixels.
 
-    Parameters
-    ----------
-    transfer : _Transfer
-        Of the samples.
-    down, across : csr_array
-        Weights of the samples in the pixels.
-    edges : _Edges
-        Light from beyond: over the left and the right edge on columns of pixels and rows of
-        samples, over the others on rows of pixels and columns of samples.
+    `edges` is light from beyond: over the left and the right edge on columns of pixels and rows of
+    samples, over the others on rows of pixels and columns of samples.
     """
 
     transfer: _Transfer
@@ -294,21 +154,15 @@ class _Seen:
     across: sparse.csr_array
     edges: _Edges
 
-    def within(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light from within the scene."""
+    def within(self, radiance: Array) -> Array:
+        """Return the light from within the scene."""
         return np.asarray((self.across @ self.transfer.within(radiance, self.down).T).T)
 
-    def from_edges(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light from beyond the scene, which goes on as at its edges."""
+    def from_edges(self, radiance: Array) -> Array:
+        """Return the light from beyond the scene, which goes on as at its edges."""
         left, right, top, bottom = self.edges.strips(radiance)
         beside, over = self.down @ (left + right).T, self.across @ (top + bottom).T
         return np.asarray(beside + over.T)
-
-    @cached_property
-    def own_light(self) -> NDArray[np.float64]:
-        """Fraction of the light of each pixel that comes from within the scene."""
-        fraction = self.within(np.ones((self.down.shape[1], self.across.shape[1])))
-        return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
 
 
 @lru_cache(maxsize=2)
@@ -324,8 +178,8 @@ def _kernel(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) ->
     return kernel, beyond
 
 
-def _sums_beyond(kernel: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Sums of a kernel over all that is beyond the left edge, for so many lines beside it."""
+def _sums_beyond(kernel: Array, count: int) -> Array:
+    """Return sums of a kernel over all beyond the left edge, for so many lines beside it."""
     return kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1][:, :count].T
 
 
@@ -347,7 +201,7 @@ def _transfer(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) 
 
 @lru_cache(maxsize=2)
 def _edges(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Edges:
-    """Light from beyond on the values of a field."""
+    """Return the light from beyond on the values of a field."""
     (left, right, top, bottom), (rows, columns) = _kernel(psf, spacing, shape)[1], shape
     return _Edges(
         _Strip.of(left, rows),
@@ -371,6 +225,6 @@ def _seen(psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor:
     return _Seen(_transfer(psf, scene.spacing, shape), down, across, edges)
 
 
-def _without_rounding(image: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The transform leaves some 1e-16 of the largest value where there is no light."""
+def _without_rounding(image: Array) -> Array:
+    """Return an image without the 1e-16 that a transform leaves where there is no light."""
     return np.where(image > _ROUNDING * image.max(), image, 0.0)

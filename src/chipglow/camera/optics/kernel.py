@@ -1,11 +1,12 @@
-"""Kernels on squares: their sum, their reach, what is beyond a view, and how wide they are."""
+"""Kernels on squares."""
 
 from math import ceil, pi
 from numbers import Real
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chipglow.quantities import Array
 
 LARGEST_KERNEL: Final = 4097
 """Squares along a side that a kernel has at most."""
@@ -14,13 +15,13 @@ _EQUAL: Final = 1e-9
 _INFINITE: Final = 1e9
 
 
-def normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A kernel of sum 1."""
+def normalised(kernel: Array) -> Array:
+    """Return a kernel of sum 1."""
     return np.asarray(kernel / kernel.sum())
 
 
-def folded(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
-    """A kernel no larger than this on each side; its outermost squares hold what was beyond."""
+def folded(kernel: Array, rows: int, columns: int) -> Array:
+    """Return a kernel cut to this size; its outermost squares hold what was beyond."""
     for axis, reach in enumerate((rows, columns)):
         line = np.moveaxis(kernel, axis, 0)
         beyond = line.shape[0] // 2 - reach
@@ -32,8 +33,8 @@ def folded(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.f
     return kernel
 
 
-def resized(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
-    """The middle of a kernel, so large on each side, or the kernel with nothing about it."""
+def resized(kernel: Array, rows: int, columns: int) -> Array:
+    """Return a kernel cut or padded with zeros to so many squares on each side of the middle."""
     for axis, reach in enumerate((rows, columns)):
         more = reach - kernel.shape[axis] // 2
         line = np.moveaxis(kernel, axis, 0)
@@ -43,7 +44,7 @@ def resized(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.
 
 
 def half_size(reach: float, spacing: float) -> int:
-    """Number of squares on each side of the middle one that hold what is within `reach`."""
+    """Return the number of squares on each side of the middle one that hold all within `reach`."""
     check_length("spacing", spacing)
     # A kernel that ends on a square's edge but for rounding needs no square more.
     half = max(0, ceil(reach / spacing - 0.5 - 1e-9))
@@ -57,8 +58,8 @@ def half_size(reach: float, spacing: float) -> int:
 
 def poisson_squares(
     spacing: float, rows: int, columns: int, tail: float, width: float, beyond: bool
-) -> NDArray[np.float64]:
-    """Fractions on squares of light with the transfer function (1 + 2π (b − a) f) exp(−2π b f).
+) -> Array:
+    """Return the fractions on squares of light of transfer (1 + 2π (b − a) f) exp(−2π b f).
 
     Far away it falls as a / (2π r³); a is `tail` and b `width`. That of exp(−2π b f) alone within
     0 to x and 0 to y is atan(x y / (b R)) / 2π with R² = x² + y² + b², and f times it is its
@@ -75,8 +76,8 @@ def poisson_squares(
     return np.asarray(np.diff(np.diff(corner, axis=0), axis=1) / (2 * pi))
 
 
-def peak(weights: NDArray[np.float64]) -> tuple[int, int]:
-    """Row and column of the greatest value; of equal ones, of that nearest to their middle."""
+def peak(weights: Array) -> tuple[int, int]:
+    """Return row and column of the greatest value; of equal ones, of that nearest their middle."""
     # What differs by rounding alone is equal: the top of a disc is flat.
     places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
     from_middle = np.hypot(*(places - places.mean(axis=0)).T)
@@ -84,8 +85,15 @@ def peak(weights: NDArray[np.float64]) -> tuple[int, int]:
     return row, column
 
 
-def half_maximum_width(line: NDArray[np.float64]) -> float:
-    """Full width at half maximum of a line of samples, in samples."""
+def kernel_fwhm(kernel: Array, spacing: float) -> float:
+    """Return the mean full width at half maximum of row and column through the peak, in m."""
+    row, column = peak(kernel)
+    widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
+    return float(np.mean(widths)) * spacing
+
+
+def half_maximum_width(line: Array) -> float:
+    """Return the full width at half maximum of a line of samples, in samples."""
     padded = np.pad(line, 1)
     level = padded.max() / 2
     above = np.flatnonzero(padded >= level)
@@ -96,12 +104,6 @@ def half_maximum_width(line: NDArray[np.float64]) -> float:
 
 
 def check_length(name: str, value: float) -> None:
-    """Refuse what is no length of a kernel.
-
-    Raises
-    ------
-    ValueError
-        If it is not over 0 to 0.1 m.
-    """
+    """Raise a ValueError unless a length is over 0 to 0.1 m."""
     if not (isinstance(value, Real) and 0.0 < value <= 0.1):
         raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 0.1 m; 8 um is 8e-6")

@@ -5,25 +5,24 @@ from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final, final
 
 import numpy as np
 import scipy
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
-    half_maximum_width,
     half_size,
+    kernel_fwhm,
     normalised,
-    peak,
 )
 from chipglow.camera.optics.round import light_on_squares
 from chipglow.camera.optics.sampling import overlap_lengths
-from chipglow.quantities import Family, FileBeside, Parameter, Part
+from chipglow.quantities import Array, Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
 from chipglow.radiometry import Band
 from chipglow.text import check_own_data
@@ -54,11 +53,11 @@ PSFS: Final = Family("psf")
 
 
 class PSFChoice(Part, ABC):
-    """What a description of a camera says of its point spread function."""
+    """A description's choice of a camera's point spread function."""
 
     @abstractmethod
     def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
-        """The point spread function on the scene.
+        """Return the point spread function on the scene; a ValueError if it is not possible.
 
         Parameters
         ----------
@@ -66,11 +65,6 @@ class PSFChoice(Part, ABC):
             The camera's band.
         magnification : float or None
             Of its lens, if it is known.
-
-        Raises
-        ------
-        ValueError
-            If it is not possible.
         """
 
 
@@ -94,17 +88,11 @@ class PointSpreadFunction(PSFChoice):
         return self
 
     def in_band(self, band: Band) -> "PointSpreadFunction":
-        """That of the same optics in another band; itself where it is not by diffraction.
-
-        Parameters
-        ----------
-        band : Band
-            The other band.
-        """
+        """Return that of the same optics in another band; itself where it is not by diffraction."""
         return self
 
     @abstractmethod
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
+    def kernel(self, spacing: float) -> Array:
         """Fractions of a point's light on a grid of squares.
 
         Parameters
@@ -124,7 +112,7 @@ class PointSpreadFunction(PSFChoice):
             If the spacing is not positive, or so fine that the kernel would be too large.
         """
 
-    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
         """Fractions of a point's light in a view, of which none is left out.
 
         Parameters
@@ -192,23 +180,21 @@ class AnnularAperturePSF(PointSpreadFunction):
         object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
 
     def in_band(self, band: Band) -> "AnnularAperturePSF":
-        """Diffraction at the band's middle wavelength; see `PointSpreadFunction.in_band`."""
+        """Return the diffraction at the band's middle wavelength."""
         return replace(self, wavelength=(band.lower + band.upper) / 2)
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+    def kernel(self, spacing: float) -> Array:
         half = half_size(self._reach * self._unit, spacing)
         return self._fractions(spacing, half, half)
 
-    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
-        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
         check_length("spacing", spacing)
         far = ceil(_FAR * self._unit / spacing)
         kernel = self._fractions(spacing, max(rows, far), max(columns, far))
         return folded(_with_the_rest(kernel, spacing), rows, columns)
 
-    def _fractions(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
-        """Fractions of the light on squares, so many up and down and to either side."""
+    def _fractions(self, spacing: float, rows: int, columns: int) -> Array:
+        """Return fractions of the light on squares, so many up and down and to either side."""
         # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
         count = 2 + ceil(3 * spacing / (pi * self._unit))
         side = spacing / self._unit
@@ -234,11 +220,11 @@ class AnnularAperturePSF(PointSpreadFunction):
         )
         return float(v[np.searchsorted(inside, ANNULAR_ENERGY)])
 
-    def _profile(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Irradiance over that in the middle."""
+    def _profile(self, v: Array) -> Array:
+        """Return the irradiance over that in the middle."""
         return self._amplitude(v) ** 2
 
-    def _amplitude(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _amplitude(self, v: Array) -> Array:
         inner = self.obscuration**2
         return np.asarray((_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner))
 
@@ -256,8 +242,7 @@ class GaussianPSF(PointSpreadFunction):
     def __str__(self) -> str:
         return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+    def kernel(self, spacing: float) -> Array:
         deviation = self.fwhm / FWHM_PER_SIGMA
         reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
         half = half_size(reach, spacing)
@@ -304,7 +289,7 @@ class MeasuredPSF(PointSpreadFunction):
     The weights are scaled to a sum of 1: what the measurement did not reach is not there.
     """
 
-    weights: NDArray[np.float64] = field(repr=False)
+    weights: Array = field(repr=False)
     spacing: float
     components: tuple[Component, ...] = field(default=(), repr=False)
     includes: tuple[str, ...] = ()
@@ -320,10 +305,7 @@ class MeasuredPSF(PointSpreadFunction):
         estimate = given / given.sum()
         object.__setattr__(self, "weights", estimate.values)
         object.__setattr__(self, "components", estimate.components)
-        row, column = peak(estimate.values)
-        lines = estimate.values[row], estimate.values[:, column]
-        widths = [half_maximum_width(line) for line in lines]
-        object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
+        object.__setattr__(self, "fwhm", kernel_fwhm(estimate.values, self.spacing))
 
     @property
     def estimate(self) -> Estimate:
@@ -332,34 +314,30 @@ class MeasuredPSF(PointSpreadFunction):
 
     @classmethod
     def from_file(
-        cls,
-        path: str | Path,
-        spacing: float | None = None,
-        includes: tuple[str, ...] | None = None,
+        cls, path: str | Path, spacing: float | None = None, includes: tuple[str, ...] | None = None
     ) -> "MeasuredPSF":
         """Read a kernel.
 
         Parameters
         ----------
         path : str or Path
-            A NumPy array (``.npy``), a table of numbers, separated by commas (``.csv``), or what
-            ``chipglow psf`` writes (``.nc``).
+            A NumPy array (``.npy``), a table of numbers, separated by commas (``.csv``), or a file
+            of ``chipglow psf`` (``.nc``).
         spacing : float, optional
             Side of the kernel's squares in m, on the scene; None for a ``.nc``, which states it.
         includes : tuple of str, optional
-            What it holds besides the optics; by default what a ``.nc`` says, and nothing.
+            Effects in it besides the optics; by default those that a ``.nc`` states, or none.
 
         Raises
         ------
         ValueError
             If the file is of another kind, or does not hold a kernel; the message names it.
         OSError
-            If it can't be read.
+            If it cannot be read.
         """
         path = Path(path)
-        readers = {".npy": _read_npy, ".csv": _read_csv}
         kind = path.suffix.lower()
-        if kind not in (*readers, ".nc"):
+        if kind not in (".npy", ".csv", ".nc"):
             raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy, .csv or .nc")
         if (spacing is None) != (kind == ".nc"):
             raise ValueError(
@@ -371,12 +349,11 @@ class MeasuredPSF(PointSpreadFunction):
                 estimate, spacing, stated = _read_netcdf(path)
                 held = stated if includes is None else includes
                 return cls(estimate.values, spacing, estimate.components, held)
-            return cls(readers[kind](path), spacing, includes=includes or ())
+            return cls(_read_array(path), spacing, includes=includes or ())
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Share the measured light among squares of side `spacing`."""
+    def kernel(self, spacing: float) -> Array:
         samples = self.weights.shape[0]
         width = samples * self.spacing
         half = half_size(width / 2, spacing)
@@ -387,62 +364,41 @@ class MeasuredPSF(PointSpreadFunction):
         )
 
 
-NumericalAperture = Annotated[
-    float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
-]
-FNumber = Annotated[
-    float | None,
-    Parameter(
-        "F-number of the lens, focused at infinity; with the camera's magnification m the "
-        "numerical aperture is m / (2 f_number (1 + m)).",
-        over=0.0,
-    ),
-]
+@dataclass(frozen=True)
+class ApertureChoice(PSFChoice):
+    """Diffraction by the data sheet of a lens; one of the two is given."""
 
+    numerical_aperture: Annotated[
+        float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+    ] = None
+    f_number: Annotated[
+        float | None,
+        Parameter(
+            "F-number of the lens, focused at infinity; with the camera's magnification m the "
+            "numerical aperture is m / (2 f_number (1 + m)).",
+            over=0.0,
+        ),
+    ] = None
 
-def check_aperture(numerical_aperture: float | None, f_number: float | None) -> None:
-    """Refuse both, or none, of the ways to say how wide a lens is open.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.numerical_aperture is None) == (self.f_number is None):
+            raise ValueError("expected one of numerical_aperture and f_number")
 
-    Raises
-    ------
-    ValueError
-        If it is so.
-    """
-    if (numerical_aperture is None) == (f_number is None):
-        raise ValueError("expected one of numerical_aperture and f_number")
-
-
-def object_aperture(
-    numerical_aperture: float | None, f_number: float | None, magnification: float | None
-) -> float:
-    """Numerical aperture on the scene's side.
-
-    Parameters
-    ----------
-    numerical_aperture : float or None
-        It, if it is given.
-    f_number : float or None
-        Of the lens, focused at infinity, in its place.
-    magnification : float or None
-        Of the lens, which an f-number needs.
-
-    Raises
-    ------
-    ValueError
-        If the magnification is missing.
-    """
-    if numerical_aperture is not None:
-        return numerical_aperture
-    assert f_number is not None
-    if magnification is None:
-        raise ValueError("magnification: is missing, expected it with psf.f_number")
-    return magnification / (2 * f_number * (1 + magnification))
+    def aperture(self, magnification: float | None) -> float:
+        """Return the numerical aperture on the scene's side; an f-number needs a magnification."""
+        if self.numerical_aperture is not None:
+            return self.numerical_aperture
+        assert self.f_number is not None
+        if magnification is None:
+            raise ValueError("magnification: is missing, expected it with psf.f_number")
+        return magnification / (2 * self.f_number * (1 + magnification))
 
 
 @final
 @PSFS.part
 @dataclass(frozen=True)
-class AiryAperture(PSFChoice):
+class AiryAperture(ApertureChoice):
     """Diffraction of a round aperture, by the data sheet of a lens."""
 
     kind: ClassVar[str] = "airy"
@@ -456,18 +412,10 @@ class AiryAperture(PSFChoice):
             most=0.1,
         ),
     ] = None
-    numerical_aperture: NumericalAperture = None
-    f_number: FNumber = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_aperture(self.numerical_aperture, self.f_number)
 
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        """Diffraction by the numerical aperture; see `PSFChoice.of_camera`."""
-        aperture = object_aperture(self.numerical_aperture, self.f_number, magnification)
         wavelength = self.wavelength or (band.lower + band.upper) / 2
-        return AnnularAperturePSF(wavelength, aperture, 0.0)
+        return AnnularAperturePSF(wavelength, self.aperture(magnification), 0.0)
 
 
 @final
@@ -507,18 +455,17 @@ class MeasuredPSFFile(PSFChoice):
         object.__setattr__(self, "psf", psf)
 
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        """The kernel; see `PSFChoice.of_camera`."""
         return self.psf
 
 
-def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """2 J1(v) / v."""
+def _jinc(v: Array) -> Array:
+    """Return 2 J1(v) / v."""
     safe = np.where(v == 0.0, 1.0, v)
     return np.where(v == 0.0, 1.0, 2 * j1(safe) / safe)
 
 
-def _with_the_rest(kernel: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """A kernel with a ring of squares more that holds all that it lacks of 1.
+def _with_the_rest(kernel: Array, spacing: float) -> Array:
+    """Return a kernel with one more ring of squares that holds all that it lacks of 1.
 
     Far away the mean of diffraction's rings falls as 1/r³. The integral of that over all x > X and
     y > Y is (X + Y − R) / XY, and over all x > X and y of 0 to Y it is (R − X) / XY, with
@@ -533,7 +480,7 @@ def _with_the_rest(kernel: NDArray[np.float64], spacing: float) -> NDArray[np.fl
     return np.asarray(np.pad(kernel, 1) + ring * (1 - kernel.sum()) / ring.sum())
 
 
-def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:
+def _checked_weights(weights: ArrayLike) -> Array:
     array = np.asarray(weights, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] % 2 == 0:
         raise ValueError(f"psf: kernel has shape {array.shape}, expected a square of odd side")
@@ -542,19 +489,16 @@ def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def _read_npy(path: Path) -> NDArray[Any]:
-    with path.open("rb") as file:
-        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
-
-
-def _read_csv(path: Path) -> NDArray[np.float64]:
-    lines = path.read_text(encoding="utf-8-sig").splitlines()
-    rows = [[float(cell) for cell in line.split(",")] for line in lines if line.strip()]
-    return np.array(rows, dtype=np.float64)
+def _read_array(path: Path) -> Array:
+    if path.suffix.lower() == ".npy":
+        with path.open("rb") as file:
+            return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+    rows = path.read_text(encoding="utf-8-sig").splitlines()
+    return np.array([[float(cell) for cell in row.split(",")] for row in rows if row.strip()])
 
 
 def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
-    """Kernel, with the components of its uncertainty if it has any, spacing and what it holds."""
+    """Return kernel, with the components of its uncertainty if any, spacing and `includes`."""
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:

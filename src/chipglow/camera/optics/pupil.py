@@ -10,32 +10,21 @@ from typing import Annotated, Any, ClassVar, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 from scipy import fft
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
-    half_maximum_width,
     half_size,
+    kernel_fwhm,
     normalised,
-    peak,
     poisson_squares,
     resized,
 )
-from chipglow.camera.optics.psf import (
-    PSFS,
-    FNumber,
-    NumericalAperture,
-    PointSpreadFunction,
-    PSFChoice,
-    check_aperture,
-    object_aperture,
-)
-from chipglow.quantities import Parameter
+from chipglow.camera.optics.psf import PSFS, ApertureChoice, PointSpreadFunction
+from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import POSITION, TEMPERATURE
 from chipglow.radiometry import Band
 
@@ -59,37 +48,32 @@ _POINT: Final = 1e-12
 _WIDTH_SQUARES: Final = 128
 
 
-class _Zernike:
-    """How a description writes coefficients: a mapping from Noll's index to a length."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Schema of the field: pairs of index and m."""
-        return core_schema.no_info_plain_validator_function(
-            self._pairs,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda pairs: {index: POSITION.text(rms) for index, rms in pairs}, when_used="json"
-            ),
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """JSON schema: texts with a unit by whole numbers."""
-        text = {"type": "string", "examples": ["0.2 um"]}
-        return {"type": "object", "patternProperties": {"^[0-9]+$": text}}
-
-    def _pairs(self, value: object) -> tuple[tuple[int, float], ...]:
-        if isinstance(value, tuple):
-            return value
-        if not isinstance(value, Mapping):
-            raise ValueError(f"{value!r}, expected lengths by Noll's index such as {{11: 0.2 um}}")
-        return tuple((_whole(index), POSITION.parse(rms)) for index, rms in value.items())
+def _zernike(value: Any) -> Any:
+    """Return pairs of index and m, of such pairs or of a mapping from index to length."""
+    if isinstance(value, Mapping):
+        pairs = tuple((_whole(index), POSITION.parse(rms)) for index, rms in value.items())
+    elif isinstance(value, tuple):
+        pairs = value
+    else:
+        raise ValueError(f"{value!r}, expected lengths by Noll's index such as {{11: 0.2 um}}")
+    seen: set[int] = set()
+    for pair in pairs:
+        index, rms = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
+        if (
+            not (isinstance(index, Integral) and 4 <= int(index) <= _MOST_ZERNIKE)
+            or index in seen
+            or not (isinstance(rms, Real) and abs(float(rms)) <= _STRONGEST)
+        ):
+            raise ValueError(
+                f"{pair!r}, expected Noll's index, 4 to {_MOST_ZERNIKE}, each once, and its rms "
+                "in m"
+            )
+        seen.add(index)
+    return pairs
 
 
 def _whole(index: object) -> Any:
-    """A whole number that was written as a text, as the keys of JSON are."""
+    """Return the whole number written as text, as the keys of JSON are."""
     return int(index) if isinstance(index, str) and re.fullmatch("[0-9]{1,3}", index) else index
 
 
@@ -107,7 +91,16 @@ Defocus = Annotated[
 ]
 Aberrations = Annotated[
     tuple[tuple[int, float], ...],
-    _Zernike(),
+    PlainValidator(_zernike),
+    PlainSerializer(
+        lambda pairs: {index: POSITION.text(rms) for index, rms in pairs}, when_used="json"
+    ),
+    WithJsonSchema(
+        {
+            "type": "object",
+            "patternProperties": {"^[0-9]+$": {"type": "string", "examples": ["0.2 um"]}},
+        }
+    ),
     Parameter(
         f"Zernike aberrations by Noll's index, 4 to {_MOST_ZERNIKE}: optical path difference as\n"
         "the root of its mean square over the unobscured pupil."
@@ -137,17 +130,6 @@ class PupilPSF(PointSpreadFunction):
     ----------
     band : Band
         The camera's band, with its response.
-    numerical_aperture : float
-        On the side of the scene, the sine of the half angle, over 0 to 1.
-    obscuration : float
-        Diameter of the central obstruction, as a fraction of the pupil's, 0 to 0.9.
-    defocus : float
-        How far the surface is from the plane of best focus in m, away from the lens.
-    zernike : tuple of (int, float)
-        Index of Noll (4 to 120) and coefficient of Zernike circle polynomials: the optical path
-        difference in m, as the root of its mean square over the unobscured pupil.
-    temperature : float
-        Of the blackbody in K.
 
     Attributes
     ----------
@@ -178,10 +160,12 @@ class PupilPSF(PointSpreadFunction):
     """
 
     band: Band
-    numerical_aperture: float
+    numerical_aperture: Annotated[
+        float, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+    ]
     obscuration: Obscuration = 0.0
     defocus: Defocus = 0.0
-    zernike: tuple[tuple[int, float], ...] = ()
+    zernike: Aberrations = ()
     temperature: SourceTemperature = 1000.0
 
     def __str__(self) -> str:
@@ -195,10 +179,6 @@ class PupilPSF(PointSpreadFunction):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        aperture = self.numerical_aperture
-        if not (isinstance(aperture, Real) and 0.0 < aperture <= 1.0):
-            raise ValueError(f"psf: numerical_aperture is {aperture!r}, expected over 0 to 1")
-        check_zernike(self.zernike)
         if self._samples > _LARGEST_PUPIL:
             raise ValueError(
                 f"psf: defocus and aberrations change the path by {self._slope:.3g} m from the "
@@ -208,28 +188,15 @@ class PupilPSF(PointSpreadFunction):
 
     @cached_property
     def fwhm(self) -> float:  # type: ignore[override]
-        """Full width at half maximum in m."""
         half = _WIDTH_SQUARES
         spacing = (self._geometric + self._shortest / self.numerical_aperture) / half
         kernel = self._squares(spacing, half, half, beyond=False)
-        row, column = peak(kernel)
-        widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
-        return float(np.mean(widths)) * spacing
+        return kernel_fwhm(kernel, spacing)
 
-    def transfer(
-        self, across: NDArray[np.float64], up: NDArray[np.float64]
-    ) -> NDArray[np.complex128]:
-        """Optical transfer function.
+    def transfer(self, across: Array, up: Array) -> NDArray[np.complex128]:
+        """Return the complex optical transfer function: 1 at zero frequency, 0 from 2 NA / λ on.
 
-        Parameters
-        ----------
-        across, up : ndarray
-            Spatial frequencies to the right and upwards in 1/m, broadcast against each other.
-
-        Returns
-        -------
-        ndarray
-            Complex; 1 at no frequency, 0 from 2 NA / λ on.
+        Frequencies `across` and `up` are in 1/m and are broadcast against each other.
         """
         across, up = np.broadcast_arrays(across, up)
         frequency = np.hypot(across, up)
@@ -246,23 +213,18 @@ class PupilPSF(PointSpreadFunction):
         return found
 
     def in_band(self, band: Band) -> "PupilPSF":
-        """Diffraction over that band; see `PointSpreadFunction.in_band`."""
         return replace(self, band=band)
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+    def kernel(self, spacing: float) -> Array:
         half = half_size(self._tail / (1 - PUPIL_ENERGY) + self._geometric, spacing)
         return self._squares(spacing, half, half, beyond=False)
 
-    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
-        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
         check_length("spacing", spacing)
         return normalised(self._squares(spacing, rows, columns, beyond=True))
 
-    def _squares(
-        self, spacing: float, rows: int, columns: int, beyond: bool
-    ) -> NDArray[np.float64]:
-        """Fractions of the light on squares; the outermost may hold what goes farther."""
+    def _squares(self, spacing: float, rows: int, columns: int, beyond: bool) -> Array:
+        """Return fractions of the light on squares; the outermost may hold what goes farther."""
         unit = self._shortest / (2 * pi * self.numerical_aperture)
         near = _NEAR * unit + 2 * self._geometric
         reach = max(near, min((max(rows, columns) + 0.5) * spacing, _FAR * unit))
@@ -274,8 +236,8 @@ class PupilPSF(PointSpreadFunction):
         tail = poisson_squares(spacing, rows, columns, self._tail, self._width, beyond)
         return np.maximum(core + tail, 0.0)
 
-    def _core(self, spacing: float, half: int) -> NDArray[np.float64]:
-        """Fractions of the light on squares less those of the tail."""
+    def _core(self, spacing: float, half: int) -> Array:
+        """Return fractions of the light on squares less those of the tail."""
         step = 1 / (_PERIOD * (2 * half + 1) * spacing)
         count = ceil(_FINEST * 2 * self.numerical_aperture / self._shortest / step)
         up = step * np.arange(-count, count + 1, dtype=np.float64)
@@ -294,7 +256,7 @@ class PupilPSF(PointSpreadFunction):
         return np.asarray(((rows[::-1] @ image) @ columns.T).real * (spacing * step) ** 2)
 
     @cached_property
-    def _spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _spectrum(self) -> tuple[Array, Array]:
         return self.band.spectrum(self.temperature, _WAVELENGTHS)
 
     @property
@@ -333,7 +295,7 @@ class PupilPSF(PointSpreadFunction):
 
     @property
     def _changes(self) -> Iterator[NDArray[np.complex128] | None]:
-        """What defocus and aberrations change in the transfer function at each wavelength.
+        """Yield what the path difference changes in the transfer function at each wavelength.
 
         On steps of the pupil's samples, the middle at [samples, samples].
         """
@@ -355,8 +317,8 @@ class PupilPSF(PointSpreadFunction):
             # Not by the middle value: there a sample on the edge counts by its square.
             yield (bent - plain) / pupil.sum()
 
-    def _path(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Optical path difference in m at coordinates of the pupil."""
+    def _path(self, x: Array, y: Array) -> Array:
+        """Return the optical path difference in m at coordinates of the pupil."""
         radius = np.hypot(x, y)
         inside = np.maximum(1 - (self.numerical_aperture * radius) ** 2, 0.0)
         path = self.defocus * (np.sqrt(inside) - 1)
@@ -368,7 +330,7 @@ class PupilPSF(PointSpreadFunction):
 @final
 @PSFS.part
 @dataclass(frozen=True)
-class Pupil(PSFChoice):
+class Pupil(ApertureChoice):
     """A pupil with obscuration, defocus and aberrations, over the camera's band."""
 
     kind: ClassVar[str] = "pupil"
@@ -376,23 +338,15 @@ class Pupil(PSFChoice):
         "{kind: pupil, numerical_aperture: 0.28, obscuration: 0.35, defocus: 10 um,\n"
         "    zernike: {11: 0.2 um}}"
     )
-    numerical_aperture: NumericalAperture = None
-    f_number: FNumber = None
     obscuration: Obscuration = 0.0
     defocus: Defocus = 0.0
     zernike: Aberrations = ()
     temperature: SourceTemperature = 1000.0
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_aperture(self.numerical_aperture, self.f_number)
-        check_zernike(self.zernike)
-
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        """Diffraction over the band; see `PSFChoice.of_camera`."""
         return PupilPSF(
             band,
-            object_aperture(self.numerical_aperture, self.f_number, magnification),
+            self.aperture(magnification),
             self.obscuration,
             self.defocus,
             self.zernike,
@@ -400,20 +354,10 @@ class Pupil(PSFChoice):
         )
 
 
-def annular_transfer(frequency: NDArray[np.float64], obscuration: float) -> NDArray[np.float64]:
-    """Transfer function of an annular pupil without aberrations.
+def annular_transfer(frequency: Array, obscuration: float) -> Array:
+    """Return the transfer function of an annular pupil without aberrations.
 
-    Parameters
-    ----------
-    frequency : ndarray
-        Spatial frequency over 2 NA / λ, 0 or more.
-    obscuration : float
-        Inner over outer diameter, 0 to under 1.
-
-    Returns
-    -------
-    ndarray
-        From 1 to 0, of the same shape: O'Neill, J. Opt. Soc. Am. 46 (1956) 285.
+    `frequency` is over 2 NA / λ (O'Neill, J. Opt. Soc. Am. 46 (1956) 285).
     """
     apart = 2 * frequency
     shared = (
@@ -424,22 +368,11 @@ def annular_transfer(frequency: NDArray[np.float64], obscuration: float) -> NDAr
     return np.asarray(shared / (pi * (1 - obscuration**2)))
 
 
-def zernike_polynomial(
-    index: int, radius: NDArray[np.float64], angle: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Zernike circle polynomial whose mean square over the unit disc is 1.
+def zernike_polynomial(index: int, radius: Array, angle: Array) -> Array:
+    """Return Noll's Zernike polynomial, of mean square 1 over the unit disc.
 
-    Parameters
-    ----------
-    index : int
-        Noll's index, 1 or more.
-    radius, angle : ndarray
-        Polar coordinates; the angle in rad, counter-clockwise from the right.
-
-    Returns
-    -------
-    ndarray
-        Values: Noll, J. Opt. Soc. Am. 66 (1976) 207, Equations 1 to 3.
+    Polar coordinates, the angle in rad from the right: Noll, J. Opt. Soc. Am. 66 (1976) 207,
+    Equations 1 to 3.
     """
     n, m = _noll(index)
     value = np.zeros(np.broadcast(radius, angle).shape)
@@ -452,31 +385,8 @@ def zernike_polynomial(
     return np.asarray(sqrt(2 * (n + 1)) * value * turn)
 
 
-def check_zernike(pairs: object) -> None:
-    """Refuse what are no coefficients by their index.
-
-    Raises
-    ------
-    ValueError
-        If an index is not 4 to 120 or stands twice, or a coefficient is not finite.
-    """
-    expected = f"expected Noll's index, 4 to {_MOST_ZERNIKE}, each once, and its rms in m"
-    if not isinstance(pairs, tuple):
-        raise ValueError(f"zernike: {pairs!r}, {expected}")
-    seen = set()
-    for pair in pairs:
-        index, rms = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
-        if (
-            not (isinstance(index, Integral) and 4 <= int(index) <= _MOST_ZERNIKE)
-            or index in seen
-            or not (isinstance(rms, Real) and abs(float(rms)) <= _STRONGEST)
-        ):
-            raise ValueError(f"zernike: {pair!r}, {expected}")
-        seen.add(index)
-
-
 def _noll(index: int) -> tuple[int, int]:
-    """Degree and order of Noll's index."""
+    """Return degree and order of Noll's index."""
     n = 0
     while (n + 1) * (n + 2) // 2 < index:
         n += 1
@@ -484,8 +394,8 @@ def _noll(index: int) -> tuple[int, int]:
     return n, 2 * (place // 2) if n % 2 == 0 else 2 * ((place - 1) // 2) + 1
 
 
-def _shared_area(apart: NDArray[np.float64], first: float, second: float) -> NDArray[np.float64]:
-    """Area that two discs share, by their radii and how far apart their middles are."""
+def _shared_area(apart: Array, first: float, second: float) -> Array:
+    """Return the area that two discs share, by their radii and the distance of their middles."""
     if second < _POINT:
         return np.zeros(apart.shape)
     d = np.clip(apart, max(abs(first - second), _POINT), first + second)
@@ -499,13 +409,11 @@ def _shared_area(apart: NDArray[np.float64], first: float, second: float) -> NDA
 
 
 def _autocorrelation(pupil: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """∫ P(ρ) P*(ρ + s) on steps of the samples, shape (2 n, 2 n), s = 0 at [n, n]."""
+    """Return ∫ P(ρ) P*(ρ + s) on steps of the samples, shape (2 n, 2 n), s = 0 at [n, n]."""
     twice = [2 * count for count in pupil.shape]
     power = np.abs(fft.fft2(pupil, twice)) ** 2
     return np.asarray(fft.fftshift(np.conj(fft.ifft2(power))))
 
 
-def _interpolated(
-    values: NDArray[np.complex128], places: NDArray[np.float64]
-) -> NDArray[np.complex128]:
+def _interpolated(values: NDArray[np.complex128], places: Array) -> NDArray[np.complex128]:
     return np.asarray(map_coordinates(values, places, order=3, mode="grid-constant"))

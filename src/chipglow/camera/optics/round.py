@@ -6,7 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from chipglow.quantities import Array
 
 _STEPS: Final = 64
 """Steps of the amplitude's table over which its fastest wave moves on by one radian."""
@@ -15,35 +16,14 @@ _KERNEL: Final[Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def light_on_squares(
-    amplitude: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    side: float,
-    rows: int,
-    columns: int,
-    nodes: int,
-) -> NDArray[np.float64]:
-    """Integrals of the square of an amplitude over squares of a grid.
+    amplitude: Callable[[Array], Array], side: float, rows: int, columns: int, nodes: int
+) -> Array:
+    """Integrate the square of an amplitude over squares, shape (rows + 1, columns + 1).
 
-    Parameters
-    ----------
-    amplitude : callable
-        Takes radii to real amplitudes. It holds no wave shorter than 2π, as that of a pupil of
-        radius 1 does not.
-    side : float
-        Side of a square. The middle of the first one is at radius 0.
-    rows, columns : int
-        Squares below the first one, and to its right.
-    nodes : int
-        Gauss nodes along a side.
-
-    Returns
-    -------
-    ndarray
-        Shape (rows + 1, columns + 1).
-
-    Notes
-    -----
-    The amplitude is evaluated at even radii only, and between them is the cubic through the four
-    nearest: with a step h it is off by 3 h⁴ / 128 of the waves' amplitude there, 1.4e-9.
+    The first square's middle is at radius 0; `nodes` are Gauss nodes along a side. The amplitude
+    holds no wave shorter than 2π, as that of a pupil of radius 1 does not. It is evaluated at even
+    radii only, and between them is the cubic through the four nearest: with a step h it is off by
+    3 h⁴ / 128 of the waves' amplitude there, 1.4e-9.
     """
     node, weight = np.polynomial.legendre.leggauss(nodes)
     down, across = (side * (np.arange(n + 1)[:, None] + node / 2) for n in (rows, columns))
@@ -56,7 +36,7 @@ def light_on_squares(
 
 @njit(**_KERNEL)
 def _add_light(table, down, across, weight, sums):  # type: ignore[no-untyped-def]
-    """Weighted sums of the squared amplitude over the nodes of all squares."""
+    """Sum the squared amplitude over the nodes of all squares, by weight."""
     for row in range(sums.shape[0]):
         for column in range(sums.shape[1]):
             total = 0.0
@@ -72,7 +52,7 @@ def _add_light(table, down, across, weight, sums):  # type: ignore[no-untyped-de
 
 @njit(inline="always")
 def _between(before, first, last, after, t):  # type: ignore[no-untyped-def]
-    """Value at 0 ≤ t ≤ 1 between the middle two of four even values, by their cubic."""
+    """Return the value at 0 ≤ t ≤ 1 between the middle two of four even values, by their cubic."""
     near = before * t * (t - 1.0) * (2.0 - t) + after * t * (t - 1.0) * (t + 1.0)
     far = (first * (1.0 - t) + last * t) * 3.0 * (2.0 - t) * (t + 1.0)
     return (near + far) / 6.0

@@ -4,35 +4,19 @@ from math import sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from chipglow.quantities import Array
 from chipglow.scene import Raster
 
 _ROUNDING: Final = 1e-6
 """Fraction of a pixel or a sample that is taken for rounding of lengths."""
 
 
-def overlap_lengths(
-    left: NDArray[np.float64], width: float, samples: int, spacing: float
-) -> NDArray[np.float64]:
-    """Length that each interval shares with each sample of a line.
+def overlap_lengths(left: Array, width: float, samples: int, spacing: float) -> Array:
+    """Return the length in m that each interval shares with each sample of a line, (n, samples).
 
-    Parameters
-    ----------
-    left : ndarray
-        Where the intervals begin in m from the beginning of the first sample, shape (n,).
-    width : float
-        Length of every interval in m.
-    samples : int
-        Number of samples of the line.
-    spacing : float
-        Length of a sample in m.
-
-    Returns
-    -------
-    ndarray
-        Lengths in m, shape (n, samples).
+    Intervals begin at `left` (n,) in m from the beginning of the first sample.
     """
     edges = spacing * np.arange(samples + 1, dtype=np.float64)
     begin = np.maximum(left[:, None], edges[None, :-1])
@@ -44,24 +28,7 @@ def overlap_lengths(
 def sensor_raster(
     scene: Raster, pitch: float, offset: tuple[float, float], shape: tuple[int, int] | None
 ) -> Raster:
-    """Where the pixels lie on a scene.
-
-    Parameters
-    ----------
-    scene : Raster
-        The scene's samples.
-    pitch : float
-        Distance between pixels in m, on the scene.
-    offset : tuple of float
-        Corner of the first pixel in m, right of and down from the scene's upper left corner.
-    shape : tuple of int, optional
-        Rows and columns of pixels; as many whole pixels as fit by default.
-
-    Raises
-    ------
-    ValueError
-        If not one pixel fits, or `shape` reaches beyond the scene.
-    """
+    """Return the raster of the pixels; as many whole pixels as fit by default."""
     left, right, bottom, top = scene.extent
     room = (top - bottom - offset[1], right - left - offset[0])
     rows, columns = (int(length / pitch + _ROUNDING) for length in room)
@@ -80,13 +47,7 @@ def sensor_raster(
 
 
 def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, slice]]:
-    """All whole pixels that fit a scene, in line with some of them, and where those are in it.
-
-    Parameters
-    ----------
-    scene, pixels : Raster
-        The scene's samples, and pixels within it.
-    """
+    """Return all whole pixels that fit a scene, in line with some, and where those are in it."""
     pitch = sensors.spacing
     down, right = scene.top - sensors.top, sensors.left - scene.left
     above, before = (int(length / pitch + _ROUNDING) for length in (down, right))
@@ -95,25 +56,8 @@ def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, s
     return sensor_raster(scene, pitch, corner, None), own
 
 
-def integrate(
-    radiance: NDArray[np.float64], scene: Raster, sensors: Raster, fill_factor: float
-) -> NDArray[np.float64]:
-    """Mean radiance over the sensitive square of every pixel.
-
-    Parameters
-    ----------
-    radiance : ndarray
-        Radiance of the scene's samples in W/(m² sr), shape `scene.shape`.
-    scene, pixels : Raster
-        Where the samples and the pixels are.
-    fill_factor : float
-        Fraction of a pixel's square that is sensitive: a square in its middle.
-
-    Returns
-    -------
-    ndarray
-        Radiance in W/(m² sr), shape `sensors.shape`.
-    """
+def integrate(radiance: Array, scene: Raster, sensors: Raster, fill_factor: float) -> Array:
+    """Return the mean radiance over every pixel's sensitive square, shape `sensors.shape`."""
     down, across = line_weights(scene, sensors, fill_factor)
     # Sparse products are summed in one order, whatever the number of threads.
     return np.asarray((across @ (down @ radiance).T).T)
@@ -122,18 +66,7 @@ def integrate(
 def line_weights(
     scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Weights of the samples in the pixels, whose mean of a column and of a row they make.
-
-    Parameters
-    ----------
-    scene, sensors, fill_factor
-        As for `integrate`.
-
-    Returns
-    -------
-    down, across : csr_array
-        Shapes (sensors.rows, scene.rows) and (sensors.columns, scene.columns), each row of sum 1.
-    """
+    """Return the weights of a column's and a row's samples in the pixels, each row of sum 1."""
     down = _line_weights(
         scene.top - sensors.top, scene.rows, sensors.rows, scene, sensors, fill_factor
     )
@@ -146,7 +79,7 @@ def line_weights(
 def _line_weights(
     begin: float, samples: int, count: int, scene: Raster, sensors: Raster, fill_factor: float
 ) -> sparse.csr_array:
-    """Weights of a line of samples in a line of pixels, each row of sum 1."""
+    """Return the weights of a line of samples in a line of pixels, each row of sum 1."""
     side = sensors.spacing * sqrt(fill_factor)
     first = begin + (sensors.spacing - side) / 2
     left = first + sensors.spacing * np.arange(count, dtype=np.float64)

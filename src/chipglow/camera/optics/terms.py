@@ -1,4 +1,4 @@
-"""What optics do besides spreading a point: each effect a small term, chosen by its kind."""
+"""Effects of the optics besides spreading a point: each a small term, chosen by its kind."""
 
 from abc import ABC
 from collections.abc import Callable
@@ -7,18 +7,17 @@ from math import log, sqrt
 from typing import Annotated, ClassVar, Final, TypeAlias, final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import half_size, poisson_squares
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA, GaussianPSF, PointSpreadFunction
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Array, Family, Parameter, Part
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 
-Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
-"""A convolution with a point spread function: `chipglow.camera.blur`, or `blur_of_like`."""
+Blur: TypeAlias = Callable[[Array, PointSpreadFunction, float], Array]
+"""A convolution with a point spread function: `chipglow.camera.blur`."""
 
 OPTICS_TERMS: Final = Family("optics_term")
 """Terms by their kind; other packages add theirs in the group ``chipglow.optics_term``."""
@@ -30,9 +29,7 @@ class OpticsTerm(Part, ABC):
     Radiance is in W/(m² sr), of shape (y, x).
     """
 
-    def on_samples(
-        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
+    def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         """Image on the scene's samples, before the pixels integrate it.
 
         Parameters
@@ -46,9 +43,7 @@ class OpticsTerm(Part, ABC):
         """
         return radiance
 
-    def on_pixels(
-        self, radiance: NDArray[np.float64], pixels: Raster, band: Band
-    ) -> NDArray[np.float64]:
+    def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
         """Radiance that the camera shows for what its pixels received.
 
         Parameters
@@ -91,10 +86,7 @@ class OpticalElement(OpticsTerm):
         ),
     ] = None
 
-    def on_pixels(
-        self, radiance: NDArray[np.float64], pixels: Raster, band: Band
-    ) -> NDArray[np.float64]:
-        """Transmitted and own light; see `OpticsTerm.on_pixels`."""
+    def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
         own = float(band.radiance(self.temperature))
         lost = 1 - self.transmittance
         if self.calibrated_at is None:
@@ -136,10 +128,7 @@ class Narcissus(OpticsTerm):
         ),
     ] = None
 
-    def on_pixels(
-        self, radiance: NDArray[np.float64], pixels: Raster, band: Band
-    ) -> NDArray[np.float64]:
-        """Radiance without what is missing; see `OpticsTerm.on_pixels`."""
+    def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
         cold = self.detector if self.corrected_at is None else self.corrected_at
         missing = float(band.radiance(self.housing)) - float(band.radiance(cold))
         x, y = _from_axis(pixels, pixels)
@@ -150,28 +139,20 @@ class Narcissus(OpticsTerm):
 @final
 @dataclass(frozen=True)
 class VeilPSF(PointSpreadFunction):
-    """Where light goes that is scattered: h / (2π √3 (r² + h² / 3)^(3/2)) per area.
-
-    Parameters
-    ----------
-    radius : float
-        Radius h in m within which half of it falls.
-    """
+    """Density of scattered light: h / (2π √3 (r² + h² / 3)^(3/2)) per area."""
 
     radius: float
+    """Radius h in m within which half of it falls."""
 
     @property
     def fwhm(self) -> float:  # type: ignore[override]
-        """Full width at half maximum in m."""
         return 2 * self._width * sqrt(2 ** (2 / 3) - 1)
 
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+    def kernel(self, spacing: float) -> Array:
         half = half_size(100 * self._width, spacing)
         return poisson_squares(spacing, half, half, self._width, self._width, beyond=False)
 
-    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
-        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
         return poisson_squares(spacing, rows, columns, self._width, self._width, beyond=True)
 
     @property
@@ -199,10 +180,7 @@ class Veil(OpticsTerm):
         float, Parameter("Within which half of it falls, on the scene.", LENGTH, over=0.0)
     ]
 
-    def on_samples(
-        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """Image with the veil; see `OpticsTerm.on_samples`."""
+    def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         veil = blurred(radiance, VeilPSF(self.radius), scene.spacing)
         return (1 - self.fraction) * radiance + self.fraction * veil
 
@@ -231,10 +209,7 @@ class Distortion(OpticsTerm):
     ]
     radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
 
-    def on_samples(
-        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """Image that undistorted pixels would see; see `OpticsTerm.on_samples`."""
+    def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
         farther = self.fraction * (x**2 + y**2) / self.radius**2
         rows, columns = (np.arange(count, dtype=np.float64) for count in scene.shape)
@@ -263,10 +238,7 @@ class FieldBlur(OpticsTerm):
     ]
     radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
 
-    def on_samples(
-        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
-    ) -> NDArray[np.float64]:
-        """Image with the blur; see `OpticsTerm.on_samples`."""
+    def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
         variance = (self.standard_deviation * (x**2 + y**2) / self.radius**2) ** 2
         result, sharper, low, high = radiance.copy(), radiance, 0.0, (scene.spacing / 2) ** 2
@@ -279,7 +251,7 @@ class FieldBlur(OpticsTerm):
         return result
 
 
-def _from_axis(raster: Raster, pixels: Raster) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places of a raster's values right of and above the pixels' middle in m."""
+def _from_axis(raster: Raster, pixels: Raster) -> tuple[Array, Array]:
+    """Return places of a raster's values right of and above the pixels' middle in m."""
     left, right, bottom, top = pixels.extent
     return raster.x - (left + right) / 2, (raster.y - (bottom + top) / 2)[:, None]

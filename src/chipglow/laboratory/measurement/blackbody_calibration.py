@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from chipglow.camera import Blackbody, CalibrationFit, FittedCalibration, fit_models, preferred
+from chipglow.camera import MODELS, Blackbody, CalibrationFit, FittedCalibration, fit_calibration
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.measurement.camera_file import read_flat_fields, uniform_counts
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -28,7 +28,7 @@ class BlackbodyCalibration:
     @property
     def preferred(self) -> str:
         """Name of the model with the least information criterion."""
-        return preferred(self.fits)
+        return _preferred(self.fits)
 
     def to_frame(self) -> pd.DataFrame:
         """Return every point of each fit; one row each."""
@@ -80,22 +80,28 @@ def calibrate_blackbodies(
     given = {"emissivity": emissivity, "surroundings": surroundings}
     known = {name: value for name, value in given.items() if value is not None}
     blackbody = Blackbody(emissivity_uncertainty=emissivity_uncertainty, **known)
+    for name in models:
+        if name not in MODELS:
+            raise ValueError(f"model: {name!r}, expected one of {', '.join(MODELS)}")
     try:
-        fits = fit_models(
-            table["temperature"],
-            table["counts"],
-            band,
-            models,
-            blackbody=blackbody,
-            count_uncertainty=table.get("count_uncertainty"),
-            temperature_uncertainty=table.get("temperature_uncertainty"),
-            common_uncertainty=common_uncertainty or 0.0,
-            integration_time=integration_time,
-            range_name=range_name,
-        )
+        fits = {
+            name: fit_calibration(
+                MODELS[name],
+                table["temperature"],
+                table["counts"],
+                band,
+                table.get("count_uncertainty"),
+                table.get("temperature_uncertainty"),
+                common_uncertainty or 0.0,
+                integration_time=integration_time,
+                range_name=range_name,
+                blackbody=blackbody,
+            )
+            for name in models
+        }
     except ValueError as error:
         raise ValueError(f"{points}: {error}") from None
-    best = preferred(fits)
+    best = _preferred(fits)
     return BlackbodyCalibration(
         fits,
         Notes(
@@ -103,6 +109,10 @@ def calibrate_blackbodies(
             list(_warnings(best, fits[best], common_uncertainty is not None)),
         ),
     )
+
+
+def _preferred(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> str:
+    return min(fits, key=lambda name: fits[name].information_criterion)
 
 
 def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:

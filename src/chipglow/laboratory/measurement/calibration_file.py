@@ -1,13 +1,12 @@
 """A calibration as a YAML file holds it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 
-from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
+from chipglow.camera import MODELS, CalibrationFit, FittedCalibration
 from chipglow.io import atomic_path
 from chipglow.quantities import ZERO_CELSIUS, Parameter, Part
 from chipglow.quantities.units import (
@@ -17,11 +16,6 @@ from chipglow.quantities.units import (
 )
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, load_described
-
-MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
-    one.kind: one for one in (LinearCalibration, SakumaHattori)
-}
-"""Forms of a calibration by the names of a file."""
 
 Rows = tuple[tuple[float, ...], ...]
 PointRow = tuple[float, float, float, float]
