@@ -6,7 +6,6 @@ from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from typer.testing import CliRunner
 
@@ -20,10 +19,9 @@ from chipglow.camera import (
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
-from chipglow.laboratory.chip.figures import draw_rake_grid
-from chipglow.laboratory.comparison import StatedUncertainties, compare
+from chipglow.laboratory.comparison import compare
 from chipglow.scene import PlacedTool
-from chipglow.uncertainty import Estimate, draw
+from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
 SLOPE = np.array([2e5, 1e5])
@@ -164,36 +162,6 @@ def test_squares_and_band_have_errors_in_common(kind, temperature_of, stated):
     assert part.min() > 0.05
 
 
-def test_the_calibration_alone_is_as_drawn():
-    generator = np.random.default_rng(8)
-    fit = fit_calibration(
-        LinearCalibration, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0
-    ).calibration
-    grid = rake_grid(looked_at(fit), TOOL)
-    kelvins = grid.frame_mean[grid.frame_count > 0]
-    read = by_line(counts_of(kelvins), *drawn_parameters(fit, generator))
-    estimate = grid.frame_estimate[grid.frame_count > 0]
-    # Three standard errors of 20 000 draws, and a 513th of the range between nodes.
-    np.testing.assert_allclose(estimate.contribution("calibration"), read.std(axis=0), rtol=0.015)
-    hot, cold = int(np.argmax(kelvins)), int(np.argmin(kelvins))
-    expected = (read[:, hot] - read[:, cold]).std()
-    difference = estimate[hot] - estimate[cold]
-    assert difference.contribution("calibration") == pytest.approx(expected, rel=0.015)
-    # What is common to all squares does not fall in their mean.
-    mean = estimate.mean().contribution("calibration")
-    assert mean == pytest.approx(read.mean(axis=1).std(), rel=0.015)
-    assert mean > 0.8 * estimate.contribution("calibration").min()
-
-
-def test_draws_of_an_estimate_are_of_its_calibration():
-    fit = fit_calibration(
-        LinearCalibration, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0
-    ).calibration
-    grid = rake_grid(looked_at(fit), TOOL)
-    (values,) = draw([grid.frame_estimate[0, 1:3]], 4000, np.random.default_rng(2))
-    assert np.corrcoef(values.T)[0, 1] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
     fit = fit_calibration(SakumaHattori, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
     measurement = looked_at(fit)
@@ -241,6 +209,27 @@ def test_the_table_of_errors_is_what_the_covariance_says(kind):
     np.testing.assert_allclose(fit.uncertainty(counts), np.sqrt(np.diag(expected)), rtol=1e-3)
 
 
+KNOWN = measured([np.full(RASTER.shape, 700.0)], relative_uncertainty=0.01).data
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: CalibrationErrors(np.arange(2.0), np.ones((1, 1))), r"\(2,\) and \(1, 1\)"),
+        (lambda: CalibrationErrors(np.arange(2.0), np.ones(2)), r"\(k,\) and \(errors, k\)"),
+        (lambda: CalibrationErrors(np.ones(2), np.ones((1, 2))), "does not rise"),
+        (lambda: CalibrationErrors(np.arange(2.0), np.array([[1, np.nan]])), "is not finite"),
+        (
+            lambda: Measurement(KNOWN.drop_vars("calibration_radiance")).calibration_errors,
+            r"'calibration_errors' over .* is missing",
+        ),
+    ],
+)
+def test_impossible_errors_are_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
 def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     frame = measured([temperature_at(np.stack([X, Y], axis=-1))])
     one = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
@@ -249,27 +238,6 @@ def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     elsewhere = PlacedTool(TOOL, (1e-6, 0.0))
     other = rake_grid(frame, elsewhere, uncertainty=FOUND).frame_estimate[0, 3]
     assert (one - other).standard_uncertainty > one.standard_uncertainty
-
-
-@pytest.mark.parametrize(
-    ("radiance", "effects", "message"),
-    [
-        ([0.0, 1.0], [[1.0]], r"have shapes \(2,\) and \(1, 1\)"),
-        ([0.0, 1.0], [1.0, 1.0], r"expected \(k,\) and \(errors, k\)"),
-        ([1.0, 1.0], [[1.0, 1.0]], "does not rise"),
-        ([0.0, 1.0], [[1.0, np.nan]], "a number is not finite"),
-    ],
-)
-def test_impossible_errors_are_refused(radiance, effects, message):
-    with pytest.raises(ValueError, match=f"calibration errors: .*{message}"):
-        CalibrationErrors(np.array(radiance), np.array(effects))
-
-
-def test_a_table_of_errors_without_its_radiance_is_refused():
-    data = measured([np.full(RASTER.shape, 700.0)], relative_uncertainty=0.01).data
-    for wrong in (data.drop_vars("calibration_radiance"), data.transpose(..., "calibration_error")):
-        with pytest.raises(ValueError, match=r"'calibration_errors' over .* is missing"):
-            _ = Measurement(wrong).calibration_errors
 
 
 def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
@@ -291,54 +259,11 @@ def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
     assert "Errors of calibration move all squares together" in result.output
 
 
-@pytest.mark.parametrize("known", [0.01, None])
-def test_the_picture_has_a_band_where_the_calibration_is_known(known):
-    frames = measured(images(600.0), relative_uncertainty=known)
-    figure = draw_rake_grid(frames, rake_grid(frames))
-    profiles = figure.axes[1]
-    bands = [one for one in profiles.collections if isinstance(one, PolyCollection)]
-    assert bool(bands) is (known is not None)
-    assert ("standard uncertainty" in profiles.get_title("left")) is (known is not None)
-
-
 # Beside simulations
 
 
 def images(base):
     return [BandImage(shift=shift, base=base).temperature() for shift in (-6e-6, -3e-6, 0.0, 3e-6)]
-
-
-@pytest.mark.parametrize(
-    ("curve", "stated", "expected"),
-    [
-        (
-            None,
-            StatedUncertainties(3.0, 0.02, tool=WIDE),
-            (1348.2729825857812, 308.83206070633275, 9.794418503589467, 5.1855947049657996),
-        ),
-        (
-            None,
-            StatedUncertainties(1.0, 0.01),
-            (369.483962039152, 147.12893747912335, 2.824933947757538, 2.198074173848494),
-        ),
-        (
-            CURVE,
-            StatedUncertainties(1.0, 0.01, 4e-6, WIDE),
-            (1344.274336927997, 1812.0104102450234, 9.398151146032033, 54.569773309383415),
-        ),
-    ],
-    ids=["tool", "pixel", "curve"],
-)
-def test_a_comparison_without_calibration_keeps_its_numbers(curve, stated, expected):
-    """Numbers of the version that worked out the tool's part by itself."""
-    sets = {"cold": measured(images(595.0)), "hot": measured(images(612.0), noise=2.0, seed=4)}
-    result = compare(measured(images(600.0), noise=4.0, seed=2), sets, TOOL, curve, stated)
-    assert result.grid is not None and result.band is not None
-    found = [
-        *(np.nansum(pair.measured.standard_uncertainty) for pair in (result.grid, result.band)),
-        *(result.places[index].fits[0].bias_uncertainty for index in (0, 2)),
-    ]
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_a_comparison_has_the_calibration_of_its_squares():

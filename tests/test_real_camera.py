@@ -18,7 +18,6 @@ from chipglow.camera import (
 )
 from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
 from chipglow.radiometry import Band, ObjectParameters
-from chipglow.text import Notes
 
 BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.linspace(573.15, 1273.15, 8)
@@ -61,14 +60,6 @@ def test_one_point_corrects_the_offset_only():
     np.testing.assert_allclose(
         elsewhere - np.median(elsewhere), 2000.0 * (gain - np.median(gain))[None], atol=60
     )
-
-
-def test_a_sensor_that_does_not_answer_has_no_signal():
-    cold, hot = uniform(1000.0), uniform(5000.0)
-    hot[:, 3, 4] = cold[:, 3, 4]
-    corrected = NonUniformity.two_point(cold, hot).apply(cold)
-    assert np.isnan(corrected[:, 3, 4]).all()
-    assert np.isnan(corrected).sum() == len(cold)
 
 
 def test_bad_sensors_are_found_by_what_is_wrong_with_them():
@@ -229,14 +220,6 @@ def test_without_object_parameters_it_is_said_what_is_assumed():
     assert "lower left corner" in measured.data.attrs["assumed"]
     assert "not known" in measured.data.attrs["warnings"]
     assert measured.calibration_uncertainty is None
-
-
-def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful():
-    said = Notes(["An even rate."], ["A gap."], ["Lens: 25 mm."])
-    measured = calibrate_recording(recording(np.full((1, 2, 2), 9.0), "radiance", notes=said))
-    assert measured.data.attrs["remarks"] == "Lens: 25 mm."
-    assert "An even rate." in measured.notes.assumed
-    assert "A gap." in measured.notes.warnings
 
 
 def test_radiance_is_taken_as_it_is():
