@@ -210,14 +210,6 @@ def test_values_by_the_legend(tmp_path, codec, box):
     assert np.sqrt((error**2).mean()) < pixel + source.uncertainty()["temperature"].total
 
 
-def test_no_legend_and_a_wrong_box_are_told(tmp_path):
-    path = a_movie(tmp_path / "a.avi")
-    with pytest.raises(SourceError, match=r"a\.avi: no legend was found"):
-        a_source(path, None).survey()
-    with pytest.raises(SourceError, match=r"a\.avi: legend: box .* does not lie in the picture"):
-        a_source(path, (100, 10, 208, 80)).survey()
-
-
 # Round trips
 
 
@@ -411,12 +403,6 @@ def test_the_background_is_found_and_told(tmp_path):
     assert "temperature: Background colours at the border: (255, 255, 255)." in found.notes.assumed
 
 
-def test_a_background_of_the_colour_of_a_value_is_refused(tmp_path):
-    path = a_movie(tmp_path / "a.avi", colours=NamedMap("gray"))
-    with pytest.raises(SourceError, match=r"a\.avi: background: .* is the colour of 139"):
-        a_source(path, NamedMap("gray"), background=((255, 255, 255),)).survey()
-
-
 def with_grey_tool(picture):
     picture = picture.copy()
     picture[50:80, 90:] = 128
@@ -490,9 +476,25 @@ def test_wrong_values_are_refused(change, message):
         a_source(Path("a.avi"), **change)
 
 
-def test_a_crop_outside_is_refused(tmp_path):
-    with pytest.raises(SourceError, match=r"crop: .* does not lie in pictures of 120 x 90"):
-        a_source(a_movie(tmp_path / "a.avi"), crop=(0, 0, 121, 90)).survey()
+GREY = NamedMap("gray")
+
+
+@pytest.mark.parametrize(
+    ("drawn_as", "colours", "more", "said"),
+    [
+        (RAINBOW, RAINBOW, {"crop": (0, 0, 121, 90)}, "crop: .* does not lie in pictures of 120 x"),
+        (RAINBOW, None, {}, r"a\.avi: no legend was found"),
+        (RAINBOW, (100, 10, 208, 80), {}, r"a\.avi: legend: box .* does not lie in the picture"),
+        (GREY, GREY, {"background": ((255, 255, 255),)}, r"a\.avi: background: .* colour of 139"),
+        (GREY, GREY, {}, r"background: \(255, 255, 255\) .* or background: \[\]"),
+    ],
+)
+def test_what_does_not_fit_a_movie_is_refused(tmp_path, drawn_as, colours, more, said):
+    path = a_movie(tmp_path / "a.avi", colours=drawn_as, count=1)
+    with pytest.raises(SourceError, match=said):
+        a_source(path, colours, **more).survey()
+    with pytest.raises(FileNotFoundError):
+        a_source(tmp_path / "none.avi").survey()
 
 
 def fails(path):
@@ -535,11 +537,6 @@ def test_a_list_of_files_is_not_followed(tmp_path):
     path = tmp_path / "list.avi"
     path.write_text(f"ffconcat version 1.0\nfile {target.name}\n")
     assert "cannot be read as a movie" in fails(path)
-
-
-def test_a_missing_movie_is_an_os_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        a_source(tmp_path / "none.avi").survey()
 
 
 @pytest.mark.parametrize("size", [(40_000, 40_000), (2**31 - 1, 2**31 - 1), (0, 5), (20_000, 9)])
@@ -677,13 +674,6 @@ def test_a_plain_coloured_background_is_no_material(tmp_path):
     shown = frame.material == Material.WORKPIECE
     # A corner of one pixel counts as a line of the background's colour.
     assert (shown != np.isfinite(known_field(0, SHAPE))).sum() <= 2
-
-
-def test_a_background_of_the_scale_alone_is_refused_unless_said(tmp_path):
-    path = a_movie(tmp_path / "a.avi", colours=NamedMap("gray"))
-    with pytest.raises(SourceError, match=r"background: \(255, 255, 255\) .* or background: \[\]"):
-        a_source(path, NamedMap("gray")).survey()
-    assert a_source(path, NamedMap("gray"), background=()).survey().kind
 
 
 def test_what_lies_under_lines_is_in_the_uncertainty(tmp_path):
