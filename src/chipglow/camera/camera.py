@@ -270,32 +270,15 @@ class Camera(Part):
         return expose(scene, views, start, self.integration_time, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
-        """Return the frames that the camera reads from exposures.
+        """Return the frames that the camera reads from exposures, one for each.
 
         Size of source, blur and mean over time are linear and commute: the mean, which an exposure
         holds, is blurred and integrated once. That equals the loop of Figure 6, and any number of
         cameras with the same band, integration time and surroundings may use the same exposures.
 
-        Parameters
-        ----------
-        exposures : Exposure or iterable of Exposure
-            One for each frame.
-
-        Returns
-        -------
-        Measurement
-            As many frames as exposures. Its attribute ``warnings`` states how far the border of the
-            scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
-
-        Raises
-        ------
-        ValueError
-            If there is no exposure, their grids differ, or the pixels do not fit.
-
-        Notes
-        -----
-        Beyond the scene radiance is taken to be as at the scene's edge. The warning compares with a
-        second assumption: that beyond the scene each pixel sees the like of what it sees within.
+        Beyond the scene radiance is taken to be as at the scene's edge. The attribute ``warnings``
+        states where a second assumption, that beyond the scene each pixel sees the like of what it
+        sees within, changes pixels by over `BORDER_TOLERANCE`.
         """
         images: list[Array] = []
         alike, starts, effects, grids = [], [], [], set()
@@ -337,11 +320,6 @@ class Camera(Part):
         -------
         Measurement
             As many frames as starts, with the scene's tool, and attributes of camera and surface.
-
-        Raises
-        ------
-        ValueError
-            If an integration reaches beyond the scene, or the pixels do not fit it.
         """
         self.pixels(scene.raster)
         fields = (self.lay(surface, scene),)
@@ -361,8 +339,8 @@ class Camera(Part):
         Parameters
         ----------
         radiance : ndarray
-            Radiance of the scene's samples in W/(m² sr), shape `scene.shape`: the mean over the
-            integration time, such as `Exposure.mean_radiance`.
+            Of the scene's samples in W/(m² sr), shape `scene.shape`: the mean over the integration
+            time, such as `Exposure.mean_radiance`.
         scene : Raster
             The samples.
 
@@ -370,12 +348,6 @@ class Camera(Part):
         -------
         ndarray
             Radiance of every pixel in W/(m² sr), shape `pixels(scene).shape`.
-
-        Raises
-        ------
-        ValueError
-            If the map is not of the raster's shape or not finite and 0 or more, or the pixels do
-            not fit the scene.
         """
         image = np.asarray(radiance, np.float64)
         if image.shape != scene.shape:

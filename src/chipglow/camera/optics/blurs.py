@@ -158,23 +158,11 @@ class BlurredPSF(PointSpreadFunction):
     psf : PointSpreadFunction
         That of the optics, or a measured one.
     blurs : tuple of BlurTerm
-        What spreads the light besides.
+        Further blurs; a ValueError if one is in the point spread function already.
 
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m: the mean of the widths along the row and the column through
-        the peak.
-
-    Raises
-    ------
-    ValueError
-        If a blur is in the point spread function already.
-
-    Notes
-    -----
-    What the blurs change is computed within 32 widths of the middle and their reach, on squares of
-    at most a quarter of the width, and summed on the squares that are asked for: the squares
+    Notes ----- `fwhm` is the mean of the widths along the row and the column through the peak. What
+    the blurs change is computed within 32 widths of the middle and their reach, on squares of at
+    most a quarter of the width, and summed on the squares that are asked for: the squares
     themselves count once. Farther away a blur of standard deviation σ changes the light at a radius
     r by a fraction of some (σ / r)², which is left out. No light is lost.
     """

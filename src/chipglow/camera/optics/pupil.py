@@ -124,18 +124,13 @@ class PupilPSF(PointSpreadFunction):
 
     Wavelengths count as they do in the in-band radiance of a blackbody: by the spectral radiance
     and by the band's response, relative to energy (a photon detector's is proportional to the
-    wavelength, times its quantum efficiency).
+    wavelength, times its quantum efficiency). `fwhm` is the mean of the widths along the row and
+    the column through the peak.
 
     Parameters
     ----------
     band : Band
         The camera's band, with its response.
-
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m: the mean of the widths along the row and the column through
-        the peak.
 
     Raises
     ------

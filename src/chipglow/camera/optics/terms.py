@@ -30,7 +30,7 @@ class OpticsTerm(Part, ABC):
     """
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
-        """Image on the scene's samples, before the pixels integrate it.
+        """Return the image on the scene's samples, before the pixels integrate it.
 
         Parameters
         ----------
@@ -39,22 +39,12 @@ class OpticsTerm(Part, ABC):
         scene, pixels : Raster
             The samples, and the pixels.
         blurred : Blur
-            How to convolve, and what is taken to be beyond the scene.
+            Convolution, by what is taken to be beyond the scene.
         """
         return radiance
 
     def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
-        """Radiance that the camera shows for what its pixels received.
-
-        Parameters
-        ----------
-        radiance : ndarray
-            Of the pixels.
-        pixels : Raster
-            The pixels.
-        band : Band
-            The camera's band.
-        """
+        """Return the radiance that the camera shows for what its pixels received in its band."""
         return radiance
 
 
