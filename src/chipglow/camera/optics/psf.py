@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 import scipy
@@ -116,7 +116,6 @@ class PointSpreadFunction(PSFChoice):
         return folded(normalised(self.kernel(spacing)), rows, columns)
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class AnnularAperturePSF(PointSpreadFunction):
@@ -207,7 +206,6 @@ class AnnularAperturePSF(PointSpreadFunction):
         return np.asarray((_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner))
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class GaussianPSF(PointSpreadFunction):
@@ -229,7 +227,6 @@ class GaussianPSF(PointSpreadFunction):
         return np.outer(line, line)
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class MeasuredPSF(PointSpreadFunction):
     """A measured kernel, such as one found with a knife edge.
@@ -349,7 +346,6 @@ class ApertureChoice(PSFChoice):
         return magnification / (2 * self.f_number * (1 + magnification))
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class AiryAperture(ApertureChoice):
@@ -372,7 +368,6 @@ class AiryAperture(ApertureChoice):
         return AnnularAperturePSF(wavelength, self.aperture(magnification), 0.0)
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class MeasuredPSFFile(PSFChoice):

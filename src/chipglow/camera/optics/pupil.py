@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, factorial, log2, pi, sqrt
 from numbers import Integral, Real
-from typing import Annotated, Any, ClassVar, Final, final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +117,6 @@ SourceTemperature = Annotated[
 ]
 
 
-@final
 @dataclass(frozen=True)
 class PupilPSF(PointSpreadFunction):
     """Diffraction of a pupil with obscuration, defocus and aberrations, over a camera's band.
@@ -322,7 +321,6 @@ class PupilPSF(PointSpreadFunction):
         return np.asarray(path)
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class Pupil(ApertureChoice):

@@ -4,7 +4,7 @@ from abc import ABC
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import log, sqrt
-from typing import Annotated, ClassVar, Final, TypeAlias, final
+from typing import Annotated, ClassVar, Final, TypeAlias
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -48,7 +48,6 @@ class OpticsTerm(Part, ABC):
         return radiance
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class OpticalElement(OpticsTerm):
@@ -85,7 +84,6 @@ class OpticalElement(OpticsTerm):
         return radiance + (own - seen) * lost / self.transmittance
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Narcissus(OpticsTerm):
@@ -126,7 +124,6 @@ class Narcissus(OpticsTerm):
         return np.asarray(radiance - self.reflectance * missing * profile)
 
 
-@final
 @dataclass(frozen=True)
 class VeilPSF(PointSpreadFunction):
     """Density of scattered light: h / (2π √3 (r² + h² / 3)^(3/2)) per area."""
@@ -150,7 +147,6 @@ class VeilPSF(PointSpreadFunction):
         return self.radius / sqrt(3)
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Veil(OpticsTerm):
@@ -175,7 +171,6 @@ class Veil(OpticsTerm):
         return (1 - self.fraction) * radiance + self.fraction * veil
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Distortion(OpticsTerm):
@@ -209,7 +204,6 @@ class Distortion(OpticsTerm):
         return np.asarray(map_coordinates(radiance, places, order=1, mode="nearest"))
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class FieldBlur(OpticsTerm):
