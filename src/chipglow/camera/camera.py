@@ -16,7 +16,7 @@ from chipglow.camera.detector.terms import Lag, follows
 from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import Beyond, blur, image_on_pixels
+from chipglow.camera.optics.convolution import Beyond, blur, images_on_pixels
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
@@ -284,11 +284,13 @@ class Camera(Part):
         alike, starts, effects, grids = [], [], [], set()
         for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
             scene = exposure.raster
-            images.append(self.form_image(exposure.mean_radiance, scene))
-            alike.append(self._image_of_like(exposure.mean_radiance, scene))
+            pixels = self.pixels(scene)
+            image, within = self._both(exposure.mean_radiance, scene)
+            images.append(self._show(image, pixels))
+            alike.append(self._show(within / self._own_light(scene), pixels))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
-            grids.add(self.pixels(scene))
+            grids.add(pixels)
         if len(grids) != 1:
             raise ValueError("camera: one or more exposures of the same grid are required")
         measured = self.measurement(np.stack(images), np.array(starts), scene)
@@ -354,15 +356,26 @@ class Camera(Part):
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
+        if self._forms_on_pixels:
+            return self._both(image, scene)[0]
         return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
+
+    @property
+    def _forms_on_pixels(self) -> bool:
+        """Whether the image is needed nowhere but on the pixels."""
+        return self.psf is not None and self.psf_order == "optics" and not self.optics
+
+    def _both(self, image: Array, scene: Raster) -> tuple[Array, Array]:
+        """Return the radiance that the pixels receive, as at the edges or nothing beyond."""
+        if self.psf is not None and self._forms_on_pixels:
+            pixels, sensitive = self.pixels(scene), self._sensitive(scene)
+            return images_on_pixels(image, self.psf, scene, pixels, sensitive)
+        return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
 
     def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
         """Return the radiance that the pixels receive: point spread function, optics, footprint."""
         pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
-            if not self.optics:
-                sensitive = self._sensitive(scene)
-                return image_on_pixels(image, self.psf, scene, pixels, sensitive, beyond)
             image = blurred(image, self.psf, scene.spacing)
         for term in self.optics:
             image = term.on_samples(image, scene, pixels, blurred)
@@ -378,15 +391,10 @@ class Camera(Part):
             image = term.on_pixels(image, pixels, self.band)
         return image
 
-    def _image_of_like(self, image: Array, scene: Raster) -> Array:
-        """Return the image if each pixel saw beyond the scene the like of what it sees within."""
-        within = self._collect(image, scene, "nothing") / self._own_light(scene)
-        return self._show(within, self.pixels(scene))
-
     @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
     def _own_light(self, scene: Raster) -> Array:
         """Return the fraction of each pixel's light that comes from within the scene."""
-        fraction = self._collect(np.ones(scene.shape), scene, "nothing")
+        _, fraction = self._both(np.ones(scene.shape), scene)
         return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
 
     def _sensitive(self, scene: Raster) -> float:
