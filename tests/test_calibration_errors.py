@@ -1,14 +1,11 @@
 """The calibration's and the tool's errors in what is read of a chip, by drawing them anew."""
 
-import csv
 from dataclasses import replace
 from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
-from typer.testing import CliRunner
 
 from chipglow.camera import (
     CalibrationErrors,
@@ -17,19 +14,16 @@ from chipglow.camera import (
     SakumaHattori,
     fit_calibration,
 )
-from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
-from chipglow.laboratory.chip.figures import draw_rake_grid
-from chipglow.laboratory.comparison import StatedUncertainties, compare
+from chipglow.laboratory.comparison import compare
 from chipglow.scene import PlacedTool
-from chipglow.uncertainty import Estimate, draw
+from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
 SLOPE = np.array([2e5, 1e5])
 CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
 FOUND = ToolUncertainty(along=3e-6, across=1e-6, angle=radians(0.3), pivot=70e-6)
-WIDE = ToolUncertainty(along=16e-6, across=2e-6, angle=radians(1.5), pivot=70e-6)
 BODIES = np.arange(300.0, 701.0, 50.0) + 273.15
 DRAWS = 20_000
 
@@ -185,15 +179,6 @@ def test_the_calibration_alone_is_as_drawn():
     assert mean > 0.8 * estimate.contribution("calibration").min()
 
 
-def test_draws_of_an_estimate_are_of_its_calibration():
-    fit = fit_calibration(
-        LinearCalibration, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0
-    ).calibration
-    grid = rake_grid(looked_at(fit), TOOL)
-    (values,) = draw([grid.frame_estimate[0, 1:3]], 4000, np.random.default_rng(2))
-    assert np.corrcoef(values.T)[0, 1] == pytest.approx(1.0, abs=1e-3)
-
-
 def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
     fit = fit_calibration(SakumaHattori, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
     measurement = looked_at(fit)
@@ -265,80 +250,11 @@ def test_impossible_errors_are_refused(radiance, effects, message):
         CalibrationErrors(np.array(radiance), np.array(effects))
 
 
-def test_a_table_of_errors_without_its_radiance_is_refused():
-    data = measured([np.full(RASTER.shape, 700.0)], relative_uncertainty=0.01).data
-    for wrong in (data.drop_vars("calibration_radiance"), data.transpose(..., "calibration_error")):
-        with pytest.raises(ValueError, match=r"'calibration_errors' over .* is missing"):
-            _ = Measurement(wrong).calibration_errors
-
-
-def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_measurement(measured(images(600.0), relative_uncertainty=0.01), tmp_path / "m.nc")
-    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
-    assert result.exit_code == 0, result.output
-    estimate = rake_grid(read_measurement("m.nc")).estimate
-    with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
-        rows = list(csv.DictReader(table))
-    for column in ("calibration_uncertainty_K", "standard_uncertainty_K"):
-        found = [float(row[column] or "nan") for row in rows]
-        expected = estimate.contribution("calibration").ravel()
-        np.testing.assert_allclose(found, expected, atol=1e-3)
-    most = np.nanmax(expected)
-    lines = [line.split() for line in result.output.splitlines()]
-    (line,) = (line for line in lines if line[:1] == ["calibration"])
-    assert float(line[-1]) == pytest.approx(most, rel=0.05)
-    assert "Errors of calibration move all squares together" in result.output
-
-
-@pytest.mark.parametrize("known", [0.01, None])
-def test_the_picture_has_a_band_where_the_calibration_is_known(known):
-    frames = measured(images(600.0), relative_uncertainty=known)
-    figure = draw_rake_grid(frames, rake_grid(frames))
-    profiles = figure.axes[1]
-    bands = [one for one in profiles.collections if isinstance(one, PolyCollection)]
-    assert bool(bands) is (known is not None)
-    assert ("standard uncertainty" in profiles.get_title("left")) is (known is not None)
-
-
 # Beside simulations
 
 
 def images(base):
     return [BandImage(shift=shift, base=base).temperature() for shift in (-6e-6, -3e-6, 0.0, 3e-6)]
-
-
-@pytest.mark.parametrize(
-    ("curve", "stated", "expected"),
-    [
-        (
-            None,
-            StatedUncertainties(3.0, 0.02, tool=WIDE),
-            (1348.2729825857812, 308.83206070633275, 9.794418503589467, 5.1855947049657996),
-        ),
-        (
-            None,
-            StatedUncertainties(1.0, 0.01),
-            (369.483962039152, 147.12893747912335, 2.824933947757538, 2.198074173848494),
-        ),
-        (
-            CURVE,
-            StatedUncertainties(1.0, 0.01, 4e-6, WIDE),
-            (1344.274336927997, 1812.0104102450234, 9.398151146032033, 54.569773309383415),
-        ),
-    ],
-    ids=["tool", "pixel", "curve"],
-)
-def test_a_comparison_without_calibration_keeps_its_numbers(curve, stated, expected):
-    """Numbers of the version that worked out the tool's part by itself."""
-    sets = {"cold": measured(images(595.0)), "hot": measured(images(612.0), noise=2.0, seed=4)}
-    result = compare(measured(images(600.0), noise=4.0, seed=2), sets, TOOL, curve, stated)
-    assert result.grid is not None and result.band is not None
-    found = [
-        *(np.nansum(pair.measured.standard_uncertainty) for pair in (result.grid, result.band)),
-        *(result.places[index].fits[0].bias_uncertainty for index in (0, 2)),
-    ]
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_a_comparison_has_the_calibration_of_its_squares():

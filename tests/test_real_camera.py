@@ -18,7 +18,6 @@ from chipglow.camera import (
 )
 from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
 from chipglow.radiometry import Band, ObjectParameters
-from chipglow.text import Notes
 
 BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.linspace(573.15, 1273.15, 8)
@@ -61,14 +60,6 @@ def test_one_point_corrects_the_offset_only():
     np.testing.assert_allclose(
         elsewhere - np.median(elsewhere), 2000.0 * (gain - np.median(gain))[None], atol=60
     )
-
-
-def test_a_sensor_that_does_not_answer_has_no_signal():
-    cold, hot = uniform(1000.0), uniform(5000.0)
-    hot[:, 3, 4] = cold[:, 3, 4]
-    corrected = NonUniformity.two_point(cold, hot).apply(cold)
-    assert np.isnan(corrected[:, 3, 4]).all()
-    assert np.isnan(corrected).sum() == len(cold)
 
 
 def test_bad_sensors_are_found_by_what_is_wrong_with_them():
@@ -222,23 +213,6 @@ def test_what_the_camera_was_told_is_taken_back(
     assert measured.data.attrs["object_parameters"].endswith("taken back")
 
 
-def test_without_object_parameters_it_is_said_what_is_assumed():
-    measured = calibrate_recording(recording(np.full((1, 2, 2), 900.0), "temperature"))
-    np.testing.assert_allclose(measured.radiance_temperature(), 900.0, atol=1e-3)
-    assert "emissivity of 1" in measured.data.attrs["assumed"]
-    assert "lower left corner" in measured.data.attrs["assumed"]
-    assert "not known" in measured.data.attrs["warnings"]
-    assert measured.calibration_uncertainty is None
-
-
-def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful():
-    said = Notes(["An even rate."], ["A gap."], ["Lens: 25 mm."])
-    measured = calibrate_recording(recording(np.full((1, 2, 2), 9.0), "radiance", notes=said))
-    assert measured.data.attrs["remarks"] == "Lens: 25 mm."
-    assert "An even rate." in measured.notes.assumed
-    assert "A gap." in measured.notes.warnings
-
-
 def test_radiance_is_taken_as_it_is():
     radiance = np.array([[[1000.0, np.inf, -5.0]]])
     told = ObjectParameters(emissivity=0.5)
@@ -266,14 +240,6 @@ def test_full_counts_are_doubted_unless_the_saturation_is_known():
     known = calibrate_recording(recording(counts, saturation=4094), LINE)
     assert "warnings" not in known.data.attrs
     assert (known.flags[0, :2, 0] == Flag.SATURATED).all()
-
-
-def test_what_the_file_does_not_say_is_the_calibrations():
-    calibration = replace(LINE, integration_time=1e-5, range_name="A")
-    measured = calibrate_recording(recording(np.ones((1, 2, 2)), band=None), calibration)
-    assert "integration time is the calibration's" in measured.data.attrs["assumed"]
-    assert "range is the calibration's, A" in measured.data.attrs["assumed"]
-    assert measured.data.attrs["integration_time"] == 1e-5
 
 
 def calibrated(quantity="counts", calibration=LINE, arguments=(), **known):
