@@ -16,7 +16,7 @@ import pyvista
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
-from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.mesh import Meshes, MeshSource
 from chipglow.scene import Raster
 from chipglow.scene.rasterise import rasterise
 
@@ -110,16 +110,13 @@ def whole_frame(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> No
         grid.save(path)
         source = MeshSource(path)
         size = path.stat().st_size / 1e6
-        least, median = timed(lambda: source._reader().read(0), 3)
+        meshes = Meshes(source)
+        least, median = timed(lambda: meshes.reader.read(0), 3)
         print(f"\nA frame of {len(triangles)} triangles from a file of {size:.0f} MB:")
         print(f"read {least:.0f} ms least, {median:.0f} ms median;", end=" ")
-        reader = source._reader()
-        ends, restricted = source._ends(reader)
-        found = source._found(reader, ends[0], restricted)
 
         def sampled():
-            blocks = restricted.of_blocks(source._read(reader, 0))
-            return source._sampled(source._flat(reader, 0, blocks, found), 0.0, RASTER, found)
+            return meshes.sampled(meshes.flat(0, meshes.read(0)), 0.0, RASTER)
 
         least, median = timed(sampled, 3)
         print(f"read and sampled {least:.0f} ms least, {median:.0f} ms median")

@@ -18,7 +18,6 @@ from pointing import POINTING, point_elsewhere
 from refusals import PNG, refused_on
 
 from chipglow.io.sources import Placement, Units
-from chipglow.io.sources.arrays import open_arrays
 from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
 from chipglow.quantities.units import (
@@ -547,16 +546,18 @@ def test_hdf5_that_points_to_other_files(tmp_path, kind):
     refused(a_source(str(tmp_path / "T.h5")), "T.h5: 'T' is in another file, expected all data")
 
 
-def test_csv_with_a_very_long_line(tmp_path):
-    (tmp_path / "T.csv").write_text("1," * 10**7 + "1\n")
-    refused(a_source(str(tmp_path / "T.csv")), "a line has over 4000000 letters")
-
-
-def test_csv_with_text_and_ragged_lines(tmp_path):
-    (tmp_path / "T.csv").write_text("300,301\n302,hot\n")
-    refused(a_source(str(tmp_path / "T.csv")), "column 2: has text in it")
-    (tmp_path / "T.csv").write_text("300,301\n302,303,304\n")
-    refused(a_source(str(tmp_path / "T.csv")), "T.csv")
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("1," * 10**7 + "1\n", "a line has over 4000000 letters"),
+        ("300,301\n302,hot\n", "column 2: has text in it"),
+        ("300,301\n302,303,304\n", "T.csv"),
+    ],
+    ids=["long", "text", "ragged"],
+)
+def test_csv_that_is_no_matrix(tmp_path, text, said):
+    (tmp_path / "T.csv").write_text(text)
+    refused(a_source(str(tmp_path / "T.csv")), said)
 
 
 def of_scipy(name):
@@ -632,14 +633,6 @@ def test_coordinates_that_go_wrong(tmp_path):
 def test_impossible_arguments(changed, text):
     with pytest.raises(ValueError, match=text):
         GridSource(**{"files": "T.npy", **changed})
-
-
-def test_names_with_numbers_follow_each_other(tmp_path):
-    for number in (2, 10, 1):
-        np.save(tmp_path / f"T{number}.npy", np.full((2, 2), float(number)))
-    arrays = open_arrays(str(tmp_path / "T*.npy"), None)
-    assert list(arrays) == ["T"]
-    np.testing.assert_array_equal(arrays["T"].read((slice(None),) * 3)[:, 0, 0], [1, 2, 10])
 
 
 def test_a_list_t_is_the_time_and_an_array_t_the_temperature(tmp_path):

@@ -20,10 +20,10 @@ from chipglow.scene import Raster, SampledFrame
 MEMORY: Final = 2 * 1024**3
 """What a reader may take for itself, in bytes."""
 
-PATIENCE: Final = 30.0
-"""How long a reader may take for one answer about the smallest file, in s.
+PATIENCE: Final = 60.0
+"""Maximum time in s for one answer about the smallest file.
 
-A process takes about 6 s to start on a machine with four times as much to do as it has cores.
+With five times as many busy processes as cores, starting a reader took 30 s.
 """
 
 PATIENCE_PER_BYTE: Final = 1e-6

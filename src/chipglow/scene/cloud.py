@@ -15,8 +15,8 @@ import scipy
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.scene.frame import Material
 from chipglow.scene.raster import Raster
-from chipglow.scene.scene import Material
 
 _SMOOTHING: Final = 1.4
 _SHARPNESS: Final = 0.75

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import SPEED, TEMPERATURE, Position
-from chipglow.scene.motion import optical_flow, strain_rate_along
-from chipglow.scene.nearest import fill
-from chipglow.scene.polygon import in_polygon
-from chipglow.scene.raster import Raster
-from chipglow.scene.sampled import SampledFrame
-from chipglow.scene.scene import (
+from chipglow.scene.frame import (
     FILLED,
     MATERIAL_COORDINATE_UNITS,
     QUALITY,
@@ -23,6 +18,11 @@ from chipglow.scene.scene import (
     Material,
     SceneError,
 )
+from chipglow.scene.motion import optical_flow, strain_rate_along
+from chipglow.scene.nearest import fill
+from chipglow.scene.polygon import in_polygon
+from chipglow.scene.raster import Raster
+from chipglow.scene.sampled import SampledFrame
 from chipglow.scene.tool import Tool
 
 STRAIN_OF_CHIP: Final = 1.0

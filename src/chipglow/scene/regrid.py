@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from chipglow.scene.scene import Material
+from chipglow.scene.frame import Material
 
 Taps = tuple[NDArray[np.int64], NDArray[np.float64]]
 _KINDS = len(Material)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.scene.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
+from chipglow.scene.frame import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
 
 READABLE: Final = tuple(
     name for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS) if name != "material"

@@ -2,8 +2,6 @@
 
 from collections.abc import Collection, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass, field as declared
-from enum import IntEnum
 from functools import cached_property
 from itertools import pairwise
 from math import isfinite
@@ -14,6 +12,14 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.scene.frame import (
+    FIELD_UNITS,
+    MATERIAL_COORDINATE_UNITS,
+    QUALITY,
+    Frame,
+    Material,
+    SceneError,
+)
 from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
@@ -23,28 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from chipglow.scene.splines import SplineFrame
-
-FIELD_UNITS: Final[Mapping[str, str]] = {
-    "temperature": "K",
-    "plastic_strain": "1",
-    "plastic_strain_rate": "1/s",
-    "velocity_x": "m/s",
-    "velocity_y": "m/s",
-    "material": "1",
-}
-"""The fields of a cut, and their units. Temperature alone is enough for a scene."""
-
-MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "material_y": "m"}
-"""Where each point was before the cut: optional, both or none."""
-
-QUALITY: Final = "quality"
-"""Name of an optional field that says how far each sample of an imported scene can be trusted.
-
-0 to 254: distance of the colour in a movie from the colour scale, in units of CIE L*a*b* (0 where
-the source gives numbers); `FILLED`: the source shows nothing there, the value is its neighbours'.
-"""
-
-FILLED: Final = 255
 
 FORCE_UNITS: Final[Mapping[str, str]] = {"cutting_force": "N/m", "thrust_force": "N/m"}
 """Force history on `force_time`, per width of cut: optional, both or none."""
@@ -77,42 +61,6 @@ _LONGEST_STEP: Final = 2.0
 def is_gap(steps: NDArray[np.float64], frame_spacing: float) -> NDArray[np.bool_]:
     """Tell which times between frames are gaps: those of over twice the usual one."""
     return np.asarray(steps > _LONGEST_STEP * frame_spacing)
-
-
-class Material(IntEnum):
-    """What a sample of the scene shows."""
-
-    VOID = 0
-    WORKPIECE = 1
-    TOOL = 2
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
-
-    What a scene does not have, or was not asked for, is None. A scene without material is
-    workpiece everywhere. `splines` is what the fields were sampled from, where they were.
-    """
-
-    time: float
-    temperature: NDArray[np.float32]
-    material: NDArray[np.uint8]
-    plastic_strain: NDArray[np.float32] | None = None
-    plastic_strain_rate: NDArray[np.float32] | None = None
-    velocity_x: NDArray[np.float32] | None = None
-    velocity_y: NDArray[np.float32] | None = None
-    material_x: NDArray[np.float32] | None = None
-    material_y: NDArray[np.float32] | None = None
-    quality: NDArray[np.uint8] | None = None
-    splines: "SplineFrame | None" = declared(default=None, repr=False)
-
-    def needed(self, name: str) -> NDArray[np.float32]:
-        """Return a field of `FIELD_UNITS` or raise a SceneError."""
-        values: NDArray[np.float32] | None = getattr(self, name)
-        if values is None:
-            raise SceneError(f"scene: has no {name}, expected it: this needs it")
-        return values
 
 
 class Scene:
@@ -327,10 +275,6 @@ _ALWAYS: Final = ("temperature", "material")
 _BYTES: Final = ("material", QUALITY)
 _VELOCITY: Final = ("velocity_x", "velocity_y")
 _MATERIALS: Final = ", ".join(f"{m.value} ({m.name.lower()})" for m in Material)
-
-
-class SceneError(ValueError):
-    """Fields that break the contract of a scene."""
 
 
 def _as_stored(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:

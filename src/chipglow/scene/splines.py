@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.scene.frame import Frame, Material
 from chipglow.scene.raster import Raster
-from chipglow.scene.scene import Frame, Material
 
 SPLINE_FIELDS: Final = (
     "temperature",

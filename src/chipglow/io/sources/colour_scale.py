@@ -23,7 +23,6 @@ _LEVELS: Final = 256
 _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
 _APART: Final = 15.0
 _CHORD: Final = 0.01  # half of the fraction of the scale over which its slope is taken
-_BAND_JUMP: Final = 3.0
 _FEWEST_BANDS, _MOST_BANDS = 4, 40
 _NARROWEST_BAND: Final = 6
 _BLURRED: Final = 2.0
@@ -63,18 +62,18 @@ class ColourScale:
     """Whether each colour stands for a band of values; otherwise values are interpolated."""
 
     def __post_init__(self) -> None:
-        least = 1 if self.banded else 2
-        if self.values.ndim != 1 or len(self.values) < least:
-            raise SourceError(f"colours: expected {least} or more, got {self.values.shape}")
-        if not np.isfinite(self.values).all() or (np.diff(self.values) <= 0).any():
-            raise SourceError("colours: the values of the scale must be finite and ascend")
-        if self.colours.shape != (len(self.values), 3):
+        """Refuse a scale that returns to a colour that it left."""
+        chosen = np.unique(np.linspace(0, len(self.knots) - 1, 192).astype(int))
+        labs = self.labs[chosen]
+        apart = np.triu(np.linalg.norm(labs[:, None] - labs[None, :], axis=2))
+        left = np.maximum.accumulate(apart, axis=1) > _APART
+        back = np.argwhere(left & (apart < _SAME) & np.triu(np.ones_like(left), 1))
+        if len(back):
+            first, second = self.knots[chosen[back[0]]]
             raise SourceError(
-                f"colours: have shape {self.colours.shape}, expected ({len(self.values)}, 3)"
+                f"colours: {first:.5g} and {second:.5g} have the same colour, expected a scale "
+                "that never returns to one"
             )
-        if not ((self.colours >= 0) & (self.colours <= 1)).all():
-            raise SourceError("colours: expected red, green and blue of 0 to 1")
-        self._refuse_colours_that_come_back()
 
     @classmethod
     def named(cls, name: str, values: tuple[float, float], bands: int = 0) -> "ColourScale":
@@ -92,7 +91,7 @@ class ColourScale:
     def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":
         """Return the scale of a legend's colours, shape (n, 3), and values at its two edges.
 
-        It has bands if its colour stands still except for jumps.
+        It has bands if these are equally wide.
         """
         colours = pixels / 255.0
         count = _equal_bands(colours)
@@ -100,33 +99,16 @@ class ColourScale:
             ends = pairwise(np.linspace(0, len(pixels), count + 1))
             plain = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
             return cls._linear(plain, values, banded=True)
-        steps = np.linalg.norm(np.diff(lab(colours), axis=0), axis=1)
-        jumps = np.flatnonzero(steps > _BAND_JUMP)
-        banded = 0 < len(jumps) < len(pixels) / 4 and steps[jumps].sum() > 0.8 * steps.sum()
-        first, last = values
-        if banded:
-            parts = _bands(colours, jumps)
-            edges = np.array([0, *(part.stop for part in parts)])
-            middles = (edges[1:] + edges[:-1]) / 2
-            chosen = np.array([np.median(colours[part], axis=0) for part in parts])
-        else:
-            middles, chosen = np.arange(len(pixels)) + 0.5, colours
-        return cls._sorted(first + (last - first) * middles / len(pixels), chosen, banded)
+        return cls._linear(colours, values, banded=False)
 
     @classmethod
     def _linear(
         cls, colours: NDArray[np.float64], values: tuple[float, float], *, banded: bool
     ) -> "ColourScale":
         first, last = values
-        places = (np.arange(len(colours)) + 0.5) / len(colours)
-        return cls._sorted(first + (last - first) * places, colours, banded)
-
-    @classmethod
-    def _sorted(
-        cls, values: NDArray[np.float64], colours: NDArray[np.float64], banded: bool
-    ) -> "ColourScale":
-        order = slice(None, None, 1 if values[-1] > values[0] else -1)
-        return cls(values[order], colours[order], banded)
+        places = first + (last - first) * (np.arange(len(colours)) + 0.5) / len(colours)
+        order = slice(None, None, 1 if last > first else -1)
+        return cls(places[order], colours[order], banded)
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:
@@ -155,33 +137,24 @@ class ColourScale:
         return np.append(0, edges), np.append(edges, len(self.values)) - 1
 
     @cached_property
-    def slope(self) -> NDArray[np.float64]:
-        """Change of the value per unit of CIE L*a*b*, over 2 % of the scale, shape (m,)."""
-        rise, chord = self._chords
-        return np.asarray(rise / _lengths(chord))
-
-    @cached_property
     def sensitivity(self) -> NDArray[np.float64]:
         """Standard deviation of the value for a root mean square distance of 1, shape (m,).
 
         The noise is equally large in red, green and blue: it has one component along the scale,
         which changes the value, and two across, which make the distance.
         """
-        chord = self._chords[1]
-        tangent = chord / _lengths(chord)[:, None]
-        change = _lab_per_colour(self.colours[self._runs[0]])
-        along = (np.einsum("nij,ni->nj", change, tangent) ** 2).sum(axis=1)
-        across = (change**2).sum(axis=(1, 2)) - along
-        return np.asarray(self.slope * np.sqrt(along / across))
-
-    @cached_property
-    def _chords(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Change of value and of L*a*b* about each colour."""
         count = len(self.knots)
         reach = max(1, round(_CHORD * count))
         above = np.minimum(np.arange(count) + reach, count - 1)
         below = np.maximum(np.arange(count) - reach, 0)
-        return self.knots[above] - self.knots[below], self.labs[above] - self.labs[below]
+        chord = self.labs[above] - self.labs[below]
+        # Where the colour stands still it is known to a rounding of 8 bits.
+        length = np.maximum(np.linalg.norm(chord, axis=1), 0.1)
+        change = _lab_per_colour(self.colours[self._runs[0]])
+        along = (np.einsum("nij,ni->nj", change, chord / length[:, None]) ** 2).sum(axis=1)
+        across = (change**2).sum(axis=(1, 2)) - along
+        slope = (self.knots[above] - self.knots[below]) / length
+        return np.asarray(slope * np.sqrt(along / across))
 
     def invert(self, picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return values and distances of a picture's colours, shape (y, x), float32.
@@ -201,20 +174,6 @@ class ColourScale:
     def _known(self) -> NDArray[np.float32]:
         """Value and 1 + distance of every colour; 0 where it was not asked for yet."""
         return np.zeros((1 << 24, 2), np.float32)
-
-    def _refuse_colours_that_come_back(self) -> None:
-        """Refuse a scale that returns to a colour that it left."""
-        chosen = np.unique(np.linspace(0, len(self.knots) - 1, 192).astype(int))
-        labs = self.labs[chosen]
-        apart = np.triu(np.linalg.norm(labs[:, None] - labs[None, :], axis=2))
-        left = np.maximum.accumulate(apart, axis=1) > _APART
-        back = np.argwhere(left & (apart < _SAME) & np.triu(np.ones_like(left), 1))
-        if len(back):
-            first, second = self.knots[chosen[back[0]]]
-            raise SourceError(
-                f"colours: {first:.5g} and {second:.5g} have the same colour, expected a scale "
-                "that never returns to one"
-            )
 
 
 @dataclass(frozen=True)
@@ -255,11 +214,6 @@ def colour_uncertainty(
 
 def _root_mean_square(values: NDArray[np.float64]) -> float:
     return float(np.sqrt((values**2).mean())) if values.size else 0.0
-
-
-def _lengths(chords: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return lengths of chords, at least that of a rounding of 8 bits."""
-    return np.asarray(np.maximum(np.linalg.norm(chords, axis=1), 0.1))
 
 
 def _lab_per_colour(colours: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -322,17 +276,6 @@ def _inner(colours: NDArray[np.float64], first: float, last: float) -> NDArray[n
     trim = min(_BLURRED, (last - first) / 4)
     start = int(np.ceil(first + trim - 0.5))
     return colours[start : max(int(last - trim + 0.5), start + 1)]
-
-
-def _bands(colours: NDArray[np.float64], jumps: NDArray[np.intp]) -> list[slice]:
-    """Return runs of one colour between jumps; a few blurred pixels go to the next run."""
-    edges = [0, *(int(jump) + 1 for jump in jumps), len(colours)]
-    longest = max(np.diff(edges))
-    kept = [0]
-    for edge in edges[1:]:
-        if edge - kept[-1] > longest / 3 or edge == len(colours):
-            kept.append(edge)
-    return [slice(first, last) for first, last in pairwise(kept)]
 
 
 @njit(cache=True)

@@ -12,7 +12,7 @@ from chipglow.io.sources.source import SourceError
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION, SI, Unit, parse_unit
 from chipglow.scene import READABLE
-from chipglow.scene.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
+from chipglow.scene.frame import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
 
 SI_UNITS: Final[Mapping[str, str]] = {
     **FIELD_UNITS,

@@ -43,17 +43,16 @@ def find_legend(picture: Picture) -> Box | None:
     if best is None:
         return None
     # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
-    within = [box for box in boxes if _is_within(box, best)]
-    return _extended(picture, min(within, key=_area))
-
-
-def _is_within(box: Box, outer: Box) -> bool:
-    inward = (box[0] - outer[0], box[1] - outer[1], outer[2] - box[2], outer[3] - box[3])
-    return all(0 <= pixels <= _BLUR for pixels in inward)
-
-
-def _area(box: Box) -> int:
-    return (box[2] - box[0]) * (box[3] - box[1])
+    left, top, right, bottom = best
+    within = [
+        box
+        for box in boxes
+        if 0 <= box[0] - left <= _BLUR
+        and 0 <= box[1] - top <= _BLUR
+        and 0 <= right - box[2] <= _BLUR
+        and 0 <= bottom - box[3] <= _BLUR
+    ]
+    return _extended(picture, min(within, key=lambda box: (box[2] - box[0]) * (box[3] - box[1])))
 
 
 def is_cut(picture: Picture, box: Box) -> bool:
@@ -112,14 +111,11 @@ def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
         labs = labs[np.linalg.norm(labs - lab(np.array(colour) / 255.0), axis=1) > MARK_TOLERANCE]
     if not len(labs):
         return 0.0
-    apart = np.linalg.norm(labs[:, None] - _path(scale)[None], axis=2).min(axis=1)
+    known = scale.labs
+    if not scale.banded:
+        known = np.concatenate([known, (known[1:] + known[:-1]) / 2])
+    apart = np.linalg.norm(labs[:, None] - known[None], axis=2).min(axis=1)
     return float((apart < MARK_TOLERANCE).mean())
-
-
-def _path(scale: ColourScale) -> NDArray[np.float64]:
-    """Return the colours of a scale, and those between two of them."""
-    labs = scale.labs
-    return labs if scale.banded else np.concatenate([labs, (labs[1:] + labs[:-1]) / 2])
 
 
 def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:

@@ -110,10 +110,10 @@ class MeshSource(Source, Part):
         return (str(self.files),) if alone else (str(self.files), str(self.files.parent))
 
     def survey(self) -> Survey:
-        meshes = _Meshes(self)
+        meshes = Meshes(self)
+        flat = [meshes.flat(number, blocks) for number, blocks in meshes.ends.items()]
         found, notes = meshes.found, Notes(meshes.assumptions(), remarks=meshes.remarks())
         times = meshes.times(notes)
-        flat = [meshes.flat(number, blocks) for number, blocks in meshes.ends.items()]
         return Survey(
             meshes.reader.kind,
             times,
@@ -125,14 +125,14 @@ class MeshSource(Source, Part):
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        meshes = _Meshes(self)
+        meshes = Meshes(self)
         times = meshes.times(Notes())
         for number in range(start, meshes.reader.count):
             mesh = meshes.flat(number, meshes.read(number))
             yield meshes.sampled(mesh, float(times[number]), raster)
 
 
-class _Meshes:
+class Meshes:
     """A source that is open."""
 
     def __init__(self, source: MeshSource) -> None:

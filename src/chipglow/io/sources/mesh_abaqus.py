@@ -83,77 +83,63 @@ def _tables(file: Path) -> list[tuple[Path, ...]]:
 
 
 def _read_deck(file: Path) -> _Deck:
-    deck = _Deck()
-    keyword, options = "", dict[str, str]()
-    waiting: list[int] = []
-    instances, outside = 0, False
-    with file.open(encoding="utf-8", errors="replace") as stream:
-        for number, line in enumerate(stream, start=1):
-            text = line.strip()
-            if not text or text.startswith("**"):
-                continue
-            if text.startswith("*"):
-                keyword, options = _keyword(text)
-                waiting = []
-                instances += keyword == "INSTANCE"
-                # Nodes of the assembly itself are points of reference with labels of their own.
-                if keyword in _ASSEMBLY:
-                    outside = keyword in ("ASSEMBLY", "END INSTANCE")
-                if keyword == "INCLUDE" or instances > 1:
-                    raise SourceError(
-                        f"{file}: line {number}: *{keyword} is not read, expected an input file "
-                        "with all nodes and elements in it and one instance at most"
-                    )
-            elif keyword == "INSTANCE":
-                raise SourceError(
-                    f"{file}: line {number}: the instance is moved, expected one that is not"
-                )
-            elif not (outside and keyword == "NODE"):
-                try:
-                    waiting = _take(deck, keyword, options, waiting, text)
-                except (ValueError, KeyError, IndexError) as error:
-                    raise SourceError(
-                        f"{file}: line {number}: {text[:60]!r} is no data of *{keyword} ({error})"
-                    ) from None
+    text = re.sub(r"(?m)^\s*\*\*.*$", "", file.read_text(encoding="utf-8", errors="replace"))
+    deck, instances, outside = _Deck(), 0, False
+    for part in re.split(r"(?m)^\s*\*", text)[1:]:
+        head, *lines = part.split("\n")
+        rows = [[word.strip() for word in line.split(",") if word.strip()] for line in lines]
+        keyword, options = _keyword(head)
+        instances += keyword == "INSTANCE"
+        # Nodes of the assembly itself are points of reference with labels of their own.
+        if keyword in _ASSEMBLY:
+            outside = keyword in ("ASSEMBLY", "END INSTANCE")
+        if keyword == "INCLUDE" or instances > 1:
+            raise SourceError(
+                f"{file}: *{keyword} is not read, expected an input file with all nodes and "
+                "elements in it and one instance at most"
+            )
+        if keyword == "INSTANCE" and any(rows):
+            raise SourceError(f"{file}: the instance is moved, expected one that is not")
+        try:
+            if not (outside and keyword == "NODE"):
+                _take(deck, keyword, options, [row for row in rows if row])
+        except (ValueError, KeyError, IndexError) as error:
+            raise SourceError(f"{file}: *{keyword}: {error}") from None
     if not deck.nodes or not deck.elements:
         raise SourceError(f"{file}: has no *NODE and *ELEMENT, expected an Abaqus input file")
     return deck
 
 
 def _keyword(text: str) -> tuple[str, dict[str, str]]:
-    name, *rest = text[1:].split(",")
+    name, *rest = text.split(",")
     pairs = (option.partition("=") for option in rest)
     return name.strip().upper(), {key.strip().upper(): value.strip() for key, _, value in pairs}
 
 
 def _take(
-    deck: _Deck, keyword: str, options: Mapping[str, str], waiting: list[int], text: str
-) -> list[int]:
-    """Take a line of data; return numbers of an element that continues in the next line."""
-    words = [word for word in (word.strip() for word in text.split(",")) if word]
+    deck: _Deck, keyword: str, options: Mapping[str, str], rows: Sequence[Sequence[str]]
+) -> None:
+    """Take the lines of data of a keyword; those of an element may continue in the next line."""
     if keyword == "NODE":
-        x, y, z = (*(float(word) for word in words[1:4]), 0.0, 0.0)[:3]
-        deck.nodes[int(words[0])] = (x, y, z)
+        for label, *words in rows:
+            x, y, z = (*(float(word) for word in words[:3]), 0.0, 0.0)[:3]
+            deck.nodes[int(label)] = (x, y, z)
     elif keyword == "ELEMENT":
         count, kind = _element(options["TYPE"])
-        numbers = [*waiting, *(int(word) for word in words)]
-        if len(numbers) <= count:
-            return numbers
-        label, nodes = numbers[0], tuple(numbers[1 : count + 1])
-        deck.elements[label] = (kind, nodes)
+        numbers = np.array([int(word) for row in rows for word in row]).reshape(-1, count + 1)
+        found = {label: (kind, tuple(nodes)) for label, *nodes in numbers.tolist()}
+        deck.elements |= found
         if "ELSET" in options:
-            deck.sets[options["ELSET"]].add(label)
+            deck.sets[options["ELSET"]] |= found.keys()
     elif keyword == "ELSET":
-        deck.sets[options["ELSET"]] |= _members(deck, options, words)
-    return []
-
-
-def _members(deck: _Deck, options: Mapping[str, str], words: Sequence[str]) -> set[int]:
-    if "GENERATE" in options:
-        first, last, step = (*(int(word) for word in words), 1)[:3]
-        return deck.elements.keys() & range(first, last + 1, step)
-    sets = [{int(word)} if word.isdecimal() else deck.sets.get(word, set()) for word in words]
-    return set().union(*sets)
+        members = deck.sets[options["ELSET"]]
+        for row in rows:
+            if "GENERATE" in options:
+                first, last, step = (*(int(word) for word in row), 1)[:3]
+                members |= deck.elements.keys() & range(first, last + 1, step)
+            else:
+                for word in row:
+                    members |= {int(word)} if word.isdecimal() else deck.sets.get(word, set())
 
 
 def _element(name: str) -> tuple[int, int]:

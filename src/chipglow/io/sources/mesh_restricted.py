@@ -5,7 +5,7 @@ some of the nodes that blocks share, MOOSE writes the sum over the elements that
 divided by the number of all elements there.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
@@ -27,7 +27,7 @@ NODE_NUMBER: Final = "GlobalNodeId"
 """VTK's name for the numbers that nodes have in a whole file of Exodus."""
 
 _LARGEST_BLANK_FRACTION: Final = 0.5
-"""Fraction of a block's elements above which blank ones mean that it does not have the field."""
+"""Fraction of a block's values above which blank ones mean that it does not have the field."""
 
 
 def restricted_fields(frames: Frames, given: Mapping[str, str]) -> dict[str, BlockFields]:
@@ -104,36 +104,20 @@ def _fields_by_block(ours: str, frames: Frames, names: Sequence[str]) -> dict[An
 
 
 def _has_values(frames: Frames, block: Block, name: str) -> bool:
-    """Whether a block has a field in the first or the last frame."""
+    """Whether most values of a block are not 0, of nodes or elements in the first or last frame."""
     same = [other.grid for frame in frames for other in frame if other.names == block.names]
-    return any(
-        fraction <= _LARGEST_BLANK_FRACTION
+    blank = [
+        _is_blank(data[name])
         for grid in same
-        for fraction in _blank_fractions(grid, name)
-    )
-
-
-def _blank_fractions(grid: Any, name: str) -> Iterator[float]:
-    """Yield the fraction of elements with a value of 0 or none: of their own, of their nodes."""
-    if not grid.n_cells:
-        return
-    if name in grid.cell_data:
-        yield float(_is_blank(grid.cell_data[name]).mean())
-    if name in grid.point_data:
-        nodes = _is_blank(grid.point_data[name]).astype(np.float64)
-        yield float(((_incidence(grid) @ nodes) > 0).mean())
+        for data in (grid.point_data, grid.cell_data)
+        if name in data and grid.n_cells
+    ]
+    return any(values.mean() <= _LARGEST_BLANK_FRACTION for values in blank)
 
 
 def _is_blank(values: Any) -> NDArray[np.bool_]:
     numbers = np.asarray(values, np.float64)
     return np.asarray(~np.isfinite(numbers) | (numbers == 0.0))
-
-
-def _incidence(grid: Any) -> csr_array:
-    """Return a matrix of ones where an element, by rows, has a node."""
-    nodes = np.asarray(grid.cell_connectivity)
-    shape = (grid.n_cells, grid.n_points)
-    return csr_array((np.ones(len(nodes)), nodes, offsets_of(grid)), shape=shape)
 
 
 def _elements_at_nodes(blocks: Sequence[Block]) -> "pd.Series[int]":
@@ -157,7 +141,9 @@ def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None")
     values = np.array(values, np.float64)
     if counts is None:
         return values
-    incidence = _incidence(grid)
+    nodes = np.asarray(grid.cell_connectivity)
+    shape = (grid.n_cells, grid.n_points)
+    incidence = csr_array((np.ones(len(nodes)), nodes, offsets_of(grid)), shape=shape)
     own = np.asarray(incidence.sum(axis=0))
     everywhere = counts.loc[np.asarray(grid.point_data[NODE_NUMBER])].to_numpy()
     factors = everywhere / np.maximum(own, 1.0)

@@ -167,7 +167,7 @@ class MovieSource(Source, Part):
         return tuple(str(movie.path) for movie in self.movies.values())
 
     def survey(self) -> Survey:
-        indices, readers, assumed = self._opened
+        indices, _, assumed = self._opened
         index = indices[self._names[0]]
         times, clock = self._times(index)
         return Survey(
@@ -176,7 +176,7 @@ class MovieSource(Source, Part):
             extent=self._pixels(index).extent,
             found={name: self.movies[name].path.name for name in self._names},
             spacing=self.metre_per_pixel,
-            notes=Notes([*clock, *assumed, *_doubts(self._uncertainty(indices, readers))]),
+            notes=Notes([*clock, *assumed, *_doubts(self.uncertainty())]),
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -209,35 +209,66 @@ class MovieSource(Source, Part):
             yield SampledFrame(float(times[number]), fields, material, quality)
 
     def uncertainty(self) -> dict[str, ColourUncertainty]:
-        """Return the uncertainty of each field by its colours in the first, middle and last one.
+        """Return the uncertainty of each field, from three pictures.
 
-        In a movie that cannot be searched it is that of three of the first 101.
+        They are the first, the middle and the last one, or early ones of a movie that cannot be
+        searched.
         """
         indices, readers, _ = self._opened
-        return self._uncertainty(indices, readers)
-
-    @cached_property
-    def _opened(self) -> tuple[dict[str, MovieIndex], dict[str, FieldReader], tuple[str, ...]]:
-        """Indices of the movies, readers of their pictures, and their assumptions."""
-        indices = self._indices()
-        return indices, *self._readers(indices)
+        result = {}
+        for name, reader in readers.items():
+            movie, index = self.movies[name], indices[name]
+            last = index.count - 1 if index.marks else min(index.count - 1, _EARLY)
+            values, distance, lines = [], [], []
+            for number in sorted({0, last // 2, last}):
+                picture = next(pictures(movie.path, index, number))
+                read = self._read(name, reader, picture, number)
+                values.append(read.values[read.seen])
+                distance.append(read.distance[read.seen])
+                lines.append(reader.error_of_filling(read))
+            result[name] = replace(
+                colour_uncertainty(reader.scale, np.concatenate(values), np.concatenate(distance)),
+                legend=_uncertainty_of_legend(movie, reader.legend),
+                lines=sqrt(fmean(error**2 for error in lines)),
+            )
+        return result
 
     @property
     def _names(self) -> tuple[str, ...]:
         return tuple(name for name in MOVIE_FIELDS if name in self.movies)
 
-    def _indices(self) -> dict[str, MovieIndex]:
-        """Index the movies, which must agree."""
-        indices = {name: index_movie(self.movies[name].path) for name in self._names}
+    @cached_property
+    def _opened(self) -> tuple[dict[str, MovieIndex], dict[str, FieldReader], list[str]]:
+        """Indices of the movies, which must agree, readers of their pictures, and assumptions."""
+        paths = {name: self.movies[name].path for name in self._names}
+        indices = {name: index_movie(path) for name, path in paths.items()}
         first = indices[self._names[0]]
-        for name, other in indices.items():
-            if (other.rows, other.columns, other.count) != (first.rows, first.columns, first.count):
+        shape = (first.rows, first.columns)
+        self._crop(first)
+        tool = self._cropped(polygon_mask(shape, self.tool_polygon))
+        square = "The pixels are square, although the movie states otherwise."
+        assumed = [] if first.square else [square]
+        readers = {}
+        for name, index in indices.items():
+            if (index.rows, index.columns, index.count) != (*shape, first.count):
                 raise SourceError(
-                    f"{self.movies[name].path}: {other.count} pictures of {other.columns} x "
-                    f"{other.rows}, expected {first.count} of {first.columns} x {first.rows} as in "
-                    f"{self.movies[self._names[0]].path}"
+                    f"{paths[name]}: {index.count} pictures of {index.columns} x {index.rows}, "
+                    f"expected {first.count} of {first.columns} x {first.rows} as in "
+                    f"{paths[self._names[0]]}"
                 )
-        return indices
+            picture = next(pictures(paths[name], index))
+            with naming(paths[name]):
+                scale, legend, said = _scale(self.movies[name], picture)
+                background, also = self._background(self._cropped(picture), scale)
+                covered = box_mask(shape, self.covered)
+                if legend is not None:
+                    covered |= box_mask(shape, [legend], _LEGEND_MARGIN)
+                readers[name] = FieldReader(
+                    scale, background, self.tool_colour, tool,
+                    self._cropped(covered), self.overlay_limit, legend,
+                )  # fmt: skip
+            assumed += [f"{name}: {text}" for text in (*said, *also)]
+        return indices, readers, assumed
 
     def _times(self, index: MovieIndex) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         if self.frame_interval is not None:
@@ -281,32 +312,6 @@ class MovieSource(Source, Part):
             return values
         left, top, right, bottom = self.crop
         return values[top:bottom, left:right]
-
-    def _readers(
-        self, indices: Mapping[str, MovieIndex]
-    ) -> tuple[dict[str, FieldReader], tuple[str, ...]]:
-        index = indices[self._names[0]]
-        self._crop(index)
-        shape = (index.rows, index.columns)
-        tool = self._cropped(polygon_mask(shape, self.tool_polygon))
-        assumed = (
-            [] if index.square else ["The pixels are square, although the movie states otherwise."]
-        )
-        readers = {}
-        for name in self._names:
-            movie = self.movies[name]
-            picture = next(pictures(movie.path, indices[name]))
-            with naming(movie.path):
-                scale, legend, said = _scale(movie, picture)
-                covered = box_mask(shape, self.covered) | box_mask(shape, legend, _LEGEND_MARGIN)
-                cropped = self._cropped(picture)
-                background, also = self._background(cropped, scale)
-                readers[name] = FieldReader(
-                    scale, background, self.tool_colour, tool,
-                    self._cropped(covered), self.overlay_limit, legend[0] if legend else None,
-                )  # fmt: skip
-            assumed += [f"{name}: {text}" for text in (*said, *also)]
-        return readers, tuple(assumed)
 
     def _background(
         self, picture: Picture, scale: ColourScale
@@ -357,34 +362,14 @@ class MovieSource(Source, Part):
         across, up = (int(sign) for sign in self.placement.signs)
         return np.ascontiguousarray(values[..., ::up, ::across])
 
-    def _uncertainty(
-        self, indices: Mapping[str, MovieIndex], readers: Mapping[str, FieldReader]
-    ) -> dict[str, ColourUncertainty]:
-        result = {}
-        for name, reader in readers.items():
-            index = indices[name]
-            values, distance, lines = [], [], []
-            for number in _sample(index):
-                picture = next(pictures(self.movies[name].path, index, number))
-                read = self._read(name, reader, picture, number)
-                values.append(read.values[read.seen])
-                distance.append(read.distance[read.seen])
-                lines.append(reader.error_of_filling(read))
-            result[name] = replace(
-                colour_uncertainty(reader.scale, np.concatenate(values), np.concatenate(distance)),
-                legend=self._of_legend(name, reader),
-                lines=sqrt(fmean(error**2 for error in lines)),
-            )
-        return result
 
-    def _of_legend(self, name: str, reader: FieldReader) -> float:
-        """Return the uncertainty of a legend's ends: a pixel if it was found, else its rounding."""
-        if reader.legend is None:
-            return 0.0
-        movie = self.movies[name]
-        left, top, right, bottom = reader.legend
-        pixel = abs(movie.values[1] - movie.values[0]) / max(right - left, bottom - top)
-        return pixel * (_ROUNDING if movie.colours else 1.0)
+def _uncertainty_of_legend(movie: FieldMovie, box: Box | None) -> float:
+    """Return the uncertainty of a legend's ends: a pixel if it was found, else its rounding."""
+    if box is None:
+        return 0.0
+    left, top, right, bottom = box
+    pixel = abs(movie.values[1] - movie.values[0]) / max(right - left, bottom - top)
+    return pixel * (_ROUNDING if movie.colours else 1.0)
 
 
 def metre_per_pixel(
@@ -399,19 +384,11 @@ def metre_per_pixel(
     return length / pixels
 
 
-def _sample(index: MovieIndex) -> tuple[int, ...]:
-    """Return the first, middle and last picture; early ones where each needs all before it."""
-    last = index.count - 1 if index.marks else min(index.count - 1, _EARLY)
-    return tuple(sorted({0, last // 2, last}))
-
-
-def _scale(
-    movie: FieldMovie, picture: Picture
-) -> tuple[ColourScale, tuple[Box, ...], tuple[str, ...]]:
+def _scale(movie: FieldMovie, picture: Picture) -> tuple[ColourScale, Box | None, list[str]]:
     """Return the scale of a movie, the place of its legend, and the assumptions."""
     if isinstance(movie.colours, NamedMap):
         name, bands = movie.colours.name, movie.colours.bands
-        return ColourScale.named(name, movie.values, bands), (), ()
+        return ColourScale.named(name, movie.values, bands), None, []
     box = movie.colours or find_legend(picture)
     if box is None:
         raise SourceError(
@@ -433,7 +410,7 @@ def _scale(
     found = "" if movie.colours else f"Legend found at {box} (left, top, right, bottom). "
     first, last = movie.values
     ends = f"{first:g} at its lower or left end, {last:g} at the other"
-    return scale, (box,), (f"{found}Legend of {kind}, {ends}.",)
+    return scale, box, [f"{found}Legend of {kind}, {ends}."]
 
 
 def _completed(

@@ -1,0 +1,46 @@
+from .atomic import (
+    atomic_folder as atomic_folder,
+    atomic_path as atomic_path,
+)
+from .import_file import (
+    IMPORT_SOURCES as IMPORT_SOURCES,
+    ImportDescription as ImportDescription,
+    import_description as import_description,
+    import_text as import_text,
+    load_import as load_import,
+)
+from .importing import (
+    Import as Import,
+    View as View,
+    import_scene as import_scene,
+    prospect as prospect,
+    read_scene as read_scene,
+)
+from .measurement_file import (
+    is_measurement as is_measurement,
+    read_measurement as read_measurement,
+    write_dataset as write_dataset,
+    write_measurement as write_measurement,
+)
+from .movie_file import (
+    check_movie_path as check_movie_path,
+    movie_writer as movie_writer,
+)
+from .scene_file import (
+    SCENE_FORMAT as SCENE_FORMAT,
+    SceneWriter as SceneWriter,
+    StoredScene as StoredScene,
+    example_scene as example_scene,
+    is_scene as is_scene,
+    open_scene as open_scene,
+    write_scene as write_scene,
+)
+from .spool import (
+    UnfinishedScene as UnfinishedScene,
+    unfinished_scenes as unfinished_scenes,
+)
+from .table_file import check_table_path as check_table_path
+from .tool_section import (
+    ToolSection as ToolSection,
+    read_tool_outline as read_tool_outline,
+)

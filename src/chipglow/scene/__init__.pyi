@@ -1,0 +1,43 @@
+from .frame import (
+    FIELD_UNITS as FIELD_UNITS,
+    FILLED as FILLED,
+    MATERIAL_COORDINATE_UNITS as MATERIAL_COORDINATE_UNITS,
+    QUALITY as QUALITY,
+    Frame as Frame,
+    Material as Material,
+    SceneError as SceneError,
+)
+from .lines import (
+    Line as Line,
+    sample as sample,
+    straight_line as straight_line,
+)
+from .placed_tool import PlacedTool as PlacedTool
+from .raster import Raster as Raster
+from .regions import (
+    Area as Area,
+    Circle as Circle,
+    Polygon as Polygon,
+    Region as Region,
+    areas as areas,
+    shared_pixels as shared_pixels,
+)
+from .sampled import (
+    READABLE as READABLE,
+    SampledFrame as SampledFrame,
+)
+from .scene import (
+    ENERGY_UNITS as ENERGY_UNITS,
+    Scene as Scene,
+    is_gap as is_gap,
+)
+from .tool import (
+    Chamfer as Chamfer,
+    Hone as Hone,
+    Tool as Tool,
+    ToolGeometry as ToolGeometry,
+)
+from .tool_outline import (
+    ToolOutline as ToolOutline,
+    ToolOutlineError as ToolOutlineError,
+)

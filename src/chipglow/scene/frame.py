@@ -1,0 +1,74 @@
+"""One frame of a scene: its fields, their units and what a sample shows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field as declared
+from enum import IntEnum
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from chipglow.scene.splines import SplineFrame
+
+FIELD_UNITS: Final[Mapping[str, str]] = {
+    "temperature": "K",
+    "plastic_strain": "1",
+    "plastic_strain_rate": "1/s",
+    "velocity_x": "m/s",
+    "velocity_y": "m/s",
+    "material": "1",
+}
+"""The fields of a cut, and their units. Temperature alone is enough for a scene."""
+
+MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "material_y": "m"}
+"""Where each point was before the cut: optional, both or none."""
+
+QUALITY: Final = "quality"
+"""Name of an optional field that says how far each sample of an imported scene can be trusted.
+
+0 to 254: distance of the colour in a movie from the colour scale, in units of CIE L*a*b* (0 where
+the source gives numbers); `FILLED`: the source shows nothing there, the value is its neighbours'.
+"""
+
+FILLED: Final = 255
+
+
+class Material(IntEnum):
+    """What a sample of the scene shows."""
+
+    VOID = 0
+    WORKPIECE = 1
+    TOOL = 2
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
+
+    What a scene does not have, or was not asked for, is None. A scene without material is
+    workpiece everywhere. `splines` is what the fields were sampled from, where they were.
+    """
+
+    time: float
+    temperature: NDArray[np.float32]
+    material: NDArray[np.uint8]
+    plastic_strain: NDArray[np.float32] | None = None
+    plastic_strain_rate: NDArray[np.float32] | None = None
+    velocity_x: NDArray[np.float32] | None = None
+    velocity_y: NDArray[np.float32] | None = None
+    material_x: NDArray[np.float32] | None = None
+    material_y: NDArray[np.float32] | None = None
+    quality: NDArray[np.uint8] | None = None
+    splines: "SplineFrame | None" = declared(default=None, repr=False)
+
+    def needed(self, name: str) -> NDArray[np.float32]:
+        """Return a field of `FIELD_UNITS` or raise a SceneError."""
+        values: NDArray[np.float32] | None = getattr(self, name)
+        if values is None:
+            raise SceneError(f"scene: has no {name}, expected it: this needs it")
+        return values
+
+
+class SceneError(ValueError):
+    """Fields that break the contract of a scene."""
