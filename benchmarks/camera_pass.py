@@ -1,16 +1,15 @@
 """Cost of what a user waits for: a frame, a study, a new image. Other programs stand beside it.
 
-python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--scene SCENE.nc]
+python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--sub-frames 50] [--scene SCENE.nc]
 
 A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels, of three scenes of the same
 splines, as smooth as those of a cut with cells of 10 um: temperature and emissivity given in
 memory; all fields in memory, the emissivity from textures and blend; and a file, looked at for the
 first time and again. Beside them the bound, which is to read once what the pass needs, and the
-paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table, and with a quadrature over
-64 wavelengths instead of the table. The study is the paper's: nine instants, two chips, on the
-same file, or on that of a cut (`chipglow cache list` says where). An image is what a camera makes
-of a kept mean radiance: GalSim, pyBSM, Pyxel and SciPy make it too, if they are there
-(``pip install galsim pybsm pyxel-sim``), and Pyxel counts.
+paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table. The study is the paper's:
+nine instants, two chips, on the same file, or on that of a cut (`chipglow cache list` says where).
+An image is what a camera makes of a kept mean radiance: GalSim, Pyxel and SciPy make it too, if
+they are there (``pip install galsim pyxel-sim``), and Pyxel counts.
 
 All are timed in one run, frames and studies in turn, each after a call that is not timed; the best
 of the rounds counts. Processor time is that of all threads: it is what can be compared on a machine
@@ -24,7 +23,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import count, pairwise
+from itertools import count, pairwise, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
@@ -46,7 +45,6 @@ from chipglow.camera import (
 )
 from chipglow.camera.optics.sampling import integrate
 from chipglow.io import SceneWriter, open_scene
-from chipglow.radiometry import spectral_radiance
 from chipglow.scene import Raster, Scene, ToolGeometry
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
 from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface
@@ -54,8 +52,6 @@ from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from figure6 import figure_6
 
-SUB_FRAMES = 50
-STEP = 0.2e-6
 SPEED = 250 / 60
 CELL = 10e-6
 RASTER = Raster(-420e-6, 460e-6, 6e-6 / 9, 810, 900)
@@ -65,7 +61,6 @@ NEEDED = (
 )  # fmt: skip
 PEERS = {
     "GalSim": ("galsim", "peers.image_galsim"),
-    "pyBSM": ("pybsm", "peers.image_pybsm"),
     "Pyxel": ("pyxel", "peers.image_pyxel"),
 }
 READ_NOISE = 500.0  # electrons
@@ -85,14 +80,14 @@ class GivenSurface(Surface, EmissivityField):
 
     needs = ()
 
-    def __init__(self, values):
-        self.values = values
+    def __init__(self, values, times):
+        self.values, self.times = values, times
 
     def on(self, scene):
         return self
 
     def emissivity(self, frame):
-        return self.values[round(frame.time / STEP)]
+        return self.values[np.argmin(np.abs(self.times - frame.time))]
 
 
 def lattice_of(raster):
@@ -101,9 +96,8 @@ def lattice_of(raster):
     return Lattice.within(raster, (-0.8e-3, -0.6e-3), CELL, in_tool, 293.15)
 
 
-def spline_frame(lattice, index):
+def spline_frame(lattice, time):
     """A chip that slides past: a hot shear band across it, sheared and strained above."""
-    time = index * STEP
     x = lattice.left + CELL * np.arange(lattice.columns)[None, :]
     y = lattice.top - CELL * np.arange(lattice.rows)[:, None]
     along = x - SPEED * time + 0.0 * y
@@ -127,12 +121,13 @@ def spline_frame(lattice, index):
     return SplineFrame(lattice, time, nodes, limits.astype(np.float32))
 
 
-def stored_scene(path, instants):
+def stored_scene(path, instants, sub_frames):
     """Write the file of the scene."""
     lattice = lattice_of(RASTER)
     with SceneWriter(path, RASTER, ToolGeometry(), lattice=lattice) as writer:
-        for index in range(instants * SUB_FRAMES):
-            writer.append(spline_frame(lattice, index).frame())
+        for index in range(instants * sub_frames):
+            time = index * CAMERA.integration_time / sub_frames
+            writer.append(spline_frame(lattice, time).frame())
 
 
 def open_cold(path):
@@ -143,9 +138,9 @@ def open_cold(path):
     return open_scene(path)
 
 
-def arrays_of(scene, names):
-    """Fields of a frame's sub-frames as contiguous arrays."""
-    return {n: np.stack([scene.field(n, i) for i in range(SUB_FRAMES)]) for n in names}
+def arrays_of(scene, names, sub_frames):
+    """Fields of the first sub-frames as contiguous arrays."""
+    return {n: np.stack([scene.field(n, i) for i in range(sub_frames)]) for n in names}
 
 
 def table_radiance():
@@ -153,20 +148,6 @@ def table_radiance():
     nodes = np.arange(250.0, 2000.0, 0.25)
     values = CAMERA.band.radiance(nodes)
     return lambda temperature: np.interp(temperature, nodes, values)
-
-
-def quadrature_radiance():
-    """Equation 1 by the trapezoidal rule over 64 wavelengths."""
-    wavelengths, step = np.linspace(CAMERA.band.lower, CAMERA.band.upper, 64, retstep=True)
-
-    def radiance(temperature):
-        total = np.zeros(temperature.shape)
-        for index, wavelength in enumerate(wavelengths):
-            fraction = step / 2 if index in (0, 63) else step
-            total += fraction * spectral_radiance(wavelength, temperature)
-        return total
-
-    return radiance
 
 
 def scipy_image(radiance, kernel):
@@ -239,40 +220,41 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--instants", type=int, default=9, help="of the study")
+    parser.add_argument("--sub-frames", type=int, default=50, help="of the stand-in's exposure")
     parser.add_argument("--scene", type=Path, help="file of a cut for the study")
     arguments = parser.parse_args()
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.nc"
-        stored_scene(path, 1 if arguments.scene else arguments.instants)
+        stored_scene(path, 1 if arguments.scene else arguments.instants, arguments.sub_frames)
         threads = numba.get_num_threads()
         print(f"{threads} threads; best of {arguments.rounds} rounds in turn")
-        kept = compare_frames(path, arguments.rounds)
+        kept = compare_frames(path, arguments.rounds, arguments.sub_frames)
         compare_studies(arguments.scene or path, arguments.instants, arguments.rounds)
     compare_images(kept, arguments.rounds)
 
 
-def compare_frames(path, rounds):
+def compare_frames(path, rounds, sub_frames):
     """Time one frame; its exposure."""
     stored = open_scene(path)
-    arrays, times = arrays_of(stored, NEEDED), stored.times[:SUB_FRAMES]
+    arrays, times = arrays_of(stored, NEEDED, sub_frames), stored.times[:sub_frames]
     whole = Scene.from_fields(RASTER, times, arrays)
     textured = CHIP_1.on(stored)
-    frames = stored.frames(range(SUB_FRAMES), NEEDED)
+    frames = stored.frames(range(sub_frames), NEEDED)
     emissivity = np.stack([textured.emissivity(frame) for frame in frames])
     given = {name: arrays[name] for name in ("temperature", "material")}
-    plain, surface = Scene.from_fields(RASTER, times, given), GivenSurface(emissivity)
+    plain, surface = Scene.from_fields(RASTER, times, given), GivenSurface(emissivity, times)
     kernel = CAMERA.psf.view_kernel(CAMERA.pitch, 90, 100)
-    table, quadrature = table_radiance(), quadrature_radiance()
+    table = table_radiance()
 
-    def literal(radiance, count):
-        fields = arrays["temperature"][:count], emissivity[:count]
-        return figure_6(*fields, radiance, CAMERA.band.temperature, kernel)
+    def literal():
+        fields = arrays["temperature"], emissivity
+        return figure_6(*fields, table, CAMERA.band.temperature, kernel)
 
     best = best_of(
         {
             "given: bound, reading once": lambda: read_once([arrays["temperature"], emissivity]),
             "given: chipglow, exposure": lambda: CAMERA.expose(plain, surface, 0.0),
-            "given: NumPy, Figure 6, table": lambda: literal(table, SUB_FRAMES),
+            "given: NumPy, Figure 6, table": literal,
             "in memory: bound, reading once": lambda: read_once(list(arrays.values())),
             "in memory: chipglow, exposure": lambda: CAMERA.expose(whole, CHIP_1, 0.0),
             "stored: chipglow, first look": lambda: CAMERA.expose(open_cold(path), CHIP_1, 0.0),
@@ -280,14 +262,12 @@ def compare_frames(path, rounds):
         },
         rounds,
     )
-    one = np.min([timed(lambda: literal(quadrature, 1)) for _ in range(2)], axis=0)
-    best["given: NumPy, Figure 6, 64 wavelengths (1 x 50)"] = one * SUB_FRAMES
     found = CAMERA.measure(plain, surface, 0.0).radiance_temperature()[0]
-    difference = np.nanmax(np.abs(found - literal(table, SUB_FRAMES)))
-    samples = RASTER.rows * RASTER.columns * SUB_FRAMES
+    difference = np.nanmax(np.abs(found - literal()))
+    samples = RASTER.rows * RASTER.columns * sub_frames
     bits = 8 * path.stat().st_size / (RASTER.rows * RASTER.columns * len(stored))
     print(
-        f"\n{SUB_FRAMES} sub-frames of 810 x 900 to 90 x 100; {bits:.2f} bits a sample in the file;"
+        f"\n{sub_frames} sub-frames of 810 x 900 to 90 x 100; {bits:.2f} bits a sample in the file;"
     )
     print(f"Figure 6 differs by {difference * 1e3:.3f} mK\n")
     print(f"{'':50}{'wall ms':>10}{'processor ms':>14}{'ns/sample':>11}")
@@ -345,29 +325,22 @@ def compare_images(kept, rounds):
 
 def new_images(kept):
     """New images of a kept exposure; with "new PSF" also one that was not used before."""
-    other = replace(CAMERA, psf=GaussianPSF(14e-6), lower_limit=573.15)
-    optics = replace(other, psf_order="optics")
-    sharp, scales = replace(optics, psf=AnnularAperturePSF()), (1 + i / 1000 for i in count())
-    sharp_detector = replace(sharp, psf_order="detector")
-
-    def wider(camera):
-        psf = GaussianPSF(14e-6 * next(scales))
-        return replace(camera, psf=psf).form_measurement(kept)
-
-    def sharper(camera):
-        psf = AnnularAperturePSF(numerical_aperture=0.28 * next(scales))
-        return replace(camera, psf=psf).form_measurement(kept)
-
-    return {
-        "new image: order detector": lambda: other.form_measurement(kept),
-        "new image: order detector, new PSF": lambda: wider(other),
-        "new image: order detector, diffraction": lambda: sharp_detector.form_measurement(kept),
-        "new image: order detector, diffraction, new PSF": lambda: sharper(sharp_detector),
-        "new image: order optics": lambda: optics.form_measurement(kept),
-        "new image: order optics, new PSF": lambda: wider(optics),
-        "new image: order optics, diffraction": lambda: sharp.form_measurement(kept),
-        "new image: order optics, diffraction, new PSF": lambda: sharper(sharp),
+    scales = (1 + i / 1000 for i in count())
+    kinds = {
+        "": lambda scale: GaussianPSF(14e-6 * scale),
+        ", diffraction": lambda scale: AnnularAperturePSF(numerical_aperture=0.28 * scale),
     }
+    calls = {}
+    for order, (kind, psf_of) in product(("detector", "optics"), kinds.items()):
+        camera = replace(CAMERA, psf=psf_of(1.0), psf_order=order, lower_limit=573.15)
+
+        def wider(camera=camera, psf_of=psf_of):
+            return replace(camera, psf=psf_of(next(scales))).form_measurement(kept)
+
+        name = f"new image: order {order}{kind}"
+        calls[name] = lambda camera=camera: camera.form_measurement(kept)
+        calls[f"{name}, new PSF"] = wider
+    return calls
 
 
 def same_images(radiance, peers):

@@ -1,16 +1,11 @@
 """An infrared image and a visible picture of one chip, with a known map between them.
 
-The geometry is NIST's: infrared 160 x 120 pixels of 6 um, and a visible camera with finer pixels
+`registration_libraries.py` registers such pairs. The geometry is NIST's: infrared 160 x 120 pixels
+of 6 um, and a visible camera with finer pixels
 that looks through the same optics (Heigel and Whitenton, 2010). What is bright differs: infrared
 by temperature and emissivity, visible by reflection and texture.
-
-``python benchmarks/dual_spectrum.py 9000 16`` registers 16 pairs by the images alone, of seeds 9000
-and up, with the settings of `DualSpectrum.drawn`, and prints how far off each is, what it says of
-itself, and how many are wrong beyond that without a warning being raised.
 """
 
-import argparse
-import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, pi, radians, sin
@@ -21,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from chipglow.camera import Camera, GaussianPSF, Measurement
-from chipglow.laboratory.registration import Registration, fit_images
+from chipglow.laboratory.registration import Registration
 from chipglow.scene import Material, Raster, Scene, Tool, ToolGeometry
 from chipglow.surface import CHIP_1
 
@@ -198,35 +193,3 @@ def errors(found: Registration, pair: DualSpectrum) -> tuple[float, float]:
     error = np.linalg.solve(pair.matrix[:2, :2], off.T) / PITCH
     stated = np.trace(found.position_covariance(places), axis1=-2, axis2=-1) / PITCH**2
     return float(np.sqrt((error**2).sum(axis=0).mean())), float(np.sqrt(stated.mean()))
-
-
-def main() -> None:
-    """Register pairs of fresh seeds and print a table."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("first", type=int, help="the first seed")
-    parser.add_argument("count", type=int, help="number of pairs")
-    parser.add_argument("--model", default="affine")
-    options = parser.parse_args()
-    print("seed bright  noise  v.noise  error  stated  ratio  seconds  warnings", flush=True)
-    wrong = missed = 0
-    for seed in range(options.first, options.first + options.count):
-        pair = DualSpectrum.drawn(seed)
-        begin = time.process_time()
-        measured = pair.infrared
-        fit = fit_images(measured.radiance[0], measured.raster, pair.visible, options.model)
-        error, stated = errors(fit.registration, pair)
-        seconds = time.process_time() - begin
-        beyond = error > 2 * stated
-        wrong += beyond
-        missed += beyond and not fit.registration.notes.warnings
-        print(
-            f"{seed:4d} {pair.chip_brightness:6.2f} {pair.noise:6.4f} {pair.visible_noise:8.1f} "
-            f"{error:6.2f} {stated:7.2f} {error / stated:6.2f} {seconds:8.1f}  "
-            f"{'; '.join(fit.registration.notes.warnings) or '-'}",
-            flush=True,
-        )
-    print(f"{wrong} of {options.count} wrong by over twice what they state, {missed} undoubted")
-
-
-if __name__ == "__main__":
-    main()

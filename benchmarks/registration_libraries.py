@@ -1,44 +1,36 @@
 """Registration of infrared and visible images: chipglow's `fit_images` beside image libraries.
 
+    python benchmarks/registration_libraries.py [--pairs 56] [--only METHOD ...]
+
 The pairs are the 56 of docs/do/registration.md, drawn by `dual_spectrum.py`. SimpleITK maximises
 Mattes' mutual information of the images, or the correlation of their edges (gradients over the
 contrast of their surroundings, as in `fit_images`), from coarse to fine by regular steps, first a
-similarity, then the model that is asked for; from the middle, or from the ten best of a grid of
-placements, which has the limits of `fit_images`. scikit-image takes the peak of the
-cross-correlation of edges over the same turns and scales, with or without a dense flow (TV-L1) that
-its RANSAC makes a map of; or ORB features of edges with RANSAC. SimpleITK's settings are the best
-of 35 on ten other pairs, of seeds 8000 to 8009.
+similarity, then the requested model, from the ten best of a grid of placements with the limits of
+`fit_images`. scikit-image takes the peak of the cross-correlation of edges over the same turns and
+scales. SimpleITK's settings are the best of 35 on ten other pairs, of seeds 8000 to 8009.
 
-No library states an uncertainty. Its result is taken to be doubtful if a placement over 8 pixels
-away is 80 % as good, if the edges' correlation is low, if the steps end early, if few features
-agree, or if it refuses. Every method runs in a subprocess, on one thread.
-
-``python benchmarks/registration_libraries.py`` takes half an hour; ``--pairs 1`` one pair.
+No library states an uncertainty. Its result counts as doubtful if a placement over 8 pixels away is
+80 % as good, if the edges' correlation is low, or if it refuses. All pairs take half an hour.
 """
 
 import argparse
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import islice, product
 from math import cos, hypot, radians, sin
-from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from dual_spectrum import DualSpectrum, errors
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_gradient_magnitude
-from skimage.feature import ORB, match_descriptors
 from skimage.filters import window
-from skimage.measure import ransac
-from skimage.registration import optical_flow_tvl1, phase_cross_correlation
-from skimage.transform import AffineTransform, SimilarityTransform, resize, warp
+from skimage.registration import phase_cross_correlation
+from skimage.transform import AffineTransform, warp
 
 from chipglow.laboratory.registration import Registration, fit_images
 from chipglow.scene import Raster
@@ -59,9 +51,8 @@ SEEDS: tuple[tuple[range, Model], ...] = (
 )
 SCALES, TURNS, REACH, STEP = (0.8, 0.9, 1.0, 1.1, 1.25), (-4.0, 0.0, 4.0), 0.25, 4
 LEAST_OVERLAP, STARTS, APART = 0.5, 10, 6.0
-FAR, RIVAL, LOW, FEW = 8.0, 0.8, 0.03, 10
+FAR, RIVAL, LOW = 8.0, 0.8, 0.03
 LEVELS = [4, 2, 1]
-FEATURES, TRIALS = 800, 5000
 BINS, COARSE, FINE, WINDOW = 32, 1.0, 0.6, 5.0
 
 
@@ -224,7 +215,7 @@ def itk_starts(scores: Mapping[Place, float], pair: Pair) -> list[Place]:
     return [place for place, _ in kept]
 
 
-def itk_climbed(
+def itk_climb(
     images: tuple[Any, Any], transform: Any, metric: str, levels: list[int]
 ) -> tuple[float, bool]:
     """What the metric is after the climb, which moves the transform, and whether it ended."""
@@ -246,26 +237,19 @@ def itk_refined(
 ) -> tuple[float, Matrix, bool]:
     """From a placement to the map: how good, the map and whether the climb ended."""
     transform = itk_similarity(place, pair)
-    good, ended = itk_climbed(images, transform, metric, LEVELS)
+    good, ended = itk_climb(images, transform, metric, LEVELS)
     if pair.model == "affine":
         affine = sitk.AffineTransform(2)
         affine.SetCenter(transform.GetCenter())
         affine.SetMatrix(transform.GetMatrix())
         affine.SetTranslation(transform.GetTranslation())
-        good, ended = itk_climbed(images, affine, metric, LEVELS[-1:])
+        good, ended = itk_climb(images, affine, metric, LEVELS[-1:])
         transform = affine
     corner, right, below = (
         np.array(transform.TransformPoint(point)) for point in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     )
     linear = np.stack([right - corner, below - corner], axis=1)
     return good, pair.to_pixels(linear, corner), ended
-
-
-def itk_middle(pair: Pair) -> Registration:
-    """Mutual information from equal middles and widths."""
-    place = (1.0, 0.0, 0.0, 0.0)
-    _, matrix, ended = itk_refined(itk_images(pair), place, "information", pair)
-    return pair.registration(matrix, () if ended else ("the climb did not end",))
 
 
 def itk_grid(pair: Pair) -> Registration:
@@ -332,51 +316,6 @@ def skimage_correlation(pair: Pair) -> Registration:
     return pair.registration(tried[0][1], set(rivals(tried, pair)))
 
 
-def agreed(
-    found: NDArray[np.float64], seen: NDArray[np.float64], pair: Pair
-) -> tuple[Matrix, int] | None:
-    """Map from pixels to visible pixels that most points agree on, and how many."""
-    kind, least = (SimilarityTransform, 2) if pair.model == "similarity" else (AffineTransform, 3)
-    if len(found) <= least:
-        return None
-    limit = 2 / pair.pitch
-    model, inliers = ransac((found, seen), kind, least, limit, max_trials=TRIALS, rng=2010)
-    return (np.asarray(model.params), int(inliers.sum())) if model else None
-
-
-def skimage_flow(pair: Pair) -> Registration:
-    tried = correlated(pair)
-    start = tried[0][1]
-    hot, seen = edge_images(pair)
-    down, right = optical_flow_tvl1(hot, laid(seen, start, pair))
-    row, column = np.nonzero(hot > np.percentile(hot, 80))
-    places = np.stack([column, row], axis=1).astype(float)
-    flow = np.stack([right[row, column], down[row, column]], axis=1)
-    found = agreed(places, mapped(start, places + flow), pair)
-    warnings = set(rivals(tried, pair))
-    if found is None or found[1] < len(places) / 2:
-        warnings.add("the flow is not that of a map")
-    return pair.registration(found[0] if found else start, warnings)
-
-
-def skimage_features(pair: Pair) -> Registration | None:
-    hot, seen = edge_images(pair)
-    shape = pair.visible.shape
-    keys, descriptors = [], []
-    for image in (resize(hot, shape, order=3), seen):
-        orb = ORB(n_keypoints=FEATURES, fast_threshold=0.02)
-        orb.detect_and_extract(image / image.max())
-        keys.append(orb.keypoints[:, ::-1])
-        descriptors.append(orb.descriptors)
-    pairs = match_descriptors(*descriptors, cross_check=True)
-    places = (keys[0][pairs[:, 0]] + 0.5) * pair.pitch - 0.5
-    found = agreed(places, keys[1][pairs[:, 1]], pair)
-    if found is None:
-        return None
-    warnings = () if found[1] >= FEW else ("few features agree",)
-    return pair.registration(found[0], warnings)
-
-
 # The comparison
 
 
@@ -386,12 +325,9 @@ def own(pair: Pair) -> Registration:
 
 METHODS: dict[str, Callable[[Pair], Registration | None]] = {
     "chipglow": own,
-    "SimpleITK, information, middle": itk_middle,
     "SimpleITK, information, grid": itk_grid,
     "SimpleITK, edges, grid": itk_edges,
     "scikit-image, correlation": skimage_correlation,
-    "scikit-image, flow": skimage_flow,
-    "scikit-image, ORB": skimage_features,
 }
 
 
@@ -403,23 +339,6 @@ class Outcome:
     stated: float
     doubtful: bool
     seconds: float
-
-
-def memory(name: str) -> float:
-    """Memory of this process in MB: `VmRSS` now, `VmHWM` at most; 0 where Linux does not tell."""
-    try:
-        lines = Path("/proc/self/status").read_text().splitlines()
-    except OSError:
-        return 0.0
-    return next(float(line.split()[1]) / 1024 for line in lines if line.startswith(name))
-
-
-def quiet() -> None:
-    """Nothing but the map counts, on one thread."""
-    warnings.simplefilter("ignore")
-    if sitk is not None:
-        sitk.ProcessObject.SetGlobalWarningDisplay(False)
-        sitk.ProcessObject.SetGlobalDefaultNumberOfThreads(1)
 
 
 def judged(name: str, pair: Pair, truth: DualSpectrum) -> Outcome:
@@ -442,18 +361,8 @@ def drawn_pairs() -> Iterator[tuple[Pair, DualSpectrum]]:
             yield Pair(measured.radiance[0], measured.raster, truth.visible, model), truth
 
 
-def outcomes(
-    name: str, pairs: list[tuple[Pair, DualSpectrum]]
-) -> tuple[list[Outcome], float | None]:
-    """Of each pair, and the most memory beyond that at the begin, in a subprocess."""
-    with ProcessPoolExecutor(1, get_context("spawn"), quiet) as pool:
-        before = pool.submit(memory, "VmRSS").result()
-        found = [pool.submit(judged, name, *pair).result() for pair in pairs]
-        most = pool.submit(memory, "VmHWM").result()
-    return found, most - before if most else None
-
-
-def row(name: str, found: list[Outcome], megabytes: float | None) -> str:
+def row(name: str, found: list[Outcome]) -> str:
+    """Return a method's row of the table."""
     error = np.array([outcome.error for outcome in found])
     sure = np.array([not outcome.doubtful for outcome in found])
     beyond = sum(outcome.stated > 0 and outcome.error > 2 * outcome.stated for outcome in found)
@@ -466,14 +375,13 @@ def row(name: str, found: list[Outcome], megabytes: float | None) -> str:
         f"{error[sure].max():.1f}" if sure.any() else "-",
         f"{beyond}" if any(outcome.stated for outcome in found) else "none stated",
         f"{np.median([outcome.seconds for outcome in found]):.1f}",
-        f"{megabytes:.0f}" if megabytes is not None else "-",
     ]
     return f"| {name} | {' | '.join(cells)} |"
 
 
 HEAD = (
     "| method | under 1 | under 3 | median | sure | sure, 3 or more | greatest, sure "
-    "| over twice the stated | s | MB |\n|" + "---|" * 10
+    "| over twice the stated | s |\n|" + "---|" * 9
 )
 
 
@@ -487,11 +395,15 @@ def main() -> None:
     names = [name for name in given.only if sitk or not name.startswith("SimpleITK")]
     if sitk is None:
         print("SimpleITK is not installed: left out (pip install SimpleITK)\n")
+    else:
+        sitk.ProcessObject.SetGlobalWarningDisplay(False)
+        sitk.ProcessObject.SetGlobalDefaultNumberOfThreads(1)
+    warnings.simplefilter("ignore")
     pairs = list(islice(drawn_pairs(), given.pairs))
     print(f"{len(pairs)} pairs; errors are rms over the image, in infrared pixels\n")
     print(HEAD)
     for name in names:
-        print(row(name, *outcomes(name, pairs)), flush=True)
+        print(row(name, [judged(name, *pair) for pair in pairs]), flush=True)
 
 
 if __name__ == "__main__":

@@ -12,10 +12,11 @@ seconds; its results are kept in build/synthetic-laboratory, so that an interrup
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, pi, radians, sin, sqrt
+from math import cos, pi, radians, sin
 from pathlib import Path
 from statistics import NormalDist, median
 from tempfile import TemporaryDirectory
@@ -25,11 +26,9 @@ import numpy as np
 import tifffile
 import yaml
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_simpson, trapezoid
-from scipy.interpolate import CubicSpline
+from scipy.integrate import trapezoid
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
-from scipy.special import j1, k1, ndtr
 
 from chipglow.camera import (
     AnnularAperturePSF,
@@ -72,15 +71,24 @@ from chipglow.radiometry import Band
 from chipglow.scene import Raster, areas
 from chipglow.uncertainty import Estimate
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from synthetic_edge import (
+    FWHM_PER_SIGMA,
+    PITCH,
+    WAVELENGTH,
+    annular_edge,
+    annular_line,
+    edge_radiance,
+    gaussian_edge,
+    tailed_edge,
+)
+
 RESULTS: Final = Path("build/synthetic-laboratory")
 BAND: Final = Band(3.8e-6, 5.1e-6)
-WAVELENGTH: Final = 4.45e-6
-PITCH: Final = 6e-6
 INTEGRATION_TIME: Final = 10e-6
 SHAPE: Final = (48, 64)
 SAMPLES: Final = 3  # of a scene along a pixel's side
 CELSIUS: Final = 273.15
-FWHM_PER_SIGMA: Final = 2 * sqrt(2 * np.log(2))
 IMAGES: Final = 4  # of each object: repetitions
 FRAMES: Final = 8
 EDGE_FRAMES: Final = 16
@@ -126,7 +134,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Optics:
-    """Hidden optics: the point spread function, and in closed form what it makes of an edge."""
+    """Hidden optics: point spread function, its width, edge-spread and transfer functions."""
 
     kind: str
     psf: PointSpreadFunction
@@ -136,70 +144,47 @@ class Optics:
 
 
 def gaussian_optics(fwhm: float) -> Optics:
-    """A round Gaussian."""
+    """Return a round Gaussian."""
     sigma = fwhm / FWHM_PER_SIGMA
     return Optics(
         "gaussian",
         GaussianPSF(fwhm),
         fwhm,
-        lambda u: ndtr(u / sigma),
+        gaussian_edge(fwhm),
         lambda f: float(np.exp(-2 * (pi * sigma * f) ** 2)),
     )
 
 
 def tailed_optics(core: float, fraction: float, length: float) -> Optics:
-    """A Gaussian with a tail exp(-r/L)/(2 pi L^2), whose line spread is a Bessel function."""
+    """Return a Gaussian with a tail exp(-r/L)/(2 pi L^2)."""
     sigma = core / FWHM_PER_SIGMA
 
     def density(r: Any) -> Any:
         gauss = np.exp(-(r**2) / (2 * sigma**2)) / (2 * pi * sigma**2)
         return (1 - fraction) * gauss + fraction * np.exp(-r / length) / (2 * pi * length**2)
 
-    x = np.concatenate([np.linspace(0, 2, 2001), np.linspace(2, 60, 4000)[1:]])
-    line = np.where(x == 0, 1.0, x * k1(np.where(x == 0, 1.0, x))) / pi
-    half = CubicSpline(x * length, cumulative_simpson(line, x=x, initial=0.0))
-
-    def edge(u: NDArray[np.float64]) -> NDArray[np.float64]:
-        tail = 0.5 + np.sign(u) * half(np.minimum(np.abs(u), 60 * length))
-        return np.asarray((1 - fraction) * ndtr(u / sigma) + fraction * tail)
-
     def transfer(f: float) -> float:
         tail = (1 + (2 * pi * length * f) ** 2) ** -1.5
         return float((1 - fraction) * np.exp(-2 * (pi * sigma * f) ** 2) + fraction * tail)
 
     spacing, reach = 1e-6, 8 * length
-    line_of = spacing * np.arange(-round(reach / spacing), round(reach / spacing) + 1)
-    kernel = density(np.hypot(line_of, line_of[:, None]))
+    line = spacing * np.arange(-round(reach / spacing), round(reach / spacing) + 1)
+    psf = MeasuredPSF(density(np.hypot(line, line[:, None])), spacing)
     top = float(density(0.0))
     width = 2 * brentq(lambda r: float(density(r)) - top / 2, 0.0, 2 * core)
-    return Optics("tail", MeasuredPSF(kernel, spacing), width, edge, transfer)
+    return Optics("tail", psf, width, tailed_edge(core, fraction, length), transfer)
 
 
 def mirror_optics(aperture: float, obscuration: float) -> Optics:
-    """Diffraction of an annular pupil; the edge by Abel's integral of the closed form."""
+    """Return the diffraction of an annular pupil."""
     psf = AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
     unit = WAVELENGTH / (2 * pi * aperture)
-    energy = 4 * pi / (1 - obscuration**2)
-
-    def jinc(t: Any) -> Any:
-        return 2 * j1(np.maximum(t, 1e-9)) / np.maximum(t, 1e-9)
-
-    def density(v: Any) -> Any:
-        inner = obscuration**2 * jinc(obscuration * v)
-        return ((jinc(v) - inner) / (1 - obscuration**2)) ** 2
-
-    far = np.concatenate([np.arange(0, 100, 0.15), np.geomspace(100, 4000, 400)])
-    along = np.concatenate([np.arange(0, 200, 0.2), np.geomspace(200, 40000, 1500)])
-    line = np.array([2 * trapezoid(density(np.hypot(x, along)), along) for x in far])
-    half = CubicSpline(far * unit, cumulative_simpson(line, x=far, initial=0.0) / energy)
-
-    def edge(u: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(0.5 + np.sign(u) * half(np.abs(u)))
+    far, line, energy = annular_line(obscuration)
 
     def transfer(f: float) -> float:
-        spectrum = np.cos(2 * pi * f * unit * far) * line
-        return 2 * float(trapezoid(spectrum, far)) / energy
+        return 2 * float(trapezoid(np.cos(2 * pi * f * unit * far) * line, far)) / energy
 
+    edge = annular_edge(WAVELENGTH, aperture, obscuration)
     return Optics("mirror", psf, psf.fwhm, edge, transfer)
 
 
@@ -343,18 +328,13 @@ class Laboratory:
 
     def _edge(self, normal: float) -> NDArray[np.float64]:
         """Radiance of a hot plate half behind a warm blade, at every pixel's square."""
-        node, weight = np.polynomial.legendre.leggauss(6)
-        inside = node * PITCH / 2
-        rows, columns = SHAPE
-        x = (PITCH * (np.arange(columns) - (columns - 1) / 2)[:, None] + inside).ravel()
-        y = (PITCH * ((rows - 1) / 2 - np.arange(rows))[:, None] + inside).ravel()
-        angle = radians(normal)
-        distance = x * cos(angle) + y[:, None] * sin(angle) - self._generator.uniform(-6e-6, 6e-6)
-        fractions = self.optics.edge(distance).reshape(rows, 6, columns, 6)
-        fraction = np.einsum("iajb,a,b->ij", fractions, weight / 2, weight / 2)
+        position = self._generator.uniform(-6e-6, 6e-6)
         blade, plate = self._generator.uniform(230.0, 280.0), self._generator.uniform(520.0, 600.0)
         dark, bright = BAND.radiance(np.array([blade, plate]) + CELSIUS)
-        return np.asarray(dark + (bright - dark) * fraction)
+        radiance = edge_radiance(
+            self.optics.edge, normal, SHAPE, position, background=dark, step=bright - dark
+        )
+        return np.asarray(radiance)
 
 
 def _even(kelvins: float) -> NDArray[np.float64]:

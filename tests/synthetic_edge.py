@@ -41,18 +41,23 @@ def tailed_edge(fwhm, fraction, length):
     return edge
 
 
-@cache
 def annular_edge(wavelength, aperture, obscuration):
     """Of an annular pupil, by Abel's integral of the closed form of its point spread function."""
+    far, line, energy = annular_line(obscuration)
+    unit = wavelength / (2 * pi * aperture)
+    half = CubicSpline(far * unit, cumulative_simpson(line, x=far, initial=0.0) / energy)
+    return lambda u: 0.5 + np.sign(u) * half(np.abs(u))
+
+
+@cache
+def annular_line(obscuration):
+    """Distances v = 2π NA r / λ, the line-spread function there, and all light."""
     far = np.concatenate([np.arange(0, 100, 0.15), np.geomspace(100, 4000, 400)])
     along = np.concatenate([np.arange(0, 200, 0.2), np.geomspace(200, 40000, 1500)])
     line = np.array(
         [2 * trapezoid(annular_density(np.hypot(x, along), obscuration), along) for x in far]
     )
-    energy = 4 * pi / (1 - obscuration**2)
-    unit = wavelength / (2 * pi * aperture)
-    half = CubicSpline(far * unit, cumulative_simpson(line, x=far, initial=0.0) / energy)
-    return lambda u: 0.5 + np.sign(u) * half(np.abs(u))
+    return far, line, 4 * pi / (1 - obscuration**2)
 
 
 def annular_density(v, o):

@@ -700,7 +700,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
     plan = Plan(rake_chip="chip 1")
     with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
         analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
-    for name in ("exposures", "phases", "textures", "line_step", "touching"):
+    for name in ("exposures", "phases", "textures"):
         with pytest.raises(ValueError, match=f"{name}: 0, expected"):
             Plan(**{name: 0})
 

@@ -1,11 +1,13 @@
 """The calibration's and the tool's errors in what is read of a chip, by drawing them anew."""
 
+import csv
 from dataclasses import replace
 from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
+from typer.testing import CliRunner
 
 from chipglow.camera import (
     CalibrationErrors,
@@ -14,6 +16,7 @@ from chipglow.camera import (
     SakumaHattori,
     fit_calibration,
 )
+from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
 from chipglow.laboratory.comparison import compare
@@ -24,6 +27,7 @@ X, Y = np.meshgrid(RASTER.x, RASTER.y)
 SLOPE = np.array([2e5, 1e5])
 CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
 FOUND = ToolUncertainty(along=3e-6, across=1e-6, angle=radians(0.3), pivot=70e-6)
+WIDE = ToolUncertainty(along=16e-6, across=2e-6, angle=radians(1.5), pivot=70e-6)
 BODIES = np.arange(300.0, 701.0, 50.0) + 273.15
 DRAWS = 20_000
 
@@ -158,27 +162,6 @@ def test_squares_and_band_have_errors_in_common(kind, temperature_of, stated):
     assert part.min() > 0.05
 
 
-def test_the_calibration_alone_is_as_drawn():
-    generator = np.random.default_rng(8)
-    fit = fit_calibration(
-        LinearCalibration, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0
-    ).calibration
-    grid = rake_grid(looked_at(fit), TOOL)
-    kelvins = grid.frame_mean[grid.frame_count > 0]
-    read = by_line(counts_of(kelvins), *drawn_parameters(fit, generator))
-    estimate = grid.frame_estimate[grid.frame_count > 0]
-    # Three standard errors of 20 000 draws, and a 513th of the range between nodes.
-    np.testing.assert_allclose(estimate.contribution("calibration"), read.std(axis=0), rtol=0.015)
-    hot, cold = int(np.argmax(kelvins)), int(np.argmin(kelvins))
-    expected = (read[:, hot] - read[:, cold]).std()
-    difference = estimate[hot] - estimate[cold]
-    assert difference.contribution("calibration") == pytest.approx(expected, rel=0.015)
-    # What is common to all squares does not fall in their mean.
-    mean = estimate.mean().contribution("calibration")
-    assert mean == pytest.approx(read.mean(axis=1).std(), rel=0.015)
-    assert mean > 0.8 * estimate.contribution("calibration").min()
-
-
 def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
     fit = fit_calibration(SakumaHattori, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
     measurement = looked_at(fit)
@@ -226,6 +209,27 @@ def test_the_table_of_errors_is_what_the_covariance_says(kind):
     np.testing.assert_allclose(fit.uncertainty(counts), np.sqrt(np.diag(expected)), rtol=1e-3)
 
 
+KNOWN = measured([np.full(RASTER.shape, 700.0)], relative_uncertainty=0.01).data
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: CalibrationErrors(np.arange(2.0), np.ones((1, 1))), r"\(2,\) and \(1, 1\)"),
+        (lambda: CalibrationErrors(np.arange(2.0), np.ones(2)), r"\(k,\) and \(errors, k\)"),
+        (lambda: CalibrationErrors(np.ones(2), np.ones((1, 2))), "does not rise"),
+        (lambda: CalibrationErrors(np.arange(2.0), np.array([[1, np.nan]])), "is not finite"),
+        (
+            lambda: Measurement(KNOWN.drop_vars("calibration_radiance")).calibration_errors,
+            r"'calibration_errors' over .* is missing",
+        ),
+    ],
+)
+def test_impossible_errors_are_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
 def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     frame = measured([temperature_at(np.stack([X, Y], axis=-1))])
     one = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
@@ -236,18 +240,23 @@ def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     assert (one - other).standard_uncertainty > one.standard_uncertainty
 
 
-@pytest.mark.parametrize(
-    ("radiance", "effects", "message"),
-    [
-        ([0.0, 1.0], [[1.0]], r"have shapes \(2,\) and \(1, 1\)"),
-        ([0.0, 1.0], [1.0, 1.0], r"expected \(k,\) and \(errors, k\)"),
-        ([1.0, 1.0], [[1.0, 1.0]], "does not rise"),
-        ([0.0, 1.0], [[1.0, np.nan]], "a number is not finite"),
-    ],
-)
-def test_impossible_errors_are_refused(radiance, effects, message):
-    with pytest.raises(ValueError, match=f"calibration errors: .*{message}"):
-        CalibrationErrors(np.array(radiance), np.array(effects))
+def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_measurement(measured(images(600.0), relative_uncertainty=0.01), tmp_path / "m.nc")
+    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
+    assert result.exit_code == 0, result.output
+    estimate = rake_grid(read_measurement("m.nc")).estimate
+    with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    for column in ("calibration_uncertainty_K", "standard_uncertainty_K"):
+        found = [float(row[column] or "nan") for row in rows]
+        expected = estimate.contribution("calibration").ravel()
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    most = np.nanmax(expected)
+    lines = [line.split() for line in result.output.splitlines()]
+    (line,) = (line for line in lines if line[:1] == ["calibration"])
+    assert float(line[-1]) == pytest.approx(most, rel=0.05)
+    assert "Errors of calibration move all squares together" in result.output
 
 
 # Beside simulations

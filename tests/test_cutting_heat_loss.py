@@ -220,17 +220,3 @@ def test_a_study_names_the_surroundings():
     study = Study(**{"cutting": {"surroundings": section}})
     assert study.cutting.simulation().surroundings == Surroundings(50.0, 0.8, 298.15)
     assert Study().cutting.simulation().surroundings == Surroundings()
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "expected"),
-    [
-        ("convection", -1.0, r"0 W/m\^2/K to 1e\+06 W/m\^2/K"),
-        ("convection", float("nan"), r"0 W/m\^2/K to 1e\+06 W/m\^2/K"),
-        ("emissivity", 1.1, "0 to 1"),
-        ("temperature", 0.0, "over 0 K"),
-    ],
-)
-def test_impossible_surroundings(field, value, expected):
-    with pytest.raises(ValueError, match=rf"Surroundings\.{field}: .*expected {expected}"):
-        Surroundings(**{field: value})

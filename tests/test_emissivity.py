@@ -26,7 +26,6 @@ from chipglow.laboratory.emissivity import (
     write_emissivity,
 )
 from chipglow.laboratory.emissivity.emissivity import COMMON
-from chipglow.laboratory.emissivity.study_sections import surface_text
 from chipglow.scene import FIELD_UNITS, Area, Polygon, Raster, Region, Scene, areas
 from chipglow.study import Study
 from chipglow.study.surface_section import surfaces_of
@@ -226,13 +225,6 @@ def heated_series(generator, temperatures, errors=(0.0, 0.0), frames=4):
     return emissivity_line(rows)
 
 
-def test_a_straight_line_comes_back():
-    line = heated_series(np.random.default_rng(1), (600.0, 700.0, 850.0), frames=2000)
-    # Frames drift by 1 W/(m² sr), of which 2000 leave 0.02: 1e-5 of the contrast at 600 K or more.
-    assert line.estimate.values[1] == pytest.approx(2e-4, abs=1e-6)
-    assert line.at(700.0).values == pytest.approx(0.4, abs=1e-4)
-
-
 @pytest.mark.parametrize("temperatures", [(600.0, 800.0), (600.0, 700.0, 800.0, 900.0)])
 def test_the_line_is_as_uncertain_as_it_says(temperatures):
     generator = np.random.default_rng(5)
@@ -394,18 +386,6 @@ def test_unknown_pixels_of_a_map_do_not_pull_their_neighbours():
     put_in[10, 10] = np.nan
     coarse = MapSurface(put_in, RASTER).at(Raster(RASTER.left, RASTER.top, 12e-6, 15, 20))
     np.testing.assert_allclose(coarse, 0.6, atol=1e-7)
-
-
-def test_a_study_takes_the_regions():
-    found = determine_emissivity([measured(table_1())], HEATING)
-    rows = rows_of(found)
-    study = Study(**yaml.safe_load(surface_text(rows.values())))
-    (surface,) = study.surface.build(1).values()
-    assert surface.chip.mean == pytest.approx(rows["chip body"].mean, abs=6e-5)
-    found = rows["chip body"].standard_deviation
-    assert surface.chip.standard_deviation == pytest.approx(found, abs=6e-5)
-    assert surface.shear_band.mean == pytest.approx(rows["shear band"].mean, abs=6e-5)
-    assert surface_text([rows["body left"]]) == ""
 
 
 # Files and the command

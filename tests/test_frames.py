@@ -6,7 +6,7 @@ from rich.console import Console
 
 from chipglow.cli.tables import screen_table
 from chipglow.laboratory.registration import fit_points
-from chipglow.laboratory.result_file import columns_and_rows
+from chipglow.laboratory.result_file import write_frame
 from chipglow.scene import Raster
 
 RASTER = Raster(0.0, 1e-3, 1e-5, 100, 100)
@@ -21,11 +21,13 @@ FRAME = pd.DataFrame(
 )
 
 
-def test_cells_have_nine_digits_and_are_empty_where_nothing_is_known():
-    columns, rows = columns_and_rows(FRAME)
-    assert columns == ["name", "count", "value_K", "uncertainty_K"]
-    assert rows[0] == ["one", "1", "0.333333333", "0.0512"]
-    assert rows[1] == ["other", "20", "", ""]
+def test_cells_have_nine_digits_and_are_empty_where_nothing_is_known(tmp_path):
+    write_frame(FRAME, tmp_path / "frame.csv")
+    assert (tmp_path / "frame.csv").read_text(encoding="utf-8").splitlines()[:3] == [
+        "name,count,value_K,uncertainty_K",
+        "one,1,0.333333333,0.0512",
+        "other,20,,",
+    ]
 
 
 def test_a_dash_stands_where_nothing_is_known():

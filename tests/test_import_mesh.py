@@ -8,6 +8,7 @@ import pytest
 from exodus_file import Exodus, write_exodus
 from fuzz.cgns_file import write_cgns
 from fuzz.foam_case import write_foam
+from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
 
 from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.mesh import MeshSource
@@ -17,14 +18,7 @@ from chipglow.scene import Material, Raster
 pv = pytest.importorskip("pyvista")
 meshio = pytest.importorskip("meshio")
 
-WIDTH, HEIGHT = 900e-6, 600e-6
-RASTER = Raster(left=0.0, top=HEIGHT, spacing=10e-6, rows=60, columns=90)
-X, Y = np.meshgrid(RASTER.x, RASTER.y)
 VOID, WORKPIECE, TOOL = Material.VOID, Material.WORKPIECE, Material.TOOL
-
-
-def temperature(x, y, at=0.0):
-    return 300.0 + 4e5 * x + 2e5 * y + 10.0 * at
 
 
 def grid_of(shape="quad", count=(9, 6), at=0.0, scale=1.0, depth=None, shift=0.0):
@@ -44,11 +38,6 @@ def grid_of(shape="quad", count=(9, 6), at=0.0, scale=1.0, depth=None, shift=0.0
     grid.point_data["V"] = np.tile((3.0, 1.0, 2.0), (len(points), 1))
     grid.cell_data["PEEQ"] = np.arange(grid.n_cells) / grid.n_cells
     return grid
-
-
-def only_frame(source, raster=RASTER):
-    (frame,) = source.frames(raster)
-    return frame
 
 
 def check_linear(frame, at=0.0, offset=0.0, inside=None):

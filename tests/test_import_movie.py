@@ -10,8 +10,18 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings, strategies as st
 from matplotlib import colormaps
-from movie_codecs import CODECS, Codec, drawn, encode, known_field, measure
-from movie_matrix import GIF, MJPEG, Case, outcome, picture_of, write
+from movies import (
+    CODECS,
+    GIF,
+    MJPEG,
+    Codec,
+    drawn,
+    encode,
+    known_field,
+    read_with_legend,
+    read_with_map,
+    with_legend as page_with_legend,
+)
 
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.colour_scale import ColourScale, colour_uncertainty, lab
@@ -179,13 +189,6 @@ def test_a_picture_without_a_legend_has_none():
     assert find_legend(np.full((50, 50, 3), 255, np.uint8)) is None
 
 
-def test_bands_of_a_legend_are_seen():
-    picture = with_legend(drawn(known_field(0, SHAPE), RAINBOW), NamedMap("rainbow", 10))
-    scale = ColourScale.from_legend(legend_pixels(picture, (100, 10, 108, 80)), ENDS)
-    assert scale.banded
-    assert scale.values == pytest.approx(ColourScale.named("rainbow", ENDS, 10).values)
-
-
 @pytest.mark.parametrize("box", [None, (200, 20, 216, 160)])
 @pytest.mark.parametrize("codec", [RAW, CODECS[2], H264], ids=lambda codec: codec.name)
 def test_values_by_the_legend(tmp_path, codec, box):
@@ -207,14 +210,6 @@ def test_values_by_the_legend(tmp_path, codec, box):
     assert np.sqrt((error**2).mean()) < pixel + source.uncertainty()["temperature"].total
 
 
-def test_no_legend_and_a_wrong_box_are_told(tmp_path):
-    path = a_movie(tmp_path / "a.avi")
-    with pytest.raises(SourceError, match=r"a\.avi: no legend was found"):
-        a_source(path, None).survey()
-    with pytest.raises(SourceError, match=r"a\.avi: legend: box .* does not lie in the picture"):
-        a_source(path, (100, 10, 208, 80)).survey()
-
-
 # Round trips
 
 
@@ -228,10 +223,10 @@ def test_no_legend_and_a_wrong_box_are_told(tmp_path):
     ids=lambda value: value.name,
 )
 def test_the_error_agrees_with_the_predicted_uncertainty(tmp_path, codec, colours):
-    found = measure(tmp_path, codec, colours, 1, (200, 240))
+    found = read_with_map(tmp_path / f"a{codec.suffix}", codec, colours, 1, (200, 240))
     # The factor of the documentation: what a codec smooths along the scale is not seen across it.
-    assert 0.5 < found["rms"] / found["predicted"] < 2
-    assert found["border"] < 0.01
+    assert 0.5 < found.rms / found.stated < 2
+    assert found.extra + found.missing < 0.01 * 200 * 240
 
 
 def test_lossless_values_are_those_of_the_scale(tmp_path):
@@ -408,12 +403,6 @@ def test_the_background_is_found_and_told(tmp_path):
     assert "temperature: Background colours at the border: (255, 255, 255)." in found.notes.assumed
 
 
-def test_a_background_of_the_colour_of_a_value_is_refused(tmp_path):
-    path = a_movie(tmp_path / "a.avi", colours=NamedMap("gray"))
-    with pytest.raises(SourceError, match=r"a\.avi: background: .* is the colour of 139"):
-        a_source(path, NamedMap("gray"), background=((255, 255, 255),)).survey()
-
-
 def with_grey_tool(picture):
     picture = picture.copy()
     picture[50:80, 90:] = 128
@@ -487,9 +476,25 @@ def test_wrong_values_are_refused(change, message):
         a_source(Path("a.avi"), **change)
 
 
-def test_a_crop_outside_is_refused(tmp_path):
-    with pytest.raises(SourceError, match=r"crop: .* does not lie in pictures of 120 x 90"):
-        a_source(a_movie(tmp_path / "a.avi"), crop=(0, 0, 121, 90)).survey()
+GREY = NamedMap("gray")
+
+
+@pytest.mark.parametrize(
+    ("drawn_as", "colours", "more", "said"),
+    [
+        (RAINBOW, RAINBOW, {"crop": (0, 0, 121, 90)}, "crop: .* does not lie in pictures of 120 x"),
+        (RAINBOW, None, {}, r"a\.avi: no legend was found"),
+        (RAINBOW, (100, 10, 208, 80), {}, r"a\.avi: legend: box .* does not lie in the picture"),
+        (GREY, GREY, {"background": ((255, 255, 255),)}, r"a\.avi: background: .* colour of 139"),
+        (GREY, GREY, {}, r"background: \(255, 255, 255\) .* or background: \[\]"),
+    ],
+)
+def test_what_does_not_fit_a_movie_is_refused(tmp_path, drawn_as, colours, more, said):
+    path = a_movie(tmp_path / "a.avi", colours=drawn_as, count=1)
+    with pytest.raises(SourceError, match=said):
+        a_source(path, colours, **more).survey()
+    with pytest.raises(FileNotFoundError):
+        a_source(tmp_path / "none.avi").survey()
 
 
 def fails(path):
@@ -532,11 +537,6 @@ def test_a_list_of_files_is_not_followed(tmp_path):
     path = tmp_path / "list.avi"
     path.write_text(f"ffconcat version 1.0\nfile {target.name}\n")
     assert "cannot be read as a movie" in fails(path)
-
-
-def test_a_missing_movie_is_an_os_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        a_source(tmp_path / "none.avi").survey()
 
 
 @pytest.mark.parametrize("size", [(40_000, 40_000), (2**31 - 1, 2**31 - 1), (0, 5), (20_000, 9)])
@@ -589,44 +589,37 @@ def test_the_maps_of_matplotlib_are_told_from_ours():
     assert all(one < other for one, other in pairwise(ColourScale.named("jet", ENDS).knots))
 
 
-# A matrix of maps, bands, edges and codecs; all of it in benchmarks/movie_matrix.py
-
-
-def case_of(name, bands, edges, codec, marks=()):
-    """A case, with an id."""
-    case = Case(name, bands, edges, codec)
-    return pytest.param(case, id=f"{name}-{bands}-{edges}-{codec.name}", marks=marks)
+# Some of the legends of benchmarks/movies.py
 
 
 @pytest.mark.parametrize(
-    "case",
+    ("name", "bands", "edges", "codec"),
     [
-        # Colours mixed along the scale, a page that is no white.
-        case_of("jet", 0, False, MJPEG, pytest.mark.slow),
+        # Colours mixed along the scale, a page that is not white.
+        pytest.param("jet", 0, False, MJPEG, marks=pytest.mark.slow),
         # Edges within the colours of the ends of the scale.
-        case_of("jet", 0, True, MJPEG, pytest.mark.slow),
-        case_of("rainbow", 9, False, MJPEG),  # bands whose jumps are blurred
-        case_of("viridis", 0, False, MJPEG, pytest.mark.slow),
-        case_of("hot", 12, False, MJPEG, pytest.mark.slow),
-        case_of("gray", 0, True, GIF),  # edges of the colour of a value
+        pytest.param("jet", 0, True, MJPEG, marks=pytest.mark.slow),
+        ("rainbow", 9, False, MJPEG),  # bands whose jumps are blurred
+        pytest.param("viridis", 0, False, MJPEG, marks=pytest.mark.slow),
+        pytest.param("hot", 12, False, MJPEG, marks=pytest.mark.slow),
+        ("gray", 0, True, GIF),  # edges of the colour of a value
     ],
 )
-def test_what_is_stated_of_a_movie_holds(tmp_path, case):
-    found = outcome(tmp_path, case, 1)
-    assert not found.refused
-    assert found.held >= 0.9
-
-
-def one_picture(tmp_path, case, codec=MJPEG):
+def test_what_is_stated_of_a_movie_holds(tmp_path, name, bands, edges, codec):
     path = tmp_path / f"one{codec.suffix}"
-    write(path, iter([picture_of(case, 0)]), codec)
+    assert read_with_legend(path, codec, NamedMap(name, bands), edges, 1).held >= 0.9
+
+
+def one_picture(tmp_path, name, bands=0, edges=False, codec=MJPEG):
+    path = tmp_path / f"one{codec.suffix}"
+    encode(path, iter([page_with_legend(0, NamedMap(name, bands), edges)]), codec)
     return next(pictures(path, index_movie(path)))
 
 
 @pytest.mark.parametrize("bands", [9, 12])
 @pytest.mark.parametrize("name", ["jet", "viridis", "gray"])
 def test_bands_are_counted_though_a_codec_blurs_them(tmp_path, name, bands):
-    picture = one_picture(tmp_path, Case(name, bands, False, MJPEG))
+    picture = one_picture(tmp_path, name, bands)
     scale = ColourScale.from_legend(legend_pixels(picture, find_legend(picture)), ENDS)
     assert scale.banded
     assert len(scale.values) == bands
@@ -635,12 +628,12 @@ def test_bands_are_counted_though_a_codec_blurs_them(tmp_path, name, bands):
 
 @pytest.mark.parametrize("name", ["jet", "viridis", "gray", "turbo"])
 def test_colours_that_run_on_are_no_bands(tmp_path, name):
-    picture = one_picture(tmp_path, Case(name, 0, False, MJPEG))
+    picture = one_picture(tmp_path, name)
     assert not ColourScale.from_legend(legend_pixels(picture, find_legend(picture)), ENDS).banded
 
 
 def test_lines_of_a_mesh_are_found_and_a_narrow_band_is_none(tmp_path):
-    meshed = one_picture(tmp_path, Case("gray", 0, True, GIF), GIF)
+    meshed = one_picture(tmp_path, "gray", edges=True, codec=GIF)
     assert 0.1 < dark_lines(meshed)[100:, :250].mean() < 0.3
     hot = drawn(known_field(0, SHAPE), NamedMap("jet"))
     hot[:, 40:42] = (0, 0, 0)
@@ -681,13 +674,6 @@ def test_a_plain_coloured_background_is_no_material(tmp_path):
     shown = frame.material == Material.WORKPIECE
     # A corner of one pixel counts as a line of the background's colour.
     assert (shown != np.isfinite(known_field(0, SHAPE))).sum() <= 2
-
-
-def test_a_background_of_the_scale_alone_is_refused_unless_said(tmp_path):
-    path = a_movie(tmp_path / "a.avi", colours=NamedMap("gray"))
-    with pytest.raises(SourceError, match=r"background: \(255, 255, 255\) .* or background: \[\]"):
-        a_source(path, NamedMap("gray")).survey()
-    assert a_source(path, NamedMap("gray"), background=()).survey().kind
 
 
 def test_what_lies_under_lines_is_in_the_uncertainty(tmp_path):

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from fuzz.tecplot_file import ZoneOfFile, extras_of_header, write_tecplot
+from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
 from refusals import refused_on
 
 from chipglow.io.sources import Placement, SourceError
@@ -10,15 +11,9 @@ from chipglow.scene import Material, Raster
 
 pv = pytest.importorskip("pyvista")
 
-WIDTH, HEIGHT, DEPTH = 900e-6, 600e-6, 300e-6
-RASTER = Raster(left=0.0, top=HEIGHT, spacing=10e-6, rows=60, columns=90)
-X, Y = np.meshgrid(RASTER.x, RASTER.y)
+DEPTH = 300e-6
 COUNT = (10, 7)
 NAMES = ("X", "Y", "Temperature [K]", "Strain")
-
-
-def temperature(x, y, at=0.0):
-    return 300.0 + 4e5 * x + 2e5 * y + 10.0 * at
 
 
 def nodes(shift=0.0):
@@ -53,11 +48,6 @@ def ordered_zone(ghosts, **said):
     strain[:6, :9] = inner
     columns = [x, y, temperature(x, y), strain.ravel()]
     return ZoneOfFile(columns, (*COUNT, 1), centred=(False, False, False, True), **said)
-
-
-def only_frame(source):
-    (frame,) = source.frames(RASTER)
-    return frame
 
 
 def check(frame, at=0.0, atol=2e-4):

@@ -14,7 +14,6 @@ from chipglow.cutting import (
     CuttingConditions,
     CuttingSimulation,
     EnergyHistory,
-    FlowStress,
     Numerics,
 )
 from chipglow.laboratory.chip import Inertia, inertia
@@ -79,27 +78,7 @@ def test_the_mass_is_scaled_by_the_speed_to_half_a_per_cent_of_the_force(speed):
     assert simulation.momentum_flow < 0.005 * 719e3
     slow = simulation.mass_scaling == 1000.0
     assert slow or simulation.momentum_flow > 0.004 * 719e3
-
-
-def test_a_mass_scaling_of_ones_own_is_kept():
-    simulation = CuttingSimulation(numerics=Numerics(mass_scaling=37.0))
-    assert simulation.mass_scaling == 37.0
-
-
-def test_the_mass_scaling_is_worked_out_once_for_each_simulation(monkeypatch):
-    simulation = CuttingSimulation()
-    stress, asked = FlowStress.at, []
-
-    def counted(*arguments):
-        asked.append(arguments)
-        return stress(*arguments)
-
-    monkeypatch.setattr(FlowStress, "at", counted)
-    assert simulation.mass_scaling == simulation.mass_scaling
-    assert len(asked) == 1
-    fast = replace(simulation, conditions=CuttingConditions(speed=400 / 60))
-    # By the square of the speed; it is not the other simulation's.
-    assert fast.mass_scaling == pytest.approx(simulation.mass_scaling * (250 / 400) ** 2)
+    assert CuttingSimulation(numerics=Numerics(mass_scaling=37.0)).mass_scaling == 37.0
 
 
 def test_momentum_flow_of_the_papers_cut():

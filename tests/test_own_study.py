@@ -14,8 +14,8 @@ from chipglow.radiometry import Band
 from chipglow.report import result_rows, write_report
 from chipglow.scene import Raster
 from chipglow.study import Study, expected_cost, fit, load_study, study_text
-from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.camera_section import CAMERAS
+from chipglow.study.fitting import left_to_the_paper
 
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},

@@ -86,17 +86,11 @@ def test_quantities_are_exactly_the_float_that_python_writes(kind, text, value):
     assert quantity(getattr(units, kind)).parse(text) == value
 
 
-@pytest.mark.parametrize("text", ["2/3 um", "4/3 um", "1/7 um", "0.5 um", "0.66667 um"])
-def test_a_simple_fraction_is_written_as_such(text):
-    assert LENGTH.text(LENGTH.parse(text)) == text
-
-
-def test_a_fraction_of_nothing_is_refused():
+def test_a_simple_fraction_is_written_as_such_and_a_range_has_one_unit():
+    for text in ("2/3 um", "4/3 um", "1/7 um", "0.5 um", "0.66667 um"):
+        assert LENGTH.text(LENGTH.parse(text)) == text
     with pytest.raises(ValueError, match="'1/0 um' is not a length"):
         LENGTH.parse("1/0 um")
-
-
-def test_a_range_has_one_unit_for_both_limits():
     assert quantity(units.WavelengthRange).parse_range("3.8-5.1 um") == (3.8e-6, 5.1e-6)
 
 
@@ -195,12 +189,6 @@ def test_every_field_is_in_the_template_after_a_comment():
         places = [i for i, line in enumerate(lines) if line.startswith(f"{name}:")]
         assert places, name
         assert all(lines[i - 1].startswith("#") for i in places), name
-
-
-def test_the_template_names_the_other_kinds_of_psf():
-    text = study_text(Study())
-    assert "{kind: gaussian, fwhm: 12 um}" in text
-    assert "{kind: measured, file: psf.nc}" in text
 
 
 def load(text, folder):
@@ -484,8 +472,8 @@ def test_the_cache_is_listed_and_cleared(cache, runs):
 
 def test_what_ended_runs_left_is_cleared_and_what_runs_stays(cache):
     cache.mkdir()
-    part = cache / ".scene-ended.0123abcd.part.nc"
-    for path in (part, part.with_suffix(".npz"), cache / ".scene-other.89ab4567.part.npz"):
+    part = cache / ".scene-ended.0123abcd.part"
+    for path in (part, part.with_suffix(".npz"), cache / ".scene-other.89ab4567.npz"):
         path.write_bytes(b"x" * 10)
     with atomic_path(cache / "scene-running.nc") as running:
         running.write_bytes(b"x" * 10)

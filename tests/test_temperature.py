@@ -145,17 +145,6 @@ def test_stated_intervals_hold_the_truth():
     assert 0.85 < np.std(scores) < 1.15
 
 
-def test_few_images_widen_the_interval():
-    emissivity = EmissivityLine.constant(0.42)
-    images = [image(drift=2.0, seed=seed) for seed in range(3)]
-    found = true_temperature(images, WHOLE, emissivity)
-    # Three repetitions, two degrees of freedom: Student's 4.3.
-    assert found.estimate.degrees_of_freedom == pytest.approx(2.0)
-    assert found.estimate.coverage_factor() == pytest.approx(4.303, abs=0.01)
-    alone = true_temperature(images[:1], WHOLE, emissivity)
-    assert np.isnan(alone.estimate.contribution("repeatability"))
-
-
 @pytest.mark.parametrize(("stated", "least", "most"), [(None, 0.0, 0.8), (0.01, 0.9, 1.0)])
 def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most):
     """1 % from the recording of the emissivity to that of the hot chip, of 60 repeats."""
@@ -325,24 +314,13 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     assert both.standard_uncertainty == pytest.approx(0.0, abs=1e-12)
 
 
-def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
-    flags = np.zeros((1, *RASTER.shape), np.uint8)
-    flags[:, :, :10] = Flag.SATURATED
-    found = determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
-    write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
-    stored = read_emissivity_lines(tmp_path / "e.nc")["chip"]
-    for emissivity in (found.of(WHOLE).line, stored):
-        (warning,) = true_temperature([image()], WHOLE, emissivity).estimate.warnings
-        assert warning.startswith("Emissivity: chip: 300 of 1200 pixels are left out")
-
-
 def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
     emissivity = EmissivityLine.constant(0.42, 0.05)
     one, other = (true_temperature([image(seed=n)], WHOLE, emissivity).estimate for n in range(2))
     assert (one - other).standard_uncertainty < 1e-6 * one.standard_uncertainty
 
 
-def test_what_cannot_be_trusted_is_said():
+def test_doubts_are_warnings(tmp_path):
     half = np.where(np.arange(RASTER.columns) < 20, HOT, HOT + 300.0)
     uneven = measured(np.full(RASTER.shape, 0.42), reference=HOT)
     uneven.data["radiance"].values[:] = 0.42 * BAND.radiance(half) + 0.58 * BAND.radiance(ROOM)
@@ -356,6 +334,12 @@ def test_what_cannot_be_trusted_is_said():
         "300 of 1200 pixels are left out (300 saturated)" in one for one in found.estimate.warnings
     )
     assert true_temperature([image()], WHOLE, EmissivityLine.constant(0.42)).estimate.warnings == ()
+    # Those of the emissivity travel to the temperature, also through its file.
+    found = determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
+    write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
+    stored = read_emissivity_lines(tmp_path / "e.nc")["chip"]
+    (warning,) = true_temperature([image()], WHOLE, stored).estimate.warnings
+    assert warning.startswith("Emissivity: chip: 300 of 1200 pixels are left out")
 
 
 def earlier_version(folder):

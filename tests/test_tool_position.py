@@ -158,18 +158,6 @@ def test_a_rake_angle_is_doubted_beyond_its_expanded_uncertainty(turned, doubted
     )
 
 
-def test_how_sure_the_best_is_knows_of_the_tool():
-    """A slope along the face and two sets, 10 K too cold and 30 K too hot: the first stays nearer
-    while the tool's error makes up to 10 K, as for any error that all values have in common.
-    """
-    base = 700.0 + 1e6 * (X * UP[0] + Y * UP[1])
-    sets = {"cold": measured([base - 10.0] * 3), "hot": measured([base + 30.0] * 3)}
-    stated = StatedUncertainties(tool=ToolUncertainty(along=15e-6, across=0.0))
-    result = compare(measured([base] * 3), sets, TOOL, CURVE, stated)
-    # 15 K: the normal distribution's probability of under 10 K; 4000 draws are good to 0.8 %.
-    assert result.places[0].confidence == pytest.approx(0.748, abs=0.025)
-
-
 def test_the_uncertainty_holds_for_tools_that_are_off_at_random():
     """A chip that is hot at the face, where contact ends: neither slope nor bend is even."""
     along = (X - TOOL.rake_foot[0]) * UP[0] + (Y - TOOL.rake_foot[1]) * UP[1]

@@ -14,13 +14,13 @@ Linux only.
 import argparse
 import gc
 import os
-import pickle
 import resource
 import signal
 import sys
 import tempfile
 import time
 from collections import Counter
+from multiprocessing import get_context
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, settings, strategies as st
@@ -30,6 +30,7 @@ from chipglow.io.sandbox import Isolated, limit_memory
 from chipglow.io.sources import SourceError
 from chipglow.scene import Raster
 
+FORK = get_context("fork")
 RASTER = Raster(0.0, 1.0, 1.0 / 24, 24, 24)
 PATIENCE = 4
 MEMORY = 1024**3
@@ -114,63 +115,51 @@ def read(source):
 
 
 class Reader:
-    """A fork of this process that reads one source after the other; a new one if it dies."""
+    """A fork of this process that reads one source after the other; a new one if it ends."""
 
     def __init__(self):
         self._child = None
         self._left = 0
 
     def outcome(self, source):
-        """What becomes of a source."""
+        """Return what becomes of a source."""
         if self._left == 0:
-            self.close()
             self._start()
         self._left -= 1
-        request = pickle.dumps(source)
-        os.write(self._requests, len(request).to_bytes(4, "little") + request)
-        answer = os.read(self._answers, 1)
-        if answer:
-            return OUTCOMES[answer[0]]
-        self._left = 0
-        _, status = os.waitpid(self._child, 0)
-        self._child = None
-        hung = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM
-        return "hang" if hung else "crash"
-
-    def close(self):
-        """End the fork."""
-        if self._child is not None:
-            os.close(self._requests)
-            os.close(self._answers)
-            os.waitpid(self._child, 0)
-            self._child = None
+        self._pipe.send(source)
+        try:
+            return OUTCOMES[self._pipe.recv()]
+        except EOFError:
+            self._left = 0
+            self._child.join()
+            return "hang" if self._child.exitcode == -signal.SIGALRM else "crash"
 
     def _start(self):
-        requests, answers = os.pipe(), os.pipe()
-        self._child, self._left = os.fork(), CASES_OF_A_FORK
-        if self._child == 0:
-            os.close(requests[1])
-            os.close(answers[0])
-            serve(requests[0], answers[1])
-        os.close(requests[0])
-        os.close(answers[1])
-        self._requests, self._answers = requests[1], answers[0]
+        if self._child is not None:
+            self._child.kill()
+            self._child.join()
+        self._pipe, end = FORK.Pipe()
+        self._child, self._left = (
+            FORK.Process(target=serve, args=(end,), daemon=True),
+            CASES_OF_A_FORK,
+        )
+        self._child.start()
+        end.close()
 
 
-def serve(requests, answers):
+def serve(pipe):
     """Read sources and answer what became of them, in a fork."""
     devnull = os.open(os.devnull, os.O_WRONLY)
     os.dup2(devnull, 1)
     os.dup2(devnull, 2)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     limit_memory(MEMORY)
-    while length := int.from_bytes(os.read(requests, 4), "little"):
-        source = pickle.loads(os.read(requests, length))
+    while True:
+        source = pipe.recv()
         signal.alarm(PATIENCE)
         found = read(source)
         signal.alarm(0)
-        os.write(answers, bytes([found]))
-    os._exit(0)
+        pipe.send(found)
 
 
 def read_as_the_product_does(source, name):

@@ -277,6 +277,7 @@ def update_grid(
 
 
 class Stepper:
+    name = "Warp"
     # Two passes over a record of 16 numbers; per node velocity, sums and density of the cell.
     bytes_per_point = 8 * (4 * 16 + (2 * 4 + 4 * 5 + 4 * 2) / 4)
 
@@ -285,7 +286,7 @@ class Stepper:
         wp.init()
         wp.set_module_options({"enable_backward": False})
         wp.set_device("cpu")
-        self.start, self.count = start, start.points.size
+        self.start, self.threads, self.count = start, threads, start.points.size
         shape = (start.grid.columns, start.grid.rows)
         self.points = wp.zeros(self.count, dtype=Point)
         self.nodes = wp.zeros(shape, dtype=Sums)

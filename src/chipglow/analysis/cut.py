@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.heated import HeatedObject
+from chipglow.analysis.places import TOUCHING
 from chipglow.cutting import EnergyHistory
 from chipglow.laboratory.chip import (
     ChipMetrics,
@@ -94,7 +95,7 @@ def lacking(scene: Scene) -> Iterator[str]:
             yield f"The scene has no {title}."
 
 
-def find_cut(scene: Scene, duration: float, exposures: int, touching: float, tell: Progress) -> Cut:
+def find_cut(scene: Scene, duration: float, exposures: int, tell: Progress) -> Cut:
     """Return the segments of a cut with a developed shear band, one per part of the scene."""
     starts = spread_starts(scene, duration, exposures)
     others = other_starts(scene, duration)
@@ -105,7 +106,7 @@ def find_cut(scene: Scene, duration: float, exposures: int, touching: float, tel
     tell("shear band", 1.0)
     developed = _developed(scene, instants[: len(starts)])
     segments = [
-        Segment.of(scene, instant, duration, touching)
+        Segment.of(scene, instant, duration, TOUCHING)
         for instant in (instants[developed], *instants[len(starts) :])
         if instant.band is not None
     ]

@@ -43,12 +43,10 @@ class Distribution:
 
     @property
     def draws(self) -> int:
-        """Number of draws."""
         return int(self.values.size)
 
     @property
     def mean(self) -> float:
-        """Mean of the draws."""
         return float(self.values.mean())
 
     @property
@@ -96,7 +94,6 @@ class Distribution:
         return self.mean - half, self.mean + half
 
     def differs_from(self, value: float) -> bool:
-        """Return whether a value lies outside the interval."""
         low, high = self.interval
         return not low <= value <= high
 

@@ -21,7 +21,7 @@ from chipglow.analysis.cut import (
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect
 from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
-from chipglow.analysis.places import BandPlace, HottestPlace, Place, RakePlace
+from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
@@ -120,7 +120,6 @@ class _Task:
 
     @property
     def duration(self) -> float:
-        """How long an exposure lasts in s."""
         return self.camera.frame_duration(self.scene.raster)
 
     def attempt(self, title: str, compute: Callable[[], _Part]) -> _Part | None:
@@ -232,20 +231,20 @@ def _find_cut(task: _Task) -> tuple[Cut | None, tuple[str, ...]]:
         if name not in task.surfaces:
             raise ValueError(f"plan: surface {name!r} is not one of {list(task.surfaces)}")
     try:
-        return find_cut(scene, task.duration, plan.exposures, plan.touching, task.tell), ()
+        return find_cut(scene, task.duration, plan.exposures, task.tell), ()
     except (NoShearBandError, NoContactError) as error:
         return None, (f"Rake face and shear band are not analysed: {error}.",)
 
 
 def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
     """Return all instants; the segments are drawn, at the rake face and in the shear band."""
-    plan, reach = task.plan, (task.plan.line_reach, task.plan.line_step)
+    plan = task.plan
     used: tuple[tuple[str, list[list[Place]]], ...] = (
         (
             plan.rake_chip,
-            [[RakePlace("rake face", s.tool, s.contact_length, *reach)] for s in cut.segments],
+            [[RakePlace("rake face", s.tool, s.contact_length)] for s in cut.segments],
         ),
-        (plan.band_chip, [[BandPlace("shear band", s.band, *reach)] for s in cut.segments]),
+        (plan.band_chip, [[BandPlace("shear band", s.band)] for s in cut.segments]),
     )
     textures = max(_textures(task, name) for name, _ in used)
     shape = len(cut.segments), textures, plan.phases**2, len(used)
@@ -304,9 +303,9 @@ def _places(task: _Task, middle: int) -> Iterator[Place]:
     yield HottestPlace()
     if scene.tool is not None and not plan.all_places:
         workpiece = scene.field("material", middle) == Material.WORKPIECE
-        contact = contact_length(scene.raster, workpiece, scene.tool, plan.touching)
+        contact = contact_length(scene.raster, workpiece, scene.tool, TOUCHING)
         if contact > 0:
-            yield RakePlace("rake face", scene.tool, contact, plan.line_reach, plan.line_step)
+            yield RakePlace("rake face", scene.tool, contact)
     yield from plan.all_places
 
 
@@ -354,7 +353,6 @@ def _scene_variables(
 def _image_variables(
     measurements: Mapping[str, Measurement], looked: Looked, shown: int
 ) -> Variables:
-    """Return the images of every instant, and of the shown one by effects."""
     every = list(measurements.values())
     pixels, per_pixel = every[0].raster, ("pixel_y", "pixel_x")
     over = "surface", "instant", *per_pixel
@@ -412,7 +410,6 @@ def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Varia
 
 
 def _history_variables(cut: Cut) -> Variables:
-    """Return forces and chip thickness over time, as far as they are known."""
     variables: Variables = {}
     if forces := cut.forces:
         variables |= {
@@ -431,7 +428,6 @@ def _history_variables(cut: Cut) -> Variables:
 
 
 def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
-    """Yield warnings of the images of the shown exposure."""
     for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"

@@ -107,8 +107,7 @@ def _heated_chip(
     # Wholly shear band within its width: the rate says so, as in the developing band.
     rate = np.where(away < width / 2, 1e6, 0.0)
     temperature = CHIP_TEMPERATURES.get(name, CHIP_TEMPERATURES["chip 1"])
-    scene = _scene(raster, temperature, material, rate)
-    images = _images(camera, scene, surface, textures, temperature)
+    images = _images(camera, surface, textures, raster, temperature, material, rate)
     regions = tuple(
         Region(
             f"{name} {title}",
@@ -138,8 +137,7 @@ def _heated_tool(
         return tool.signed_distance(*np.meshgrid(of.x, of.y))
 
     material = np.where(depth(raster) < 0, Material.TOOL, Material.VOID)
-    scene = _scene(raster, TOOL_TEMPERATURE, material, 0.0)
-    images = _images(camera, scene, surface, textures, TOOL_TEMPERATURE)
+    images = _images(camera, surface, textures, raster, TOOL_TEMPERATURE, material, 0.0)
     inside = depth(images[0].raster) < -_TOOL_MARGIN * pitch
     area = Area("tool", "tool", inside, whole=True)
     return HeatedObject("tool", images[0], (), (_row("tool", surface.tool, images, area),))
@@ -152,13 +150,16 @@ def _raster(pitch: float, columns: int, corner: tuple[float, float] | None = Non
     return Raster(left, top, spacing, rows, columns)
 
 
-def _scene(
+def _images(
+    camera: Camera,
+    surface: FeatureSurface,
+    textures: int,
     raster: Raster,
     temperature: float,
     material: NDArray[np.integer],
     rate: NDArray[np.float64] | float,
-) -> Scene:
-    """Return a scene of one frame of one temperature, at rest."""
+) -> list[EmissivityMap]:
+    """Return emissivity maps of an object of one temperature, at rest, with each texture."""
     x, y = np.meshgrid(raster.x, raster.y)
     fields = {
         "temperature": temperature,
@@ -171,13 +172,7 @@ def _scene(
         "material_y": y,
     }
     frames = {name: np.broadcast_to(of, (1, *raster.shape)) for name, of in fields.items()}
-    return Scene.from_fields(raster, [0.0], frames)
-
-
-def _images(
-    camera: Camera, scene: Scene, surface: FeatureSurface, textures: int, temperature: float
-) -> list[EmissivityMap]:
-    """Return emissivity maps of the object with each texture."""
+    scene = Scene.from_fields(raster, [0.0], frames)
     heating = Heating(temperature, reference_uncertainty=THERMOCOUPLE)
     at_rest = [replace(surface.redrawn(k), follow="material") for k in range(textures)]
     return [determine_emissivity([camera.measure(scene, one, 0.0)], heating) for one in at_rest]

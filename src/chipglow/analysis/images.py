@@ -137,7 +137,6 @@ class ExposureImages:
         self._references: dict[tuple[object, ...], Array] = {}
 
     def reference(self, camera: Camera) -> Array:
-        """Return the reference temperature of a camera's pixels."""
         key = camera.pitch, camera.offset, camera.shape, camera.fill_factor
         reference = self._references.get(key)
         if reference is None:
@@ -166,7 +165,6 @@ class ExposureImages:
         return np.stack(rows)
 
     def errors(self, camera: Camera) -> xr.Dataset:
-        """See `error_images`."""
         reference, measured, ideal = self.stack(camera, CASES)
         limit, unusable = camera.lower_limit or 0.0, self._read(camera)[1]
         images = {
@@ -184,7 +182,6 @@ class ExposureImages:
         )
 
     def parts(self, camera: Camera, untextured: Exposure | None = None) -> xr.Dataset:
-        """See `error_parts`."""
         errors, quiet = self.errors(camera), replace(camera, detector=None)
         kind = "maximum" if self.kind == "true" else self.kind
         mean = self.exposure.mean_radiance
@@ -237,14 +234,12 @@ def _without_detector(camera: Camera) -> Camera:
 
 
 def _blurred(exposure: Exposure, psf: PointSpreadFunction) -> Array:
-    """Return the radiance of the samples behind the optics."""
     return blur(exposure.mean_radiance, psf, exposure.raster.spacing)
 
 
 def _formed(
     exposure: Exposure, blurred: Callable[[PointSpreadFunction], Array] | None, camera: Camera
 ) -> Array:
-    """Return the radiance of the pixels."""
     radiance, psf = exposure.mean_radiance, camera.psf
     if blurred and psf and camera.psf_order == "optics" and "footprint" not in psf.includes:
         radiance, camera = blurred(psf), replace(camera, psf=None)

@@ -38,7 +38,6 @@ class View:
 
     @property
     def textures(self) -> int:
-        """How many textures are drawn."""
         return int(self.numbers.shape[1])
 
 

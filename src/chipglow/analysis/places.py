@@ -16,6 +16,12 @@ from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
 _EXTREMES: Final = ("mean", "most negative", "greatest")
+LINE_REACH, LINE_STEP = 60e-6, 1e-6
+"""Reach of the lines across rake face and shear band to either side, and their points' distance."""
+
+TOUCHING: Final = 3e-6
+"""Distance from the rake face in m within which material touches it: half the paper's pixel."""
+
 NEAR: Final = 2.0
 """Distance in pixels within which an extremum of an image belongs to a place."""
 
@@ -146,8 +152,8 @@ class RakePlace(Place):
 
     tool: Tool
     contact_length: float
-    half_length: float  # of the line across, in m
-    step: float  # between its points, in m
+    half_length: float = LINE_REACH
+    step: float = LINE_STEP
     quantities: ClassVar = (
         "mid-contact",
         "most negative within two pixels",
@@ -183,8 +189,8 @@ class BandPlace(Place):
     """The shear band, read across its middle."""
 
     band: ShearBand
-    half_length: float  # of the line across, to either side of the ridge, in m
-    step: float  # between its points, in m
+    half_length: float = LINE_REACH
+    step: float = LINE_STEP
     quantities: ClassVar = (
         "ridge of strain rate",
         "ridge of measured temperature",
@@ -218,7 +224,6 @@ def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> 
 
 
 def _mean(values: Stack) -> float:
-    """Return the mean of the finite values; NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if known.size else nan
 

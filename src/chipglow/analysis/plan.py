@@ -25,12 +25,6 @@ class Plan(Part):
     cut : bool
         Whether a scene that shows a cut is analysed segment by segment, at the rake face and the
         shear band. Otherwise the scene is analysed exposure by exposure.
-    line_reach, line_step : float
-        Reach of the lines across rake face and shear band to either side, and distance between
-        their points, in m.
-    touching : float
-        Distance from the rake face in m within which material counts as touching it; by default
-        half the paper's pixel.
 
     Raises
     ------
@@ -102,15 +96,9 @@ class Plan(Part):
     ] = field(default_factory=dict)
     places: tuple[Place, ...] = ()
     cut: bool = True
-    line_reach: float = 60e-6
-    line_step: float = 1e-6
-    touching: float = 3e-6
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("line_reach", "line_step", "touching"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"{name}: {getattr(self, name)!r}, expected over 0 m")
         if not self.psf_widths:
             raise ValueError("psf_widths: none, expected one length or more")
         names = [place.name for place in self.all_places]

@@ -1,6 +1,7 @@
 """The error of one band and of the ratio of two against the true temperature, cause by cause."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -128,7 +129,6 @@ class WavelengthPlan(Part):
         return [*((number,) for number in range(len(self.bands))), *self.pairs]
 
     def thermometer(self, pair: Sequence[int]) -> RatioThermometer:
-        """The ratio of two bands of a grey body."""
         first, second = (self.bands[number] for number in pair)
         exponent = log((second.lower + second.upper) / (first.lower + first.upper))
         return RatioThermometer(first, second, 1.0, self.exponent_uncertainty * exponent)
@@ -238,7 +238,8 @@ def wavelength_errors(
     """
     tell = progress or (lambda label, part: None)
     cameras = [camera.in_band(band) for band in plan.bands]
-    kept = [spot for spot in spots if _has_room(scene, camera, spot.start, plan.delay)]
+    duration = camera.integration_time
+    kept = [spot for spot in spots if _has_room(scene, spot.start + plan.delay, duration)]
     if not kept:
         raise ValueError(
             f"delay: {1e6 * plan.delay:g} us, expected so little that the scene lasts until the "
@@ -291,7 +292,7 @@ def cut_spots(
 ) -> list[Spot]:
     """Return spots at the rake face, half a pixel into the chip, and in each shear band."""
     tell = progress or (lambda label, part: None)
-    cut = find_cut(scene, camera.integration_time, plan.exposures, plan.touching, tell)
+    cut = find_cut(scene, camera.integration_time, plan.exposures, tell)
     spots = []
     for segment in cut.segments:
         tool = segment.tool
@@ -316,13 +317,11 @@ def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str
     ]
 
 
-def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
-    """Return whether the scene lasts until a delayed exposure ends."""
-    try:
-        frame_weights(scene.times, scene.frame_spacing, start + delay, camera.integration_time)
-    except ValueError:
-        return False
-    return True
+def _has_room(scene: Scene, start: float, duration: float) -> bool:
+    with suppress(ValueError):
+        frame_weights(scene.times, scene.frame_spacing, start, duration)
+        return True
+    return False
 
 
 def _draws(
@@ -419,7 +418,6 @@ def _compared(
 
 
 def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: Array) -> Array:
-    """Return the temperature by radiance and emissivity in a band."""
     return np.asarray(band.temperature((radiance - environment) / emissivity + environment))
 
 
@@ -444,7 +442,6 @@ def _of_place(
 
 
 def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
-    """Return the centre of the pixel that holds a spot."""
     pixels = camera.pixels(scene.raster)
     corner = np.array([pixels.left, pixels.top])
     column, row = np.floor((spot.point - corner) * [1, -1] / pixels.spacing).astype(int)
@@ -475,17 +472,14 @@ def _of_pixel(
 
 
 def _image(camera: Camera, exposure: Exposure) -> Array:
-    """Return the radiance of a camera's pixels before its detector in W/(m² sr), shape (y, x)."""
     return camera.form_image(exposure.mean_radiance, exposure.raster)
 
 
 def _ideal(camera: Camera) -> Camera:
-    """Return the camera without its optics."""
     return replace(camera, psf=None, optics=())
 
 
 def _read(camera: Camera, image: Array, start: float) -> Array:
-    """Return what the camera's detector makes of an image."""
     return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)
 
 

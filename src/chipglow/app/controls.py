@@ -95,7 +95,6 @@ class Control:
 
     @property
     def setting(self) -> str:
-        """Path of the setting in the study."""
         return self.path
 
     @property
@@ -146,17 +145,14 @@ class PlaceControl(Control):
 
     @property
     def setting(self) -> str:
-        """Path of the place in the study."""
         is_line = self.path in LINES
         return f"analysis.lines.{LINES[self.path]}" if is_line else f"analysis.points.{CURSOR}"
 
     def text(self, value: Any) -> str:
-        """Return positions as links write them."""
         points = value if self.path in LINES else (value,)
         return ";".join(f"{1e6 * x:.1f},{1e6 * y:.1f}" for x, y in points)
 
     def shown(self, value: Any) -> str:
-        """Return positions as their field shows them."""
         return self.text(value).replace(",", ", ").replace(";", "; ")
 
     def value(self, text: str) -> Any:
@@ -230,7 +226,6 @@ class State:
         return self.study.analysis.points[CURSOR]
 
     def line(self, name: str) -> LinePlace:
-        """Return one of `LINES`."""
         return LinePlace(LINES[name], self.study.analysis.lines[LINES[name]])
 
     def key(self, *prefixes: str) -> tuple[tuple[str, str], ...]:
@@ -287,7 +282,6 @@ class Controls:
 
     @cached_property
     def initial(self) -> State:
-        """The state at the initial values."""
         return self.state({})
 
     @cached_property
@@ -295,11 +289,9 @@ class Controls:
         return {row.path: row for row in self.rows}
 
     def row(self, path: str) -> Control:
-        """Return the control of a path."""
         return self._by_path[path]
 
     def is_shown(self, row: Control, state: State) -> bool:
-        """Whether the study has the setting of a control."""
         return row.path in _VIEW or _has(state.study, row.setting)
 
     def value(self, row: Control, state: State) -> Any:
@@ -359,7 +351,6 @@ def _word(row: Control, texts: Texts) -> str:
 
 
 def _check_exposure(state: State, scene: Scene) -> None:
-    """Raise a ValueError if the scene holds no exposure of the state's camera."""
     camera = state.study.camera.on(scene.raster, state.study.seed)
     camera.pixels(scene.raster)
     duration = camera.frame_duration(scene.raster)
@@ -462,7 +453,6 @@ def _surfaces(study: Study) -> dict[str, Option]:
 
 
 def _reading(study: Study, chip: str) -> object:
-    """Return the section of the analysis that reads one chip everywhere."""
     return changed(study.analysis, {"rake_chip": chip, "band_chip": chip})
 
 

@@ -206,7 +206,6 @@ class Figures:
                 line.band.data = {"along": [], "low": [], "high": []}
 
     def show_drawn(self, picture: Picture, drawn: Drawn) -> None:
-        """Shade the range of draws along the lines."""
         for name, line in self.lines.items():
             along, draws = picture.lines[name]["along"], drawn.lines[name]
             known = np.isfinite(draws).all(axis=0)
@@ -214,7 +213,6 @@ class Figures:
             line.band.data = {"along": along[known], "low": low, "high": high}
 
     def set_theme(self, theme: str) -> None:
-        """Write everything on light or dark ground."""
         text = _TEXT[theme]
         for one in self.all.values():
             one.title.text_color = text

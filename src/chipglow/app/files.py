@@ -93,7 +93,6 @@ def _figure(picture: Picture, model: SceneModel, view: View, drawn: Drawn | None
 def _draw_images(
     figure: Figure, axes: Any, picture: Picture, model: SceneModel, view: View
 ) -> None:
-    """Draw scene, measurement and error in the colours of the page."""
     state, tool = picture.state, model.opened.scene.tool
     factor, _ = length_unit(model.opened.scene.raster)
     left, right, bottom, top = (factor * edge for edge in view)

@@ -10,6 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from chipglow.analysis import spread_starts
+from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
@@ -27,13 +28,9 @@ QUICK_SAMPLES: Final = 35_000
 MOST_UPLOADED: Final = 512 * 1024**2
 """Maximum size of an uploaded file in bytes."""
 
-_REACH: Final = 60e-6
-"""Half the length of the lines across rake face and shear band in m: the paper's."""
-
 _PATIENCE: Final = 4.0
 """Factor on the time that reading an upload may take: the server has other work."""
 
-_TOUCHING: Final = 3e-6
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
 
@@ -120,7 +117,6 @@ def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
 
 
 def _results(folder: Path) -> OpenedScene:
-    """Open the scene of a folder of results with its study."""
     file = folder / "study.yaml"
     if not file.is_file():
         raise FileNotFoundError(f"{folder}: holds no study.yaml, expected a folder of results")
@@ -151,14 +147,14 @@ def _scene_places(scene: Scene, start: float, duration: float) -> list[_Points]:
         return [cursor, rake, band]
     index = int(np.searchsorted(scene.times, start + duration / 2)) - 1
     workpiece = scene.field("material", max(index, 0)) == Material.WORKPIECE
-    contact = contact_length(scene.raster, workpiece, tool, _TOUCHING)
+    contact = contact_length(scene.raster, workpiece, tool, TOUCHING)
     if contact > 0:
-        middle, across = tool.rake_point(contact / 2), _REACH * np.asarray(tool.rake_normal)
+        middle, across = tool.rake_point(contact / 2), LINE_REACH * np.asarray(tool.rake_normal)
         cursor, rake = [middle], [middle - across, middle + across]
     if "plastic_strain_rate" in scene.fields:
         ridge = Instant.at(scene, start, duration).band
         if ridge is not None:
-            band = ridge.across(_REACH, _REACH).points[[0, -1]]
+            band = ridge.across(LINE_REACH, LINE_REACH).points[[0, -1]]
     return [cursor, rake, band]
 
 

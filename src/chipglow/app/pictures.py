@@ -96,13 +96,10 @@ class Drawn:
 
 
 class _Cache(dict[Hashable, _Result], Generic[_Result]):
-    """The results of the last few keys."""
-
     def __init__(self, size: int) -> None:
         self._size = size
 
     def result(self, key: Hashable, make: Callable[[], _Result]) -> _Result:
-        """Return the result of a key, which is made if it is not there."""
         self[key] = result = self.pop(key) if key in self else make()
         if len(self) > self._size:
             del self[next(iter(self))]
@@ -179,7 +176,6 @@ class SceneModel:
         return Picture(state, raster, data, panels, lines, quick, camera, exposure, parts)
 
     def readout(self, picture: Picture) -> Readout:
-        """Return the numbers at the cursor of a picture."""
         assert picture.camera and picture.exposure and picture.parts
         state, at, exposure = picture.state, picture.state.cursor, picture.exposure
 
@@ -248,7 +244,6 @@ class SceneModel:
         return state.key(*(_ROLLING if state.study.camera.line_time is not None else _EXPOSURE))
 
     def _on(self, state: State, quick: bool) -> tuple[Scene, Surface]:
-        """Return the scene with its tool, and the surface on it."""
         base = self.opened.coarse if quick else self.opened.scene
         assert base is not None
 
@@ -302,7 +297,6 @@ class SceneModel:
         return self._exposures.result(key, make)
 
     def _scene_panel(self, state: State, exposure: Exposure, quick: bool) -> Panel:
-        """Return the image of the scene in the middle of the exposure."""
         name, (label, unit) = state.scene_image, SCENE_IMAGES[state.scene_image]
         few = quick and self._field_key(state, name, self._displayed, exposure) not in self._images
         scene = self._displayed_quick if few else self._displayed
@@ -333,7 +327,6 @@ class SceneModel:
     def _values(
         self, state: State, name: str, scene: Scene, exposure: Exposure, index: int
     ) -> NDArray[np.floating]:
-        """Return a field of a frame in SI."""
         if name == "speed":
             return np.asarray(np.hypot(*(scene.field(f"velocity_{xy}", index) for xy in "xy")))
         if name == "emissivity":
@@ -346,7 +339,6 @@ class SceneModel:
         return scene.field(name, index)
 
     def _middle_frame(self, state: State) -> int:
-        """Return the index of the frame in the middle of the exposure."""
         return middle_frame(self.opened.scene, state.start, state.study.camera.integration_time)
 
 
@@ -359,7 +351,6 @@ class MeasurementModel:
         self.opened, self.controls = opened, opened.controls
 
     def is_ready(self, state: State) -> bool:
-        """Whether the exact picture takes milliseconds: always."""
         return True
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
@@ -391,7 +382,6 @@ class MeasurementModel:
 
 
 def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str, Array]]:
-    """Return the temperatures along both lines."""
     lines = {}
     for name in LINES:
         line = state.line(name).line(raster.spacing)

@@ -74,7 +74,6 @@ class OpenFiles:
         return path.stem
 
     def close(self) -> None:
-        """Remove the uploaded files."""
         self._folder.cleanup()
 
 
@@ -83,7 +82,6 @@ class Upload(RequestHandler):  # type: ignore[misc]
     """Receives a file in pieces and opens it."""
 
     def initialize(self, files: OpenFiles, auth: TokenAuth, origins: tuple[str, ...]) -> None:
-        """Set the arguments that Tornado passes to every request."""
         self._files, self._auth, self._origins = files, auth, origins
         self._path: Path | None = None
 
@@ -97,7 +95,6 @@ class Upload(RequestHandler):  # type: ignore[misc]
         self._path.touch(mode=0o600)
 
     def data_received(self, chunk: bytes) -> None:
-        """Write a piece."""
         if self._path is not None:
             with self._path.open("ab") as file:
                 file.write(chunk)
@@ -151,7 +148,6 @@ class App:
         )
 
     def run(self) -> None:
-        """Serve until Ctrl-C."""
         loop = self.server.io_loop
 
         # An exception would be lost if a finaliser were at work when the signal comes.
@@ -168,7 +164,6 @@ class App:
             self.stop()
 
     def stop(self) -> None:
-        """Stop serving, and remove the uploaded files."""
         self.server.stop()
         self.files.close()
 
@@ -186,7 +181,6 @@ class App:
 
 
 def _free_port(address: str, port: int) -> int:
-    """Return the port, or a free one for 0."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -101,7 +101,6 @@ class Session:
         self._draws = Newest(self._draw, notify)
 
     def show(self) -> None:
-        """Compute the picture of the state."""
         self._draws.cancel()
         self._pictures.ask(self.state)
 
@@ -144,7 +143,6 @@ class Session:
         self._draws.ask(self.state)
 
     def cancel(self) -> None:
-        """End the drawing."""
         self._draws.cancel()
 
     def painted(self, number: int) -> None:
@@ -153,7 +151,6 @@ class Session:
             self._painted.set()
 
     def end(self) -> None:
-        """End all work."""
         self._pictures.cancel()
         self._draws.cancel()
 

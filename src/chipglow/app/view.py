@@ -119,14 +119,12 @@ class View:
         return refused
 
     def _receive(self, event: Any) -> None:
-        """Answer a message of the page."""
         message = event.data
         self._handled = int(message["n"])
         with unlocked():  # one answer, that the browser draws once
             getattr(self, f"_on_{message['kind']}")(message.get("content"))
 
     def _notified(self, kind: str, *content: Any) -> None:
-        """Show a result of another thread."""
         self._later(lambda: getattr(self, f"_show_{kind}")(*content))
 
     def _on_ready(self, _: None) -> None:
@@ -304,7 +302,6 @@ class View:
         }
 
     def _later(self, show: Callable[[], None]) -> None:
-        """Show the result of another thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self.page.alone, show)
             return

@@ -27,7 +27,6 @@ class Boundary(TyperGroup):
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run a command."""
         try:
             done = super().invoke(ctx)
             screen.current().close()

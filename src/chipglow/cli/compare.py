@@ -58,7 +58,7 @@ def compare(
     settings: opt.Settings = None,
 ) -> None:
     """Compare a measurement with simulations and report the best fit at each place."""
-    from chipglow.drawing.frames import shown_frame
+    from chipglow.drawing.scales import shown_frame
     from chipglow.laboratory import comparison as lab
     from chipglow.laboratory.chip import chosen_tool, read_curve
     from chipglow.laboratory.comparison.comparison import COVERAGE

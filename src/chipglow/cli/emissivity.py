@@ -106,7 +106,6 @@ def _print_tables(result: "lab.RegionEmissivities") -> None:
 
 
 def _print_study(result: "lab.RegionEmissivities", out: Path | None) -> None:
-    """Print the YAML that a study needs for these emissivities."""
     from chipglow.laboratory import emissivity as lab
 
     text, head = lab.surface_text(result.rows[0]), "For a study"

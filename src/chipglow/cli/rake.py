@@ -57,8 +57,7 @@ def rake(
 
 
 def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[int] | None:
-    """Return the indices of the chosen frames, or None for all."""
-    from chipglow.drawing.frames import shown_frame
+    from chipglow.drawing.scales import shown_frame
 
     times = measurement.times
     if at is not None:

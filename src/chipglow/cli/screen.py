@@ -48,13 +48,11 @@ class Screen:
             self._print(screen_table(frame, columns, title, unbroken))
 
     def budget(self, name: str, estimate: "Estimate", title: str) -> None:
-        """Print the uncertainty budget of values in K below a title."""
         self.heading(f"\n{title}")
         self.table(name, budget_frame(estimate))
         self.heading()
 
     def facts(self, name: str, rows: Iterable[tuple[str, str]]) -> None:
-        """Print names with their texts."""
         rows = list(rows)
         self._record["facts"].setdefault(name, {}).update(rows)
         if not self.json:
@@ -87,12 +85,10 @@ class Screen:
         self._sentences("missing", "Missing", missing, sys.stdout)
 
     def remarks(self, notes: "Notes") -> None:
-        """Print the remarks among notes."""
         for sentence in notes.remarks:
             self.say(sentence)
 
     def file(self, path: Path, what: str = "") -> None:
-        """Print the name of a written file."""
         self.heading(f"{what}: {path}" if what else str(path))
         self._record["files"].append(str(path))
 

@@ -41,7 +41,7 @@ def shearband(
     settings: opt.Settings = None,
 ) -> None:
     """Read the radiance temperature along the shear band (the paper's Figure 9)."""
-    from chipglow.drawing.frames import shown_frame
+    from chipglow.drawing.scales import shown_frame
     from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
     from chipglow.laboratory.chip.figures import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.screen import current, figure, finish
-from chipglow.drawing.frames import shown_frame
+from chipglow.drawing.scales import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.measurement import MeasurementSummary, measurement_summary
@@ -107,7 +107,6 @@ def _scene_facts(scene: StoredScene, path: Path) -> _Rows:
 
 
 def _where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Rows:
-    """Describe the positions of samples or pixels, and the times of the frames."""
     left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
     yield name, f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
     yield "x", f"{left} to {right}"
@@ -145,7 +144,6 @@ def _state(summary: "SceneSummary") -> _Rows:
 
 
 def _raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
-    """Return the numbers of `_where_and_when`."""
     return {
         "rows": raster.rows,
         "columns": raster.columns,

@@ -93,7 +93,6 @@ def budget_frame(estimate: "Estimate") -> "pd.DataFrame":
 
 
 def _heading(column: str) -> str:
-    """Return the heading of a column, with its unit."""
     name = column.partition(_PLUS_MINUS)[0]
     stem, _, unit = name.rpartition("_")
     text = (stem if unit in _UNITS else name).replace("_", " ")

@@ -69,7 +69,6 @@ def temperature(
 def _emissivities(
     text: str, uncertainty: float | None
 ) -> "lab.EmissivityLine | dict[str, lab.EmissivityLine]":
-    """Return one emissivity, or those of a file."""
     from chipglow.laboratory import emissivity as lab
 
     try:

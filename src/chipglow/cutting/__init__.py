@@ -3,81 +3,54 @@
 from typing import TYPE_CHECKING, Any
 
 from chipglow.cutting import library
-from chipglow.cutting.checkpoint import Checkpoint
+from chipglow.cutting.checkpoint import Checkpoint as Checkpoint
 from chipglow.cutting.conditions import (
-    CuttingConditions,
-    Friction,
-    Numerics,
-    OutputWindow,
-    Surroundings,
-    unresolved,
+    CuttingConditions as CuttingConditions,
+    Friction as Friction,
+    Numerics as Numerics,
+    OutputWindow as OutputWindow,
+    Surroundings as Surroundings,
+    unresolved as unresolved,
 )
-from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
-from chipglow.cutting.energy import EnergyHistory
-from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
-from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz, ZerilliArmstrong
+from chipglow.cutting.damage import (
+    FittedDamage as FittedDamage,
+    JohnsonCookDamage as JohnsonCookDamage,
+)
+from chipglow.cutting.energy import EnergyHistory as EnergyHistory
+from chipglow.cutting.flow_stress import FLOW_LAWS as FLOW_LAWS, FlowStress as FlowStress
+from chipglow.cutting.laws import (
+    HyperbolicTangent as HyperbolicTangent,
+    JohnsonCook as JohnsonCook,
+    MarusichOrtiz as MarusichOrtiz,
+    ZerilliArmstrong as ZerilliArmstrong,
+)
 from chipglow.cutting.library import (
-    MaterialError,
-    MaterialFile,
-    is_own_file,
-    material_file,
-    material_names,
-    tool_material,
-    workpiece,
+    MaterialError as MaterialError,
+    MaterialFile as MaterialFile,
+    is_own_file as is_own_file,
+    material_file as material_file,
+    material_names as material_names,
+    tool_material as tool_material,
+    workpiece as workpiece,
 )
 from chipglow.cutting.material import (
-    NonlocalViscosity,
-    RateTable,
-    TemperatureTable,
-    ToolMaterial,
-    WorkpieceMaterial,
+    NonlocalViscosity as NonlocalViscosity,
+    RateTable as RateTable,
+    TemperatureTable as TemperatureTable,
+    ToolMaterial as ToolMaterial,
+    WorkpieceMaterial as WorkpieceMaterial,
 )
-from chipglow.cutting.recording import Preview
-from chipglow.cutting.simulation import SOLVER_VERSION, CuttingSimulation, ForceHistory, SolverError
-from chipglow.cutting.steady_tool import SteadyTool, ToolBody
+from chipglow.cutting.recording import Preview as Preview
+from chipglow.cutting.simulation import (
+    SOLVER_VERSION as SOLVER_VERSION,
+    CuttingSimulation as CuttingSimulation,
+    ForceHistory as ForceHistory,
+    SolverError as SolverError,
+)
+from chipglow.cutting.steady_tool import SteadyTool as SteadyTool, ToolBody as ToolBody
 
 if TYPE_CHECKING:
-    from chipglow.cutting.library import AISI_1045, CARBIDE
-
-__all__ = [
-    "AISI_1045",
-    "CARBIDE",
-    "FLOW_LAWS",
-    "SOLVER_VERSION",
-    "Checkpoint",
-    "CuttingConditions",
-    "CuttingSimulation",
-    "EnergyHistory",
-    "FittedDamage",
-    "FlowStress",
-    "ForceHistory",
-    "Friction",
-    "HyperbolicTangent",
-    "JohnsonCook",
-    "JohnsonCookDamage",
-    "MarusichOrtiz",
-    "MaterialError",
-    "MaterialFile",
-    "NonlocalViscosity",
-    "Numerics",
-    "OutputWindow",
-    "Preview",
-    "RateTable",
-    "SolverError",
-    "SteadyTool",
-    "Surroundings",
-    "TemperatureTable",
-    "ToolBody",
-    "ToolMaterial",
-    "WorkpieceMaterial",
-    "ZerilliArmstrong",
-    "is_own_file",
-    "material_file",
-    "material_names",
-    "tool_material",
-    "unresolved",
-    "workpiece",
-]
+    from chipglow.cutting.library import AISI_1045 as AISI_1045, CARBIDE as CARBIDE
 
 
 def __getattr__(name: str) -> Any:

@@ -107,10 +107,11 @@ def tool_material(name: str) -> ToolMaterial:
 
 def material_file(name: str, kind: str | None = None) -> MaterialFile:
     """Return a material (of a kind) by its name in the library or by a path that ends in .yaml."""
-    material = read_material(Path(name)) if is_own_file(name) else _in_library(name)
+    own = is_own_file(name) and kind != "tool"
+    material = read_material(Path(name)) if own else _in_library(name)
     if material is None:
-        known = ", ".join(material_names(kind))
-        raise MaterialError(f"{name!r} is unknown, expected one of {known}, or a file like my.yaml")
+        known = [*material_names(kind), *(() if kind == "tool" else ("or a file like my.yaml",))]
+        raise MaterialError(f"{name!r} is unknown, expected one of {', '.join(known)}")
     if kind not in (None, material.kind):
         raise MaterialError(f"{name}: kind: {material.kind!r}, expected {kind}")
     return material

@@ -160,41 +160,14 @@ class CuttingSimulation:
         on_checkpoint: Callable[[Checkpoint], None] | None = None,
         preview: Preview | None = None,
     ) -> ForceHistory:
-        """Simulate the cut and hand over its frames.
+        """Simulate the cut, hand over its frames in their order, and return its forces.
 
-        Parameters
-        ----------
-        window : OutputWindow
-            Which part of the cut is recorded.
-        raster : Raster
-            Samples of the frames.
-        on_frame : callable
-            Called with every frame of the window and of the bands after it, in their order.
-        on_progress : callable, optional
-            Called with the fraction of the cut that is done, 0 to 1.
-        resume : Checkpoint, optional
-            Go on from here, after an earlier run of the same simulation with the same window: the
-            results are those of an unbroken run to the last bit. Only the frames that are still
-            to come are handed over.
-        on_checkpoint : callable, optional
-            Called with the state after every interval, when its frame was handed over. The arrays
-            are the simulation's own: write or copy them before you return.
-        preview : Preview, optional
-            How the whole cut is shown while it is computed, from where it starts or is resumed.
-
-        Returns
-        -------
-        ForceHistory
-            Forces averaged over every interval of the window's length, from the start of the cut to
-            the end of the window, or of the cut if bands after the window are recorded.
-
-        Raises
-        ------
-        ValueError
-            If the window or a raster reaches beyond what is simulated, or the checkpoint is of
-            another simulation.
-        SolverError
-            If the simulation goes wrong.
+        The forces are averaged over every interval from the start of the cut to the end of the
+        window, or of the cut if bands after the window are recorded. `on_progress` gets the
+        fraction of the cut that is done. `on_checkpoint` gets the state after every interval, in
+        the simulation's own arrays: write or copy them before you return. A run that resumes from
+        it has the results of an unbroken one with the same window, to the last bit, and hands over
+        only the frames that are still to come. `preview` shows the cut while it is computed.
         """
         self._check_window(window)
         state = _State(self, window.interval)
@@ -370,7 +343,7 @@ class _State:
         self.simulation, self.interval = simulation, interval
         self.heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
         mass = self.heat_mass * simulation.mass_scaling
-        resists = material.nonlocal_viscosity
+        resists, exponent = material.nonlocal_viscosity, simulation.friction.thermal_exponent
         self.step = Step(
             mass=mass,
             heat_mass=self.heat_mass,
@@ -389,8 +362,9 @@ class _State:
             inflow=-numerics.upstream,
             ceiling=conditions.feed + 2 * cell,
             speed=conditions.speed,
+            friction_exponent=exponent or 1.0,
+            friction_melting=inf if exponent is None else material.melting_temperature,
             viscosity=resists.viscosity if resists is not None else 0.0,
-            **_thermal_friction(simulation),
         )
         law, damage = material.flow_stress.numbers(), material.damage
         self.step_points = advance_with(law)
@@ -670,15 +644,6 @@ def _conduction(material: WorkpieceMaterial, temperature: float) -> tuple[float,
     conductivity = material.conductivity.at(temperature)
     capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
     return float(conductivity / capacity), float(np.sqrt(conductivity * capacity))
-
-
-def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
-    """Return what `Step` takes if friction depends on the temperature."""
-    exponent = simulation.friction.thermal_exponent
-    if exponent is None:
-        return {}
-    melting = simulation.workpiece.melting_temperature
-    return {"friction_exponent": exponent, "friction_melting": melting}
 
 
 def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> ToolHeat:

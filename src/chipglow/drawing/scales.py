@@ -1,4 +1,4 @@
-"""Colours of figures and the limits of their scales."""
+"""Colours of figures, the limits of their scales, and the frame that they show."""
 
 from typing import Any, Final
 
@@ -37,3 +37,16 @@ def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> 
     if known.size == 0:
         return step
     return max(step, float(np.ceil(np.percentile(known, percentile) / step)) * step)
+
+
+def shown_frame(
+    times: NDArray[np.float64], time: float | None, whose: str = "measurement", option: str = ""
+) -> int:
+    """Return the index of the frame nearest to a time, by default the middle one."""
+    if time is None:
+        return (len(times) - 1) // 2
+    slack = 1e-9 + (float(np.diff(times).min()) / 2 if len(times) > 1 else 0.0)
+    if not times[0] - slack <= time <= times[-1] + slack:
+        shown, first, last = (f"{1e6 * one:.7g} us" for one in (time, times[0], times[-1]))
+        raise ValueError(f"{option}{shown} is not in the {whose}, expected {first} to {last}")
+    return int(np.abs(times - time).argmin())

@@ -2,43 +2,35 @@
 
 import os
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import pandas as pd
 import xarray as xr
 
-from chipglow.io.table_file import write_table, write_table_or_dataset
+from chipglow.io import atomic_path, check_table_path, write_dataset
 
 
 class Result(Protocol):
-    """What can be written as a table and as arrays."""
+    """Result that can be written as a table and as arrays."""
 
     def to_frame(self) -> pd.DataFrame:
-        """A row for each value, with the units in the names of the columns."""
+        """Return a row for each value, with the units in the names of the columns."""
 
     def to_dataset(self) -> xr.Dataset:
-        """Arrays in SI units."""
+        """Return arrays in SI units."""
 
 
 def write_result(result: Result, path: str | os.PathLike[str]) -> None:
     """Write a result in the format that the file suffix names."""
-    write_table_or_dataset(Path(path), *columns_and_rows(result.to_frame()), result.to_dataset)
+    path = Path(path)
+    check_table_path(path)
+    if path.suffix.lower() == ".nc":
+        write_dataset(result.to_dataset(), path)
+    else:
+        write_frame(result.to_frame(), path)
 
 
 def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
-    """Write a result's frame as CSV: the names of its columns, then a line a row.
-
-    Numbers have nine digits; NaN is an empty cell.
-    """
-    write_table(Path(path), *columns_and_rows(frame))
-
-
-def columns_and_rows(frame: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
-    """Names of a frame's columns, and the text of its cells row by row."""
-    return list(frame.columns), [list(map(_cell, row)) for row in frame.itertuples(index=False)]
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, float):
-        return "" if value != value else f"{value:.9g}"
-    return str(value)
+    """Write a result's frame as CSV: numbers have nine digits, NaN is an empty cell."""
+    with atomic_path(path) as temporary:
+        frame.to_csv(temporary, index=False, float_format="%.9g", lineterminator="\r\n")

@@ -4,7 +4,7 @@ from math import floor, isfinite, isnan, log10
 
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
-    """Text of a number with its unit, or a dash where there is none."""
+    """Return a number with its unit, or a dash where there is none."""
     if value is None:
         return "–"
     rounded = round(value, decimals) + 0.0  # no negative zero
@@ -13,7 +13,7 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
 
 
 def uncertain_text(value: float, uncertainty: float) -> str:
-    """Text of a number and its standard uncertainty, which has two significant digits."""
+    """Return a number and its standard uncertainty, which has two significant digits."""
     if not isfinite(uncertainty) or uncertainty <= 0:
         return f"{value:.4g}"
     decimals = min(max(0, 1 - floor(log10(uncertainty))), 9)
@@ -21,7 +21,7 @@ def uncertain_text(value: float, uncertainty: float) -> str:
 
 
 def rounded_text(value: float, unit: str = "") -> str:
-    """Text of a number to four digits that count, with its unit."""
+    """Return a number to four digits that count, with its unit."""
     if isnan(value):
         return quantity_text(None, unit, 0)
     if value == 0.0:

@@ -74,14 +74,13 @@ class Parameter:
             raise ValueError(f"{name}: {error}") from None
 
     def words(self, kind: Any) -> str:
-        """Which values are allowed, in words; empty if anything of the field's type is."""
+        """Return which values are allowed, in words; empty if anything of the type is."""
         none = f"{NONE}, or " if NoneType in get_args(kind) else ""
         return self.allowed or (none + self.limits if self._is_limited else "")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return the schema of a field: text with a unit or a plain value, within the limits."""
         plain, words = self._without_words(source)
         if self.quantity is None:
             schema = handler(plain)
@@ -100,7 +99,6 @@ class Parameter:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """JSON schema: a text with a unit, or a plain value with its limits."""
         words = schema.get("metadata", {}).get("words", {})
         text = {"type": "string", "examples": [self.quantity.example]} if self.quantity else None
         json: JsonSchemaValue = text or handler(schema)
@@ -146,7 +144,7 @@ class Parameter:
         )
 
     def _without_words(self, source: Any) -> tuple[Any, dict[str, Any]]:
-        """The type of a value that is no word, and the words with what they stand for."""
+        """Return the type of a value that is no word, and the words with their values."""
         if get_origin(source) not in (Union, UnionType):
             return source, {}
         words: dict[str, Any] = {}
@@ -191,7 +189,7 @@ def _take_lists(schema: Any) -> None:
 
 
 def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:
-    """Schema of a field that may also be one of some words."""
+    """Return the schema of a field that may also be one of some words."""
 
     def read(given: object, rest: ValidatorFunctionWrapHandler) -> object:
         if given is None and NONE in words:

@@ -123,17 +123,17 @@ class Part:
 
     @classmethod
     def parameter(cls, name: str) -> Parameter:
-        """What a field declares, for another part that has it too."""
+        """Return what a field declares, for another part that has it too."""
         return cls._parameters[name]
 
     @classmethod
     def declared(cls) -> Mapping[str, Parameter]:
-        """What the fields declare, by their names."""
+        """Return what the fields declare, by their names."""
         return cls._parameters
 
     @classmethod
     def defaults(cls) -> dict[str, Any]:
-        """The defaults of the declared fields that have one."""
+        """Return the defaults of the declared fields that have one."""
         found = {}
         for one in dataclass_fields(cls):
             if one.name in cls._annotations:
@@ -145,7 +145,6 @@ class Part:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
-        """Schema of a section of a description that has the declared fields."""
         if isabstract(cls) or "__dataclass_fields__" not in vars(cls):
             return core_schema.is_instance_schema(cls)
 
@@ -175,7 +174,6 @@ class Part:
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: Any, handler: GetJsonSchemaHandler) -> Any:
-        """JSON schema of the section, with its defaults as YAML has them."""
         json = handler.resolve_ref_schema(handler(_section(cls).core_schema))
         plain = _section(cls).dump_python(cls.defaults(), mode="json", warnings=False)
         for name, default in plain.items():
@@ -184,7 +182,7 @@ class Part:
 
 
 def unchecked(part: PartType, **values: Any) -> PartType:
-    """A copy of a part with other values, which nothing checks."""
+    """Return a copy of a part with other values, which nothing checks."""
     made = copy(part)
     for name, value in (values | {"given": part.given | values.keys()}).items():
         object.__setattr__(made, name, value)
@@ -217,27 +215,23 @@ class Family:
         return {**of_other_packages(f"chipglow.{self.name}"), **self._own}
 
     def find(self, kind: object) -> Any:
-        """The part of a kind, or None; other packages are not loaded for the library's own."""
+        """Return the part of a kind, or None; others are not loaded for the library's own."""
         if not isinstance(kind, str):
             return None
         return self._own.get(kind) or self.parts.get(kind)
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Names of the kinds."""
         return tuple(self.parts)
 
     @property
     def examples(self) -> str:
-        """A line for each kind with an example."""
         found = (getattr(part, "example", "") for part in self.parts.values())
         return "\n".join(f"  {example}" for example in found if example)
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of the field: the section of the part whose kind is chosen."""
-
         def chosen(value: Any, info: ValidationInfo) -> Any:
             # Looked up when the field is read: parts may be added later.
             if isinstance(value, Part):
@@ -260,7 +254,6 @@ class Family:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """JSON schema: that of one of the parts."""
         sections = [part.__get_pydantic_json_schema__({}, handler) for part in self.parts.values()]
         return {"oneOf": sections, "discriminator": {"propertyName": "kind"}}
 
@@ -270,7 +263,7 @@ adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
 
 
 def problem(error: ValidationError) -> str:
-    """The first problem in one line: field, value and what was expected."""
+    """Return the first problem in one line: field, value and what was expected."""
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"])
     if first["type"] == "value_error":
@@ -286,7 +279,7 @@ def problem(error: ValidationError) -> str:
 
 @cache
 def of_other_packages(group: str) -> dict[str, Any]:
-    """What other packages add by entry points, by name; what cannot be loaded is a warning."""
+    """Return what other packages add by entry points; what cannot be loaded is a warning."""
     found = {}
     for entry in entry_points(group=group):
         try:
@@ -311,7 +304,7 @@ FileBeside = Annotated[str, AfterValidator(beside_the_study)]
 
 
 def first_sentence(part: type) -> str:
-    """The first paragraph of a class's documentation, in one line."""
+    """Return the first paragraph of a class's documentation, in one line."""
     return " ".join((part.__doc__ or "").split("\n\n")[0].split())
 
 
@@ -341,7 +334,6 @@ def _mode(info: SerializationInfo) -> Literal["json", "python"]:
 
 
 def _keys(part: Any) -> list[str]:
-    """Keys of a part's section, in the order of its fields."""
     names = [one.name for one in dataclass_fields(part) if one.name in part._annotations]
     return ["kind", *names] if part.kind else names
 
@@ -364,7 +356,7 @@ def _parameter(annotation: Any) -> Any:
 
 
 def _with_parameters(text: str, annotations: Mapping[str, Any]) -> str:
-    """A class's documentation with the declared parameters, before those that it has already."""
+    """Return a class's documentation with the declared parameters before its own."""
     title = "Parameters\n----------\n"
     before, found, after = text.partition(title)
     rows = []

@@ -24,12 +24,10 @@ class Setting:
 
     @property
     def name(self) -> str:
-        """Its own key."""
         return self.path.rpartition(".")[2]
 
     @property
     def meaning(self) -> str:
-        """A sentence."""
         return self.parameter.meaning
 
     @property
@@ -44,12 +42,11 @@ class Setting:
 
     @property
     def is_section(self) -> bool:
-        """Whether it has settings itself."""
         return isinstance(self.value, Part)
 
 
 def settings(part: Part) -> dict[str, Setting]:
-    """All settings of a part and of those within it, by their paths."""
+    """Return all settings of a part and of those within it, by their paths."""
     found = {}
     for one in own_settings(part):
         found[one.path] = one
@@ -60,7 +57,7 @@ def settings(part: Part) -> dict[str, Setting]:
 
 
 def own_settings(part: Part) -> Iterator[Setting]:
-    """The settings of a part itself, in their order."""
+    """Yield the settings of a part itself, in their order."""
     plain, defaults = adapter(type(part)).dump_python(part, mode="json"), part.defaults()
     for name in plain:
         value = getattr(part, name)
@@ -109,7 +106,7 @@ def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
 
 
 def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
-    """What was given of a part, a mapping or a list, with the changes."""
+    """Return what was given of a part, a mapping or a list, with the changes."""
     if isinstance(part, Mapping):
         data = dict(part)
     elif isinstance(part, tuple):

@@ -68,7 +68,6 @@ class Unit:
             raise ValueError(f"unit: scale {self.scale!r} must be finite and over 0")
 
     def to_si(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Values in SI."""
         return np.asarray(np.asarray(values, np.float64) * self.scale + self.offset, np.float32)
 
 
@@ -143,7 +142,7 @@ class Quantity:
         return lower, upper
 
     def text(self, value: float) -> str:
-        """Shortest text in this quantity's unit that is read back as the same number."""
+        """Return the shortest text in this quantity's unit that is read back as the same number."""
         number = self._number(value)
         if len(number) > _LONGEST_NUMBER:
             scale, offset = self._unit(self.unit)
@@ -154,7 +153,7 @@ class Quantity:
         return f"{number} {self.unit}"
 
     def range_text(self, limits: tuple[float, float]) -> str:
-        """Text of a range that is read back as the same numbers."""
+        """Return the text of a range that is read back as the same numbers."""
         return f"{self._number(limits[0])}-{self._number(limits[1])} {self.unit}"
 
     @property
@@ -165,7 +164,6 @@ class Quantity:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of one number or of a pair of limits; text from files needs its unit."""
         pair = get_origin(source) is tuple
         parse, text = (self.parse_range, self.range_text) if pair else (self.parse, self.text)
         return core_schema.with_info_plain_validator_function(
@@ -176,7 +174,6 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """JSON schema: a text with a unit."""
         return {"type": "string", "examples": [self.example]}
 
     def _unit(self, unit: str) -> tuple[Decimal, Decimal]:
@@ -220,7 +217,7 @@ class Quantity:
 
 
 def is_bare_number(value: object) -> bool:
-    """Whether a value from a YAML file is a number without a unit."""
+    """Return whether a value from a YAML file is a number without a unit."""
     if isinstance(value, str):
         return _BARE.fullmatch(value) is not None
     return isinstance(value, int | float) and not isinstance(value, bool)
@@ -281,7 +278,7 @@ def _registry() -> "UnitRegistry[Decimal]":
 
 @cache
 def _scale_and_offset(text: str, base: str) -> tuple[Decimal, Decimal]:
-    """Scale and offset of a unit to the SI unit of its quantity; a ValueError if it is another."""
+    """Return scale and offset of a unit to SI; a ValueError if it is another quantity's."""
     clean = text.strip()
     spelled = _SPELLINGS.get(clean.lower().replace(" ", "_"), clean)
     spelled = _BELOW.sub(lambda below: "/" + "/".join(below[1].split()), spelled)

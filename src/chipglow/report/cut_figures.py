@@ -6,16 +6,21 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from chipglow.analysis import Analysis, Cut, HeatedObject
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
 from chipglow.report.facts import Facts
-from chipglow.report.visible import visible_picture
-from chipglow.scene import Material
+from chipglow.scene import Frame, Material, Raster
+from chipglow.surface import Emissivity, Texture
 
 _COLOURS: Final = (BLUE, VERMILLION)
+
+_GRAIN, _SEED, _STEEL = 9e-6, 8, Emissivity(0.62, 0.07)
+_VOID, _SHEARED, _DARKEST = 0.28, (1.5, 5.0), 0.45
+"""Of the visible picture: texture in m, grey values, plastic strains and darkness of bands."""
 
 
 def heated_chips(facts: Facts) -> Figure | None:
@@ -109,7 +114,7 @@ def dual_spectrum(facts: Facts) -> Figure:
     heat = (low, max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0))
     pixels = analysis.measurements[name].raster
     for (left, right), frame in zip(grid, cut.moments, strict=True):
-        grey = visible_picture(frame, analysis.raster)
+        grey = _visible_picture(frame, analysis.raster)
         drawing.show_image(left, grey, analysis.raster, None, "gray", (0.0, 1.0))
         number = max(int(np.searchsorted(starts, frame.time)) - 1, 0)
         picture = drawing.show_image(right, images[number], pixels, None, scales.HEAT, heat)
@@ -218,3 +223,17 @@ def _draw_heated(figure: Figure, axes: Axes, heated: HeatedObject) -> None:
     for colour, region in zip(_COLOURS, heated.regions, strict=False):
         outline = region.outline(raster)
         drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour, region.feature)
+
+
+def _visible_picture(frame: Frame, raster: Raster) -> NDArray[np.float64]:
+    """Return grey values from 0 to 1, shape (y, x), for orientation only."""
+    x, y = frame.material_x, frame.material_y
+    if x is None or y is None:
+        x, y = (grid.astype(np.float32) for grid in np.meshgrid(raster.x, raster.y))
+    generator = np.random.default_rng(_SEED)
+    steel = Texture.random(_STEEL, _GRAIN, generator, restore_standard_deviation=True).at(x, y)
+    low, high = _SHEARED
+    sheared = np.clip((frame.needed("plastic_strain") - low) / (high - low), 0.0, 1.0)
+    grey = steel * (1.0 - _DARKEST * sheared)
+    grey = np.where(frame.material == Material.WORKPIECE, grey, _VOID)
+    return np.asarray(np.where(frame.material == Material.TOOL, 0.0, grey), np.float64)

@@ -272,7 +272,6 @@ def _draw_marks(axes: Axes, facts: Facts) -> None:
 
 
 def _draw_published(axes: Axes, line: str) -> None:
-    """Draw the published values on a line of a cut."""
     error, fraction = PAPER[f"{line}_error_degC"], PAPER[f"{line}_psf_fraction_percent"]
     _draw_point(axes, 0.0, error.value, BLUE, "the paper's error")
     portion = error.value * fraction.value / 100

@@ -44,7 +44,6 @@ class MovieScales:
 
     @classmethod
     def of(cls, simulation: CuttingSimulation) -> "MovieScales":
-        """Return the scales of a cut."""
         conditions = simulation.conditions
         start = conditions.initial_temperature
         melting = getattr(simulation.workpiece.flow_stress, "melting_temperature", _MELTING)

@@ -44,22 +44,18 @@ class View:
 
     @property
     def pictures(self) -> list[str]:
-        """Images of all frames as data URLs."""
         return [self._picture(frame) for frame in self.frames]
 
     @property
     def scale(self) -> str:
-        """Image of the colour scale."""
         return self._picture(np.linspace(*self.limits, 256)[None])
 
     @property
     def low(self) -> str:
-        """Lower end of the colour scale."""
         return quantity_text(self.limits[0], self.unit, 0)
 
     @property
     def high(self) -> str:
-        """Upper end of the colour scale."""
         return quantity_text(self.limits[1], self.unit, 0)
 
     def _picture(self, values: NDArray[np.float64]) -> str:
@@ -96,7 +92,6 @@ class Player:
 
     @property
     def scale_bar(self) -> dict[str, Any]:
-        """Bar of a round length at the bottom left."""
         left, right, bottom, top = self._extent
         length = _round_down((right - left) / 4)
         x, y, size = left + (right - left) / 25, -bottom - (top - bottom) / 16, (right - left) / 18

@@ -44,7 +44,6 @@ class Row:
 
     @property
     def paper(self) -> float | None:
-        """The published value."""
         return self.published.value if self.published else None
 
     @property

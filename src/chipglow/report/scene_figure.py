@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID
+from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID, shown_frame
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
@@ -97,7 +96,6 @@ def _panels(frame: Frame) -> list[ImagePanel]:
 
 
 def _decades(rate: NDArray[Any]) -> tuple[float, float]:
-    """Return whole decades up to the largest rate."""
     fastest = scales.ends(rate, 0.0, 99.9)[1]
     top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
     return 10.0 ** (top - _DECADES), 10.0**top

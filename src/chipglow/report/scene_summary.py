@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import KELVIN
+from chipglow.drawing.scales import KELVIN, shown_frame
 from chipglow.scene import FILLED, Frame, Material, Scene
 
 _SAMPLED: Final = 5
@@ -79,7 +78,6 @@ def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
 
 
 def _values(name: str, frame: Frame, ends: list[float]) -> dict[str, object]:
-    """Return a row of `SceneSummary.fields`."""
     now, field = _over_workpiece(name, frame), _FIELDS[name]
     least, median, greatest = np.percentile(now, (0, 50, 100)) if now.size else (np.nan,) * 3
     return {

@@ -37,7 +37,6 @@ class ToolRow:
 
     @property
     def cells(self) -> Mapping[str, str]:
-        """The row in a table: texts by column."""
         return {
             "quantity": self.quantity,
             "own": spread_text(*self.own, self.unit, 0),
@@ -104,7 +103,6 @@ def _error(analysis: Analysis, name: str) -> Spread:
 
 
 def _spread(values: Iterable[float]) -> Spread:
-    """Return mean and sample standard deviation of the known values."""
     known = [value for value in values if isfinite(value)]
     if not known:
         return _UNKNOWN

@@ -34,7 +34,6 @@ class Scatter(_Numbered):
 
     @classmethod
     def of(cls, draws: Distribution) -> "Scatter":
-        """Return the scatter of a distribution."""
         low, high = draws.range
         interval_low, interval_high = (known(end) for end in draws.interval)
         return cls(

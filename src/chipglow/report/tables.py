@@ -118,7 +118,6 @@ def _scatter(errors: Sequence[Row]) -> Table:
 
 
 def _settings(facts: Facts) -> list[Line]:
-    """Return the settings of the cutting simulation beside the paper's, if there was one."""
     if not facts.is_compared or facts.study is None or facts.study.scene is not None:
         return []
     names = ("setting", "paper", "here")
@@ -126,7 +125,6 @@ def _settings(facts: Facts) -> list[Line]:
 
 
 def _emissivities(facts: Facts) -> list[Line]:
-    """Return the emissivities of the heated objects: published, input and found."""
     cut, lines = facts.analysis.cut, []
     for row in (row for heated in (cut.heated if cut else ()) for row in heated.rows):
         published, means = paper.TABLE_1.get(row.feature), row.means

@@ -124,8 +124,7 @@ def _scatter_kind(
     neighbours, nearest = _neighbours(places, layers)
     gradients = np.zeros((*values.shape, 2))
     _gradients(neighbours, places, values, spacing, gradients)
-    columns = (places[:, 0] - raster.left) / raster.spacing - 0.5
-    rows = (raster.top - places[:, 1]) / raster.spacing - 0.5
+    rows, columns = raster.index(places)
     gradients *= raster.spacing
     totals = np.zeros((*raster.shape, values.shape[1]))
     fraction, weight = np.zeros(raster.shape), np.zeros(raster.shape)

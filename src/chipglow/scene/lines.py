@@ -41,19 +41,9 @@ def sample(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.fl
 
     NaN outside the outermost centres and beside a NaN.
     """
-    places = np.asarray(points, dtype=np.float64)
-    column = (places[..., 0] - raster.left) / raster.spacing - 0.5
-    row = (raster.top - places[..., 1]) / raster.spacing - 0.5
-    return np.asarray(
-        map_coordinates(
-            np.asarray(image, dtype=np.float64),
-            [row, column],
-            order=1,
-            mode="constant",
-            cval=np.nan,
-        ),
-        dtype=np.float64,
-    )
+    values, index = np.asarray(image, dtype=np.float64), raster.index(points)
+    read = map_coordinates(values, index, order=1, mode="constant", cval=np.nan)
+    return np.asarray(read, dtype=np.float64)
 
 
 def nearest(image: ArrayLike, raster: Raster, points: ArrayLike) -> NDArray[np.float64]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True)
@@ -64,3 +64,16 @@ class Raster:
             self.top - self.spacing * self.rows,
             self.top,
         )
+
+    def index(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Return fractional row and column of points (..., 2) in m, shape (2, ...)."""
+        places = np.asarray(points, dtype=np.float64)
+        column = (places[..., 0] - self.left) / self.spacing - 0.5
+        row = (self.top - places[..., 1]) / self.spacing - 0.5
+        return np.stack([row, column])
+
+    def covers(self, index: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which rows and columns, shape (2, ...), are between the outermost centres."""
+        row, column = index
+        inside = (row >= 0) & (row <= self.rows - 1) & (column >= 0) & (column <= self.columns - 1)
+        return np.asarray(inside)

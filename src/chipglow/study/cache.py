@@ -25,7 +25,7 @@ class CachedScene:
 
 
 def cache_folder() -> Path:
-    """The folder of cached scenes; it may not exist yet."""
+    """Return the folder of cached scenes; it may not exist yet."""
     if folder := os.environ.get(FOLDER_VARIABLE):
         return Path(folder)
     from platformdirs import user_cache_path
@@ -34,13 +34,13 @@ def cache_folder() -> Path:
 
 
 def scene_path(inputs: Mapping[str, Any]) -> Path:
-    """Where the scene computed from these inputs is, or would be."""
+    """Return where the scene computed from these inputs is, or would be."""
     text = dumps(inputs, sort_keys=True, allow_nan=False)
     return cache_folder() / f"scene-{sha256(text.encode()).hexdigest()[:32]}.nc"
 
 
 def cached_scenes() -> list[CachedScene]:
-    """Scenes in the cache, the latest first; what ended runs left of scenes counts too."""
+    """Return scenes in the cache, the latest first, with what ended runs left of scenes."""
     scenes = []
     for path in cache_folder().glob("scene-*.nc"):
         with suppress(FileNotFoundError):  # another process cleared it meanwhile
@@ -53,7 +53,7 @@ def cached_scenes() -> list[CachedScene]:
 
 
 def clear_cache() -> int:
-    """Delete the cached scenes; the bytes that this gave back."""
+    """Delete the cached scenes; return the bytes that this gave back."""
     scenes = cached_scenes()
     for scene in scenes:
         scene.path.unlink(missing_ok=True)

@@ -124,7 +124,7 @@ class CameraSection(Part):
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
-        """The data with what preset, detector and lens make."""
+        """Return the data with what preset, detector and lens make."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("preset")
@@ -140,7 +140,7 @@ class CameraSection(Part):
         return camera
 
     def build(self, seed: int = 2010) -> Camera:
-        """The camera, with as many pixels as see the scene."""
+        """Return the camera, with as many pixels as see the scene."""
         response = None if self.response is None else read_response(self.response)
         band = Band(*self.band, response)
         shared = Camera.declared().keys() & self.declared().keys()
@@ -154,7 +154,7 @@ class CameraSection(Part):
         return Camera(**made, seed=seed)
 
     def on(self, scene: Raster, seed: int = 2010) -> Camera:
-        """The camera on a scene, with no more pixels than its detector has."""
+        """Return the camera on a scene, with no more pixels than its detector has."""
         camera = self.build(seed)
         if self.array is None:
             return camera

@@ -40,7 +40,7 @@ class Cost:
 
 
 def expected_cost(study: Study) -> Cost:
-    """What a study costs on this machine, from its sizes; right within a factor of two or so."""
+    """Return what a study costs on this machine, right within a factor of two or so."""
     cutting, camera = study.cutting, study.camera
     view, window = cutting.field_of_view, cutting.window
     samples = view.rows * view.columns

@@ -56,7 +56,6 @@ class FieldOfViewSection(Part):
         self.build()
 
     def build(self) -> Raster:
-        """The grid of samples."""
         return Raster(self.left, self.top, self.spacing, self.rows, self.columns)
 
 
@@ -80,12 +79,10 @@ class CutToolSection(ToolSection):
     )
 
     def start(self) -> float | ToolBody | None:
-        """What the simulation takes."""
         return self.body if self.temperature == STEADY else self.temperature
 
 
 def _known(name: str, info: ValidationInfo) -> str:
-    """Name of a material, or the path of a material's file beside the study."""
     if is_own_file(name):
         name = beside_the_study(name, info)
     try:
@@ -145,7 +142,6 @@ class CuttingSection(CuttingConditions):
         return float((self.window.end - self.window.start) / self.speed)
 
     def simulation(self) -> CuttingSimulation:
-        """The simulation that this section describes."""
         conditions = {one.name: getattr(self, one.name) for one in fields(CuttingConditions)}
         return CuttingSimulation(
             conditions=CuttingConditions(**conditions),

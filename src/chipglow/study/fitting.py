@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
+from chipglow.quantities import Part, own_settings
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
-from chipglow.study.surface_section import surfaces_of
+from chipglow.study.surface_section import FeaturesSection, surfaces_of
 from chipglow.surface import (
     EmissivityTrend,
     FeatureSurface,
@@ -17,9 +18,17 @@ from chipglow.surface import (
     WrappedSurface,
 )
 from chipglow.text import Notes
+from chipglow.text.template import yaml_line
 
 _FEW_FRAMES: Final = 5
 _FEW_CELLS: Final = 10
+
+_HOW_FINELY: Final = {
+    "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
+    "camera": {"offset_right", "offset_down"},
+    "surface": {"kind", "measured_in", "maps", "measured", "follow", "restore_standard_deviation"},
+}
+"""Fields whose defaults are no property of the paper's experiment."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +73,6 @@ def fit(study: Study, scene: Scene) -> Fitted:
 
 
 def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
-    """A surface whose textures do not follow the material."""
     if isinstance(surface, FeatureSurface):
         return replace(surface, follow=follow) if surface.follow == "material" else surface
     if not isinstance(surface, WrappedSurface):
@@ -74,14 +82,12 @@ def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
 
 
 def _layers(surface: Surface) -> Iterator[Surface]:
-    """A surface, and those under it."""
     yield surface
     if isinstance(surface, WrappedSurface):
         yield from _layers(surface.bare)
 
 
 def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
-    """At which temperatures emissivities were measured, a sentence for each surface."""
     for name, surface in surfaces.items():
         trends: list[EmissivityTrend] = []
         for layer in _layers(surface):
@@ -99,7 +105,6 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
-    """Where frames or cells are too coarse for what is asked, a sentence each."""
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
     if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
         yield (
@@ -117,7 +122,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
 
 
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
-    """What emissivity maps leave of the scene, a sentence each."""
+    """Yield what emissivity maps leave of the scene, a sentence each."""
     for name, outer in surfaces.items():
         *_, surface = _layers(outer)
         if not isinstance(surface, MapSurface):
@@ -139,3 +144,34 @@ def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
 def _place(raster: Raster) -> str:
     left, right, bottom, top = (f"{1e6 * edge:.4g}" for edge in raster.extent)
     return f"x {left} to {right} um, y {bottom} to {top} um"
+
+
+def left_to_the_paper(study: Study) -> Iterator[str]:
+    """Yield what is the paper's in a study that is another, a sentence for each section."""
+    if study.is_papers:
+        return
+    sections = ["surface", "camera"] if study.scene else ["cutting", "surface", "camera"]
+    for name in sections:
+        section = getattr(study, name)
+        if name == "surface" and not isinstance(section, FeaturesSection):
+            continue
+        left = list(_unset(section, _HOW_FINELY[name], ""))
+        if left:
+            yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
+
+
+def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
+    for one in own_settings(section):
+        if one.name in without or one.plain in ("none", []):
+            continue
+        if one.name not in section.given:
+            yield f"{prefix}{one.name} {_written(one.plain)}"
+        elif one.is_section:
+            yield from _unset(one.value, {"kind"}, f"{prefix}{one.name}.")
+
+
+def _written(value: Any) -> str:
+    """Return a value in one line, without what is none."""
+    if isinstance(value, dict):
+        value = {key: inner for key, inner in value.items() if inner not in ("none", None, {}, [])}
+    return yaml_line(value)

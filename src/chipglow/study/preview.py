@@ -18,7 +18,7 @@ _MOST_SAMPLES: Final = 360
 
 
 def preview_raster(study: Study) -> Raster:
-    """Samples of a preview: those of the study's scene, or several taken together."""
+    """Return the samples of a preview: those of the study's scene, or several together."""
     raster = study.cutting.field_of_view.build()
     step = _step(raster)
     return replace(
@@ -30,7 +30,7 @@ def preview_raster(study: Study) -> Raster:
 
 
 def preview_of(study: Study, on_frame: Callable[[Frame], None]) -> Preview:
-    """A preview of a study's cut for who takes its frames."""
+    """Return a preview of a study's cut."""
     return Preview(preview_raster(study), PREVIEW_FRAMES, on_frame)
 
 
@@ -46,7 +46,7 @@ def show_scene(scene: Scene, preview: Preview, on_progress: Callable[[float], No
 
 
 def _step(raster: Raster) -> int:
-    """How many samples of a scene are one of its preview, in either direction."""
+    """Return how many samples of a scene are one of its preview, in either direction."""
     wanted = ceil(max(raster.shape) / _MOST_SAMPLES)
     return min(wanted, *raster.shape)
 

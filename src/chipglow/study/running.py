@@ -30,9 +30,8 @@ from chipglow.io.digest import is_intact
 from chipglow.io.interrupts import uninterrupted
 from chipglow.quantities import adapter, unchecked
 from chipglow.scene import Frame, SceneError, ToolOutline
-from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
-from chipglow.study.fitting import Fitted, fit
+from chipglow.study.fitting import Fitted, fit, left_to_the_paper
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
 
@@ -224,7 +223,6 @@ def _fitted(
 
 
 def _inputs(study: Study) -> dict[str, Any]:
-    """Return all that a scene depends on."""
     simulation = study.cutting.simulation()
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)

@@ -52,13 +52,12 @@ class ChipSection(Part):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
-        """JSON schema of the section, or the name of a chip."""
         section = super().__get_pydantic_json_schema__(schema, handler)
         return {"anyOf": [section, {"enum": list(CHIPS)}]}
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
-        """The data, or those of the paper's chip of this name."""
+        """Return the data, or those of the paper's chip of this name."""
         if not isinstance(data, str):
             return data
         if data not in CHIPS:
@@ -154,11 +153,9 @@ class FeaturesSection(Part):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the surfaces: the chips, the maps, then the measured chips."""
         return (*self.chips, *self.maps, *self.measured)
 
     def build(self, seed: int) -> dict[str, Surface]:
-        """The surfaces by name."""
         chips = {
             name: self._features(chip.body, chip.shear_band, seed)
             for name, chip in self.chips.items()
@@ -169,7 +166,7 @@ class FeaturesSection(Part):
         return {name: self._wrapped(surface) for name, surface in bare.items()}
 
     def _wrapped(self, surface: Surface) -> Surface:
-        """A surface with what is over it, the spectrum first."""
+        """Return a surface with what is over it, the spectrum first."""
         if self.spectral is not None:
             surface = DispersiveSurface(surface, self.spectral, Band(*self.measured_in))
         if self.oxide is not None:
@@ -205,12 +202,12 @@ SurfaceSection = Annotated[FeaturesSection | SurfaceChoice, SURFACES]
 
 
 def surface_names(section: FeaturesSection | SurfaceChoice) -> tuple[str, ...]:
-    """Names of a section's surfaces; a surface that is the only one is called by its kind."""
+    """Return the names of a section's surfaces; a single one is called by its kind."""
     return section.names if isinstance(section, FeaturesSection) else (section.kind,)
 
 
 def surfaces_of(section: FeaturesSection | SurfaceChoice, seed: int) -> dict[str, Surface]:
-    """The surfaces of a section by their names."""
+    """Return the surfaces of a section by their names."""
     if isinstance(section, FeaturesSection):
         return section.build(seed)
     return {section.kind: section.surface()}

@@ -37,7 +37,6 @@ def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[st
 
 
 def _with(data: Any, setting: str) -> Any:
-    """Return the description with one field set."""
     place, equals, value = setting.partition("=")
     names = place.strip().split(".")
     if not equals or not all(names):

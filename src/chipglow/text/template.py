@@ -20,7 +20,7 @@ def commented_yaml(header: str, section: Part, unused: Collection[str] = ()) -> 
 
 
 def json_schema(kind: type) -> str:
-    """JSON schema of a part, by which editors check and complete YAML."""
+    """Return the JSON schema of a part, by which editors check and complete YAML."""
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return json.dumps(dialect | adapter(kind).json_schema(), indent=1) + "\n"
 
@@ -51,7 +51,7 @@ def _entry_lines(name: str, value: object, plain: Any, indent: str) -> Iterator[
 
 
 def _wrapped(text: str) -> list[str]:
-    """Lines of a text; a number stays with its unit."""
+    """Return lines of a text; a number stays with its unit."""
     joined = re.sub(r"(?<=\d) (?=[a-z])", "\xa0", text)
     lines = [wrap(one, _WIDTH, break_on_hyphens=False) for one in joined.splitlines()]
     return [one.replace("\xa0", " ") for each in lines for one in each]

@@ -87,7 +87,7 @@ def _read_deck(file: Path) -> _Deck:
     deck, instances, outside = _Deck(), 0, False
     for part in re.split(r"(?m)^\s*\*", text)[1:]:
         head, *lines = part.split("\n")
-        rows = [[word.strip() for word in line.split(",") if word.strip()] for line in lines]
+        rows = filter(None, map(_words, lines))
         keyword, options = _keyword(head)
         instances += keyword == "INSTANCE"
         # Nodes of the assembly itself are points of reference with labels of their own.
@@ -102,12 +102,16 @@ def _read_deck(file: Path) -> _Deck:
             raise SourceError(f"{file}: the instance is moved, expected one that is not")
         try:
             if not (outside and keyword == "NODE"):
-                _take(deck, keyword, options, [row for row in rows if row])
+                _take(deck, keyword, options, rows)
         except (ValueError, KeyError, IndexError) as error:
             raise SourceError(f"{file}: *{keyword}: {error}") from None
     if not deck.nodes or not deck.elements:
         raise SourceError(f"{file}: has no *NODE and *ELEMENT, expected an Abaqus input file")
     return deck
+
+
+def _words(line: str) -> list[str]:
+    return [word.strip() for word in line.split(",") if word.strip()]
 
 
 def _keyword(text: str) -> tuple[str, dict[str, str]]:
@@ -117,7 +121,7 @@ def _keyword(text: str) -> tuple[str, dict[str, str]]:
 
 
 def _take(
-    deck: _Deck, keyword: str, options: Mapping[str, str], rows: Sequence[Sequence[str]]
+    deck: _Deck, keyword: str, options: Mapping[str, str], rows: Iterable[Sequence[str]]
 ) -> None:
     """Take the lines of data of a keyword; those of an element may continue in the next line."""
     if keyword == "NODE":
@@ -126,8 +130,9 @@ def _take(
             deck.nodes[int(label)] = (x, y, z)
     elif keyword == "ELEMENT":
         count, kind = _element(options["TYPE"])
-        numbers = np.array([int(word) for row in rows for word in row]).reshape(-1, count + 1)
-        found = {label: (kind, tuple(nodes)) for label, *nodes in numbers.tolist()}
+        numbers = np.fromiter((int(word) for row in rows for word in row), np.int64)
+        table = numbers.reshape(-1, count + 1).tolist()
+        found = {label: (kind, tuple(nodes)) for label, *nodes in table}
         deck.elements |= found
         if "ELSET" in options:
             deck.sets[options["ELSET"]] |= found.keys()

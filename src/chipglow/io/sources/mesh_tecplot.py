@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +19,8 @@ from chipglow.io.sources.tecplot_zone import ELEMENTS, ORDERED, Zone, block_of
 ENDINGS: Final = (".dat", ".tec", ".plt")
 
 _KEY: Final = r'(\w+)\s*=\s*("[^"]*"|\((?:[^()]|\([^()]*\))*\)|[^\s,]+)'
-_NUMBER: Final = re.compile(rb"\s*[-+.]?\d")
+_ZONE: Final = re.compile(rb"(?mi)^[ \t]*ZONE\b")
+_NUMBER: Final = re.compile(rb"(?m)^[ \t]*[-+.]?\d")
 _ORDERED: Final = (ORDERED, "POINT", "BLOCK")
 _NOT_READ: Final = ("VARSHARELIST", "CONNECTIVITYSHAREZONE", "D", "PASSIVEVARLIST")
 
@@ -68,39 +70,29 @@ def _zones(file: Path) -> tuple[Zone, ...]:
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
-    header, begins, ends, texts = b"", list[int](), list[int](), list[bytes]()
-    inside = False
     with file.open("rb") as stream:
-        at = 0
-        for line in stream:
-            if line.lstrip().startswith(b"#"):
-                at += len(line)
-                continue
-            if line.lstrip()[:4].upper() == b"ZONE":
-                ends.append(at)
-                texts.append(line)
-                inside = True
-            elif inside and _NUMBER.match(line):
-                begins.append(at)
-                inside = False
-            elif inside:
-                texts[-1] += line
-            elif not texts:
-                header += line
-            at += len(line)
-    names = _names(header.decode(errors="replace"))
-    if not names or not texts or len(begins) != len(texts):
+        content = mmap(stream.fileno(), 0, access=ACCESS_READ)
+    starts = [match.start() for match in _ZONE.finditer(content)]
+    names = _names(_text(content[: starts[0] if starts else 0]))
+    zones = []
+    for number, (start, end) in enumerate(pairwise([*starts, len(content)]), start=1):
+        data = _NUMBER.search(content, start, end)
+        if not names or data is None:
+            break
+        keys = _keys(_text(content[start : data.start()]))
+        with naming(f"{file}: zone {number}: SOLUTIONTIME"):
+            time = float(keys["SOLUTIONTIME"]) if "SOLUTIONTIME" in keys else None
+        read = partial(_load, file, content, number, names, keys, data.start(), end)
+        zones.append(Zone(time, read))
+    if not zones or len(zones) < len(starts):
         raise SourceError(
             f"{file}: has no VARIABLES and ZONE with data, expected an ASCII file of Tecplot"
         )
-    zones = []
-    for number, rows in enumerate(zip(texts, begins, [*ends[1:], at], strict=True), start=1):
-        text, begin, end = rows
-        keys = _keys(text.decode(errors="replace"))
-        with naming(f"{file}: zone {number}: SOLUTIONTIME"):
-            time = float(keys["SOLUTIONTIME"]) if "SOLUTIONTIME" in keys else None
-        zones.append(Zone(time, partial(_load, file, number, names, keys, begin, end)))
     return tuple(zones)
+
+
+def _text(content: bytes) -> str:
+    return re.sub(rb"(?m)^\s*#.*$", b"", content).decode(errors="replace")
 
 
 def _names(header: str) -> tuple[str, ...]:
@@ -117,12 +109,16 @@ def _keys(text: str) -> dict[str, str]:
 
 
 def _load(
-    file: Path, number: int, names: tuple[str, ...], keys: Mapping[str, str], begin: int, end: int
+    file: Path,
+    content: mmap,
+    number: int,
+    names: tuple[str, ...],
+    keys: Mapping[str, str],
+    begin: int,
+    end: int,
 ) -> Block:
     """Read a zone with variables of some names between two bytes of a file."""
-    with file.open("rb") as stream:
-        stream.seek(begin)
-        words = re.sub(rb"(?m)^\s*#.*$", b"", stream.read(end - begin)).split()
+    words = re.sub(rb"(?m)^\s*#.*$", b"", content[begin:end]).split()
     kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", ORDERED))).upper().removeprefix("FE")
     with naming(f"{file}: zone {number}"):
         for key in _NOT_READ:

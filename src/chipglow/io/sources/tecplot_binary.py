@@ -150,15 +150,12 @@ class _Cursor:
         self.at += dtype.itemsize * count
         return values
 
-    def numbers(self, kind: str, count: int) -> list[Any]:
-        values: list[Any] = self.skip(kind, count).tolist()
-        return values
+    def take(self, layout: str) -> list[Any]:
+        """Return numbers: i is an integer of 32 bits, f and d are floats of 32 and 64 bits."""
+        return [self.skip(kind, 1)[0].item() for kind in layout]
 
     def integer(self) -> int:
-        return int(self.numbers("i4", 1)[0])
-
-    def marker(self) -> float:
-        return float(self.numbers("f4", 1)[0])
+        return int(self.take("i")[0])
 
     def text(self) -> str:
         """Return letters of 32 bits each, up to a zero."""
@@ -197,13 +194,13 @@ class _Cursor:
 
     def flags(self, count: int, without: int = 0) -> list[int]:
         """Return a number for each variable if the file contains them."""
-        return self.numbers("i4", count) if self.integer() else [without] * count
+        return self.take("i" * count) if self.integer() else [without] * count
 
 
 def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Zone]:
     """Return the headers of the zones, up to the end of the file's header."""
     found: list[_Zone] = []
-    while (marker := cursor.marker()) != _END_OF_HEADER:
+    while (marker := cursor.take("f")[0]) != _END_OF_HEADER:
         if marker == _ZONE:
             found.append(_header(cursor, version, variables, 1 + len(found)))
         elif marker == _GEOMETRY:
@@ -216,7 +213,7 @@ def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Zone]:
         elif marker == _RECORD:
             cursor.text()
         elif marker in (_ABOUT_FILE, _ABOUT_VARIABLE):
-            cursor.skip("i4", 1 if marker == _ABOUT_VARIABLE else 0)
+            cursor.take("i" if marker == _ABOUT_VARIABLE else "")
             _skip_remark(cursor)
         else:
             raise cursor.damaged(f"mark {marker:g} at byte {cursor.at - 4}")
@@ -227,9 +224,7 @@ def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Zone]:
 
 def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Zone:
     name = cursor.text()
-    _, strand = cursor.numbers("i4", 2)
-    (time,) = cursor.numbers("f8", 1)
-    _, kind_number = cursor.numbers("i4", 2)
+    _, strand, time, _, kind_number = cursor.take("iidii")
     if not 0 <= kind_number < len(_KINDS):
         raise cursor.damaged(f"zone {number} is of the kind {kind_number}")
     kind = _KINDS[kind_number]
@@ -249,10 +244,10 @@ def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Zone
     if mode not in _NEIGHBOURS:
         raise cursor.refused(f"zone {number} has faces with many neighbours, which are not read")
     if kind == ORDERED:
-        across, down, deep = cursor.numbers("i4", 3)
+        across, down, deep = cursor.take("iii")
         elements = 0
     else:
-        across, elements, *_ = cursor.numbers("i4", 5)
+        across, elements, *_ = cursor.take("iiiii")
         down, deep = 1, 1
     if not isfinite(time):
         raise cursor.damaged(f"zone {number} is at the time {time}")
@@ -267,19 +262,16 @@ def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Zone
 
 def _skip_remark(cursor: _Cursor) -> None:
     cursor.text()
-    cursor.skip("i4", 1)
+    cursor.integer()
     cursor.text()
 
 
 def _skip_geometry(cursor: _Cursor) -> None:
-    system, *_ = cursor.numbers("i4", 3)
-    cursor.skip("f8", 3)
-    *_, shape, _ = cursor.numbers("i4", 6)
-    cursor.skip("f8", 2)
-    cursor.skip("i4", 3)
-    cursor.skip("f8", 2)
+    system, *_ = cursor.take("iiiddd")
+    *_, shape, _ = cursor.take("iiiiii")
+    cursor.take("ddiiidd")
     cursor.text()
-    precision, _ = cursor.numbers("i4", 2)
+    precision, _ = cursor.take("ii")
     kind = "f4" if precision == 1 else "f8"
     if shape != _LINE:
         cursor.skip(kind, 2 if shape in (_RECTANGLE, _ELLIPSE) else 1)
@@ -289,20 +281,16 @@ def _skip_geometry(cursor: _Cursor) -> None:
 
 
 def _skip_text(cursor: _Cursor) -> None:
-    for kind, count in (("i4", 2), ("f8", 3), ("i4", 2), ("f8", 1), ("i4", 1), ("f8", 2),
-                        ("i4", 2), ("f8", 2), ("i4", 3)):  # fmt: skip
-        cursor.skip(kind, count)
-    cursor.text()
-    cursor.skip("i4", 1)
-    cursor.text()
+    cursor.take("iidddiididdiiddiii")
+    _skip_remark(cursor)
 
 
 def _locate(cursor: _Cursor, names: Sequence[str], zones: Sequence[_Zone], ghosts: bool) -> None:
     """Find the numbers of the zones; each zone has to begin where the one before ends."""
     for number, zone in enumerate(zones, start=1):
-        if (marker := cursor.marker()) != _ZONE:
+        if (marker := cursor.take("f")[0]) != _ZONE:
             raise cursor.damaged(f"mark {marker:g} in place of zone {number}")
-        kinds = cursor.numbers("i4", len(names))
+        kinds = cursor.take("i" * len(names))
         passive = cursor.flags(len(names))
         shared = cursor.flags(len(names), _ALONE)
         cells_of = cursor.integer()

@@ -1,18 +1,17 @@
 """Temperature along the shear band of a measurement, and how far the band has developed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
 from math import isfinite, nan, sqrt
-from typing import Any, Final, TypeAlias
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
@@ -63,8 +62,6 @@ _DEEP_FRACTION: Final = 1.0 / 3.0
 
 _STEP: Final = 0.5
 _FINE: Final = 4
-
-_Images: TypeAlias = Callable[[int], ThermalImage]
 
 
 class Stage(StrEnum):
@@ -206,8 +203,6 @@ def band_profile(
     ------
     NoShearBandError
         If no frame has a band; of a single frame with the reason.
-    ValueError
-        If there is no tool, a number is impossible, or nothing on a given curve is usable.
 
     Notes
     -----
@@ -226,20 +221,28 @@ def band_profile(
         if not (isfinite(value) and value >= 0):
             raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
     numbers = frame_numbers(frames, measurement.times.size)
-    images = cache(partial(ThermalImage.of, measurement))
-    given = None if curve is None else _given(curve, tool, pitch)
-    found, reason = _found(images, tool, numbers)
-    notes = Notes()
+    reader = _Reader(measurement, tool, width, position)
+    found, reason = reader.bands(numbers)
+    notes, lines = Notes(), found
     if measurement.calibration_errors is None:
         notes.warnings.append(CALIBRATION_UNKNOWN)
-    if given is None and not any(found):
+    if curve is not None:
+        base = _given(curve, tool, pitch)
+        lines, distance = [base] * numbers.size, base.distance
+        if reference is None:
+            notes.assumed.append("The given curve is the place of the fully developed band.")
+    elif any(found):
+        distance = _common(found, pitch)
+        if reference is None:
+            base = reader.developed(found, numbers, notes)
+    else:
         several = f"shear band: none is found in any of {numbers.size} frames; in the last: "
         raise NoShearBandError(several * (numbers.size > 1) + reason)
-    base = _reference(measurement, images, tool, found, numbers, given, reference, notes)
-    lines = found if given is None else [given] * numbers.size
-    distance = _common(lines, pitch) if given is None else given.distance
+    if reference is not None:
+        frame_numbers([reference], measurement.times.size)
+        base = find_band(reader.image(reference), tool)
     points = np.stack([_laid(line, distance) for line in lines])
-    reader, moves = _Reader(measurement, images, width, position), np.zeros((0, 2))
+    moves = np.zeros((0, 2))
     if uncertainty is not None:
         moves = uncertainty.displacements(tool, tool.edge_point)
     read = [
@@ -252,7 +255,7 @@ def band_profile(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
             "in the image where the chip is hotter than the camera's lower range limit"
         )
-    if given is None:
+    if curve is None:
         notes.warnings.extend(_joined(temperature, measurement.times[numbers]))
     estimate = measurement.estimate(temperature, calibration)
     known = np.isfinite(temperature)
@@ -297,57 +300,6 @@ def _given(curve: Array, tool: Tool, pitch: float) -> Line:
     return Line(distance, np.stack(columns, axis=1))
 
 
-def _found(
-    images: _Images, tool: Tool, numbers: NDArray[np.int64]
-) -> tuple[list[Line | None], str]:
-    """Find the ridge of every frame, and the reason why the last one without has none."""
-    lines: list[Line | None] = []
-    reason = ""
-    for number in numbers.tolist():
-        try:
-            lines.append(find_band(images(number), tool))
-        except NoShearBandError as error:
-            lines.append(None)
-            reason = str(error)
-    return lines, reason
-
-
-def _reference(
-    measurement: Measurement,
-    images: _Images,
-    tool: Tool,
-    found: list[Line | None],
-    numbers: NDArray[np.int64],
-    given: Line | None,
-    reference: int | None,
-    notes: Notes,
-) -> Line:
-    """Return the curve of the fully developed band."""
-    if reference is not None:
-        frame_numbers([reference], measurement.times.size)
-        return find_band(images(reference), tool)
-    if given is not None:
-        notes.assumed.append("The given curve is the place of the fully developed band.")
-        return given
-    pitch = measurement.raster.spacing
-    bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
-    near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
-    if not near:
-        notes.warnings.append(
-            "No band begins near the cutting edge, so all may have moved; the stages are "
-            "judged against the hottest and longest one."
-        )
-    line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
-    if len(bands) == 1:
-        notes.warnings.append("Only one frame has a band; its stage cannot be judged.")
-    elif near:
-        notes.assumed.append(
-            f"The band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
-            "it is the hottest and longest of those that begin near the cutting edge."
-        )
-    return line
-
-
 def _joined(temperature: Array, times: Array) -> tuple[str, ...]:
     """Return a warning of found curves that cross a deep valley between two hot places."""
     crossing = []
@@ -365,14 +317,6 @@ def _joined(temperature: Array, times: Array) -> tuple[str, ...]:
         f"The curve at {when} µs crosses a valley, up to {max(crossing)[0]:.0f} K deep: "
         "it may join two bands, or a band that has moved and the heat at the edge.",
     )
-
-
-def _heat(measurement: Measurement, line: Line, number: int) -> float:
-    """Integrate the temperature over the lower range limit along a line in K m."""
-    frame = measurement.data["radiance_temperature"][number].values
-    lower_limit = float(measurement.data.attrs.get("lower_limit", np.nanmin(frame)))
-    values = np.nan_to_num(sample(frame, measurement.raster, line.points) - lower_limit)
-    return float(scipy.integrate.trapezoid(values, line.distance))
 
 
 def _common(lines: Sequence[Line | None], pitch: float) -> Array:
@@ -406,14 +350,53 @@ def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
 class _Reader:
     """Reader of means across a curve, and of their uncertainty, in one frame after another."""
 
-    def __init__(
-        self, measurement: Measurement, images: _Images, width: float, position: float
-    ) -> None:
-        self.measurement, self.images = measurement, images
+    def __init__(self, measurement: Measurement, tool: Tool, width: float, position: float) -> None:
+        self.measurement, self.tool, self.position = measurement, tool, position
+        self.image = cache(partial(ThermalImage.of, measurement))
         self.pitch = measurement.raster.spacing
-        self.position = position
         count = max(round(width / self.pitch * _FINE), 1)
         self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
+
+    def bands(self, numbers: NDArray[np.int64]) -> tuple[list[Line | None], str]:
+        """Find the ridge of every frame, and the reason why the last one without has none."""
+        lines: list[Line | None] = []
+        reason = ""
+        for number in numbers.tolist():
+            try:
+                lines.append(find_band(self.image(number), self.tool))
+            except NoShearBandError as error:
+                lines.append(None)
+                reason = str(error)
+        return lines, reason
+
+    def developed(
+        self, found: Sequence[Line | None], numbers: NDArray[np.int64], notes: Notes
+    ) -> Line:
+        """Choose the fully developed one of the bands found."""
+        bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
+        near = [band for band in bands if band[0].distance[0] < NEAR_THE_EDGE * self.pitch]
+        if not near:
+            notes.warnings.append(
+                "No band begins near the cutting edge, so all may have moved; the stages are "
+                "judged against the hottest and longest one."
+            )
+        line, number = max(near or bands, key=lambda band: self._heat(*band))
+        if len(bands) == 1:
+            notes.warnings.append("Only one frame has a band; its stage cannot be judged.")
+        elif near:
+            notes.assumed.append(
+                f"The band at {self.measurement.times[number] * 1e6:.6g} µs is fully developed: "
+                "it is the hottest and longest of those that begin near the cutting edge."
+            )
+        return line
+
+    def _heat(self, line: Line, number: int) -> float:
+        """Integrate the temperature over the lower range limit along a line in K m."""
+        data, raster = self.measurement.data, self.measurement.raster
+        frame = data["radiance_temperature"][number].values
+        lower_limit = float(data.attrs.get("lower_limit", np.nanmin(frame)))
+        values = np.nan_to_num(sample(frame, raster, line.points) - lower_limit)
+        return float(scipy.integrate.trapezoid(values, line.distance))
 
     def __call__(self, number: int, points: Array, nearer: Array) -> tuple[Array, ...]:
         """Return the temperature at points of a frame, NaN beyond the ends of its curve.
@@ -437,21 +420,18 @@ class _Reader:
             normal = normals_of(curve)
             tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
             for step, changes in zip(nearer, edge, strict=True):
-                changes[there] = contribution(self.images(number), curve, step * tangent)
+                changes[there] = contribution(self.image(number), curve, step * tangent)
         return temperature, calibration, position, edge
 
     def _mean(self, image: NDArray[np.floating], places: Array) -> Array:
         return np.asarray(sample(image, self.measurement.raster, places).mean(axis=-1))
 
     def _position(self, number: int, curve: Array) -> Array:
-        image, u = self.images(number), self.position
-
-        def read(values: Any, points: Array) -> Any:
-            return map_coordinates(values, image.index(points), order=1, mode="nearest")
-
-        down, right = (read(slope, curve) for slope in np.gradient(image.temperature, self.pitch))
+        image, u = self.image(number), self.position
+        slopes: Any = np.gradient(image.temperature, self.pitch)
+        down, right = (replace(image, temperature=slope).read(curve) for slope in slopes)
         behind, here, ahead = (
-            read(image.temperature, curve + self.pitch * k * normals_of(curve)) for k in (-1, 0, 1)
+            image.read(curve + self.pitch * k * normals_of(curve)) for k in (-1, 0, 1)
         )
         bend = (behind - 2 * here + ahead) / self.pitch**2
         return np.asarray(np.sqrt((down**2 + right**2) * u**2 + 0.75 * bend**2 * u**4))

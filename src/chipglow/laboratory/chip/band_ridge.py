@@ -66,11 +66,11 @@ class ThermalImage:
         filled[flags & Flag.UNDER_RANGE > 0] = lower_limit
         return cls(filled, usable, measurement.raster)
 
-    def index(self, points: Array) -> Array:
-        """Return row and column of points in m, shape (2, ...)."""
-        column = (points[..., 0] - self.raster.left) / self.raster.spacing - 0.5
-        row = (self.raster.top - points[..., 1]) / self.raster.spacing - 0.5
-        return np.stack([row, column])
+    def read(self, points: Array) -> Array:
+        """Return temperatures at points in m, bilinear; outside those of the nearest pixel."""
+        index = self.raster.index(points)
+        values = map_coordinates(self.temperature, index, order=1, mode="nearest")
+        return np.asarray(values, np.float64)
 
     def noise(self) -> float:
         """Estimate the standard deviation of the noise in K by the method of Immerkaer (1996)."""
@@ -187,14 +187,14 @@ def _profiles(
     """Return offsets in m up to a reach in pixels, and the smoothed temperature across points."""
     count = ceil(reach * _FINE)
     offsets = image.raster.spacing / _FINE * np.arange(-count, count + 1, dtype=np.float64)
-    index = image.index(across_curve(points, offsets))
+    index = image.raster.index(across_curve(points, offsets))
     values = map_coordinates(coefficients, index, order=3, mode="nearest", prefilter=False)
     return offsets, gaussian_filter(values, _CLIMB_BLUR, mode="nearest")
 
 
 def _within(points: Array, image: ThermalImage) -> Array:
     """Return the points from the first to the last whose pixel is usable."""
-    row, column = np.rint(image.index(points)).astype(np.int64)
+    row, column = np.rint(image.raster.index(points)).astype(np.int64)
     rows, columns = image.usable.shape
     inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
     inside[inside] = image.usable[row[inside], column[inside]]

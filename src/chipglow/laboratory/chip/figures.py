@@ -59,7 +59,7 @@ def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeG
 
 
 def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
-    """Mean over the grid's frames of what is usable in K; NaN where no frame has a value."""
+    """Return the mean over the grid's frames of what is usable in K, or NaN."""
     frames = np.isin(measurement.times, grid.times)
     values = measurement.radiance_temperature()[frames]
     known = np.isfinite(values)
@@ -130,7 +130,7 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
 
 
 def _draw_times(figure: Figure, axes: Axes, times: Array) -> None:
-    """Which colour is which time, where there are too many curves to name each."""
+    """Draw a colour bar of the times, where there are too many curves to name each."""
     span = matplotlib.colors.Normalize(1e6 * times[0], 1e6 * times[-1])
     key = matplotlib.cm.ScalarMappable(span, _COLOURS)
     figure.colorbar(key, ax=axes, label="time / µs", aspect=25)

@@ -60,11 +60,6 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
         Assumed tool, the paper's by default. Its rake angle is looked for within 20 degrees; its
         edge and its clearance angle are taken as they are.
 
-    Raises
-    ------
-    ValueError
-        If there is no straight edge in the image that stands out from its noise.
-
     Notes
     -----
     Along each row the radiance has one smooth course in the chip and another in the tool, blurred

@@ -190,7 +190,7 @@ class _Look:
 def _passing(
     scene: Scene, tool: Tool, frames: list[int], scan: ChipScan, period: float
 ) -> tuple[int, dict[str, float]]:
-    """Number of whole segments that pass the scanned line, and the metrics of their chip."""
+    """Return the number of whole segments that pass the line, and the metrics of their chip."""
     windows = [] if np.isnan(scan.height) else _windows(scan.time, period)
     if not windows:
         nothing = {"thickness": nan, "band_strain": nan}
@@ -226,14 +226,14 @@ def _frame_numbers(scene: Scene) -> list[int]:
 
 
 def _heights(raster: Raster, tool: Tool) -> Array:
-    """Heights on the rake face in the view, each two samples."""
+    """Return heights on the rake face in the view, at steps of two samples."""
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
     points = tool.rake_point(heights)
     return heights[: max(1, int(_inside(raster, points).sum()))]
 
 
 def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
-    """Which points are in the view, a sample or more from its border."""
+    """Return which points are in the view, a sample or more from its border."""
     left, right, bottom, top = raster.extent
     x, y, rim = points[..., 0], points[..., 1], raster.spacing
     across = (x > left + rim) & (x < right - rim)
@@ -241,7 +241,7 @@ def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
 
 
 def _profile(frame: Frame, raster: Raster, tool: Tool, heights: Array) -> Array:
-    """Distance from the rake face to the chip's free surface; NaN where the view ends before.
+    """Return the distance from the rake face to the chip's free surface; NaN outside the view.
 
     The chip is the longest stretch of material on the line: it may have lifted off the face.
     """
@@ -259,7 +259,7 @@ def _profile(frame: Frame, raster: Raster, tool: Tool, heights: Array) -> Array:
 
 
 def _feed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
-    """Height of the uncut surface at the left border, before the cut where that is known."""
+    """Return the height of the uncut surface at the left border, before the cut if known."""
     void = np.flatnonzero(~solid[:, 0])
     top = int(void[-1]) + 1 if void.size else 0  # of the workpiece: a curled chip may be over it
     if not 0 < top < raster.rows:
@@ -270,21 +270,21 @@ def _feed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
 
 
 def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
-    """Speed of what is not deformed, under the cut and before the edge."""
+    """Return the speed of the undeformed workpiece under the cut, before the edge."""
     before = (raster.y[:, None] < 0) & (raster.x < 0)
     still = before & solid & (frame.needed("plastic_strain") < _UNDEFORMED)
     return float(np.median(frame.needed("velocity_x")[still])) if still.any() else nan
 
 
 def _scan_row(looks: list[_Look], feed: float) -> int | None:
-    """The lowest height at which every frame shows the chip's free surface, over the uncut one."""
+    """Return the lowest height at which every frame shows the chip's free surface."""
     chip = [look.exit_height > _CHIP_OVER_FEED * feed for look in looks]
     seen = np.flatnonzero(np.all(chip, axis=0))
     return int(seen[0]) if seen.size else None
 
 
 def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
-    """Whole periods, the last at the end of the scene; without a period the whole scene."""
+    """Return whole periods, the last at the end of the scene; without a period the scene."""
     if np.isnan(period):
         return [np.ones(time.size, dtype=np.bool_)]
     step = (time[-1] - time[0]) / max(time.size - 1, 1)
@@ -295,7 +295,7 @@ def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
 
 
 def _forces(scene: Scene) -> dict[str, float]:
-    """Metrics of the force history; NaN without one."""
+    """Return the metrics of the force history; NaN without one."""
     if "cutting_force" not in scene.data:
         return dict.fromkeys(_FORCES, nan)
     names = ("force_time", "cutting_force", "thrust_force")
@@ -304,7 +304,7 @@ def _forces(scene: Scene) -> dict[str, float]:
 
 
 def _developed_bands(scene: Scene, tool: Tool, frames: list[int]) -> list[ShearBand]:
-    """Bands that reach the free surface with half the largest rate or more."""
+    """Find the bands that reach the free surface with half the largest rate or more."""
     found = [band for number in frames if (band := _band(scene, tool, number)) is not None]
     greatest = max((band.middle_rate for band in found), default=0.0)
     return [band for band in found if band.middle_rate >= _DEVELOPED * greatest]
@@ -320,7 +320,7 @@ def _band(scene: Scene, tool: Tool, number: int) -> ShearBand | None:
 
 
 def _angle(band: ShearBand) -> float:
-    """Angle of the straight line through the middle half, over the horizontal to the left."""
+    """Return the angle of the line through the middle half, over the horizontal to the left."""
     points = band.ridge.points[band.middle_half]
     offset = points - points.mean(axis=0)
     direction = np.linalg.svd(offset, full_matrices=False)[2][0]
@@ -333,7 +333,7 @@ def _median(values: list[float]) -> float:
 
 
 def _with_deviation(name: str, values: ArrayLike) -> dict[str, float]:
-    """Mean of the known values and their standard deviation, by the names of the metrics."""
+    """Return the mean of the known values and the standard deviation, by their names."""
     every = np.asarray(values, np.float64)
     known = every[np.isfinite(every)]
     mean = float(known.mean()) if known.size else nan

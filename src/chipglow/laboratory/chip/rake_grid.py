@@ -205,12 +205,6 @@ def rake_grid(
     uncertainty : ToolUncertainty, optional
         How well the place of the tool is known, such as that of a `FoundTool`.
 
-    Raises
-    ------
-    ValueError
-        If there is no tool, no square is inside the image, or none beside the rake face is usable
-        in any frame.
-
     Notes
     -----
     A pixel belongs to the square that holds its middle; nothing is resampled. A square is left out
@@ -230,8 +224,9 @@ def rake_grid(
     size = _checked_size(pixels, depth, raster)
     numbers = frame_numbers(frames, measurement.times.size)
     rows = int(depth / size + _ROUNDING)
-    columns = _columns(raster, tool, size, rows)
-    squares = _Squares.of(raster, tool, size, rows, columns)
+    whole = _whole(raster, tool, size, rows)
+    columns = whole.shape[1]
+    squares = _Squares.of(raster, tool, size, whole)
     temperatures, flags = measurement.data["radiance_temperature"], measurement.data["flags"]
     read = [
         squares.statistics(
@@ -308,7 +303,8 @@ class _Squares:
     """Weights, of sum 1 in each square, shape (k,)."""
 
     @classmethod
-    def of(cls, raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> "_Squares":
+    def of(cls, raster: Raster, tool: Tool, size: float, whole: NDArray[np.bool_]) -> "_Squares":
+        rows, columns = whole.shape
         middles = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
         along, across = tool.face_coordinates(middles)
         column = np.floor(along / size + _ROUNDING).astype(np.int64)
@@ -317,8 +313,7 @@ class _Squares:
         square = (row * columns + column)[inside]
         off = np.stack([along - size * (column + 0.5), across - size * (row + 0.5)], axis=-1)
         weight = _centred_weights(off[inside], square, rows * columns)
-        whole = _whole(raster, tool, size, rows, columns).ravel()
-        return cls((rows, columns), whole, np.flatnonzero(inside), square, weight)
+        return cls(whole.shape, whole.ravel(), np.flatnonzero(inside), square, weight)
 
     def statistics(
         self, values: Array, usable: NDArray[np.bool_]
@@ -365,31 +360,25 @@ def _corners(tool: Tool, size: float, rows: int, columns: int) -> Array:
     return np.asarray(tool.rake_point(along)[None] + across[:, None, None] * normal)
 
 
-def _columns(raster: Raster, tool: Tool, size: float, rows: int) -> int:
-    """Return the number of squares along the face up to the last that is whole in the image."""
+def _whole(raster: Raster, tool: Tool, size: float, rows: int) -> NDArray[np.bool_]:
+    """Return which squares are whole inside the image, up to the last column that has one."""
     left, right, bottom, top = raster.extent
-    corners = np.array([[left, bottom], [left, top], [right, bottom], [right, top]])
-    furthest = float(tool.face_coordinates(corners)[0].max())
-    most = max(int(furthest / size + _ROUNDING), 0)
-    whole = np.flatnonzero(_whole(raster, tool, size, rows, most).any(axis=0))
-    if whole.size == 0:
-        x, y = 1e6 * tool.rake_foot
-        edges = ", ".join(f"{1e6 * edge:.6g}" for edge in raster.extent)
-        raise ValueError(
-            f"rake grid: no square on the rake face is inside the image; the face begins at x "
-            f"{x:.6g} um, y {y:.6g} um, expected it in the image from left, right, bottom, top "
-            f"{edges} um"
-        )
-    return int(whole[-1]) + 1
-
-
-def _whole(raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> NDArray[np.bool_]:
-    """Return which squares are whole inside the image, shape (rows, columns)."""
-    left, right, bottom, top = raster.extent
+    ends = np.array([[left, bottom], [left, top], [right, bottom], [right, top]])
+    columns = max(int(float(tool.face_coordinates(ends)[0].max()) / size + _ROUNDING), 0)
     slack = _ROUNDING * size
     x, y = np.moveaxis(_corners(tool, size, rows, columns), -1, 0)
     inside = (x > left - slack) & (x < right + slack) & (y > bottom - slack) & (y < top + slack)
-    return np.asarray(inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:])
+    whole = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
+    shown = np.flatnonzero(whole.any(axis=0))
+    if shown.size == 0:
+        foot_x, foot_y = 1e6 * tool.rake_foot
+        edges = ", ".join(f"{1e6 * edge:.6g}" for edge in raster.extent)
+        raise ValueError(
+            f"rake grid: no square on the rake face is inside the image; the face begins at x "
+            f"{foot_x:.6g} um, y {foot_y:.6g} um, expected it in the image from left, right, "
+            f"bottom, top {edges} um"
+        )
+    return np.asarray(whole[:, : shown[-1] + 1])
 
 
 def _centred_weights(off: Array, square: NDArray[np.int64], squares: int) -> Array:

@@ -63,14 +63,11 @@ class PolarGrid:
         angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         points = edge + radii[:, None, None] * rays
-        column = (points[..., 0] - left) / raster.spacing - 0.5
-        row = (top - points[..., 1]) / raster.spacing - 0.5
-        on_raster = (column >= 0) & (column <= raster.columns - 1)
-        on_raster &= (row >= 0) & (row <= raster.rows - 1)
+        index = raster.index(points)
         return cls(
             points=points,
-            index=np.stack([row, column]),
-            on_raster=on_raster,
+            index=index,
+            on_raster=raster.covers(index),
             off_face=off_face(points, tool),
             radii=radii,
             radius_step=step,

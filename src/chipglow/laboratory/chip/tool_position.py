@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.band_ridge import ThermalImage
@@ -72,17 +70,8 @@ def contribution(image: ThermalImage, points: Array, displacement: Array) -> Arr
     It is half the difference between the temperatures on either side (JCGM 100, 5.1.3, note 2);
     where one side is outside the image, the difference to the other.
     """
-    (behind, no_behind), (here, _), (ahead, no_ahead) = (
-        _read(image, points + side * displacement) for side in (-1, 0, 1)
-    )
+    places = [points + side * displacement for side in (-1, 0, 1)]
+    behind, here, ahead = map(image.read, places)
+    no_behind, _, no_ahead = (~image.raster.covers(image.raster.index(one)) for one in places)
     one_side = np.where(no_ahead, here - behind, ahead - here)
     return np.where(no_ahead ^ no_behind, one_side, (ahead - behind) / 2)
-
-
-def _read(image: ThermalImage, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return temperatures in K, of the nearest pixel outside the image, and which are outside."""
-    row, column = image.index(points)
-    rows, columns = image.temperature.shape
-    outside = (row < 0) | (row > rows - 1) | (column < 0) | (column > columns - 1)
-    values = map_coordinates(image.temperature, [row, column], order=1, mode="nearest")
-    return values, outside

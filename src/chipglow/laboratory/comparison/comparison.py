@@ -90,7 +90,7 @@ class PlaceResult:
     @property
     def sentence(self) -> str:
         """Which simulation fits best here, in one sentence."""
-        best, place = self.fits[self.best], self.place[0].upper() + self.place[1:]
+        best, place = self.fits[self.best], f"{self.place[0].upper()}{self.place[1:]},"
         others = [fit for fit in self.fits if fit is not best]
         result = f"{_fit_text(best)} values agree (E_n up to 1)"
         if not others:
@@ -171,7 +171,7 @@ class Comparison:
         """Return the fit of each simulation at each place; one row each."""
         return pd.DataFrame(
             {
-                "place": result.place.rstrip(","),
+                "place": result.place,
                 "simulation": fit.label,
                 "bias_K": fit.bias,
                 "bias_standard_uncertainty_K": fit.bias_uncertainty,
@@ -192,10 +192,10 @@ class Comparison:
             return f"{self.labels[0]}: {agreeing} of {count} values agree (E_n up to 1)."
         parts = []
         for i, label in enumerate(self.labels):
-            where = [r.place.rstrip(",") for r in self.places if r.is_sure and r.best == i]
+            where = [r.place for r in self.places if r.is_sure and r.best == i]
             if where:
                 parts.append(f"{label} fits best {'; '.join(where)}.")
-        unsure = [r.place.rstrip(",") for r in self.places if not r.is_sure]
+        unsure = [r.place for r in self.places if not r.is_sure]
         if unsure:
             parts.append(f"The sets cannot be distinguished {'; '.join(unsure)}.")
         return " ".join(parts)
@@ -256,12 +256,6 @@ def compare(
         Uncertainties that the files do not state.
     reference : int, optional
         Number of the measured frame whose band is fully developed; see `band_profile`.
-
-    Raises
-    ------
-    ValueError
-        If there is no simulation, nothing that can be compared, or an uncertainty of the
-        temperature is stated beside that of the measurement itself.
 
     Notes
     -----
@@ -508,23 +502,18 @@ def _places(
     labels: Sequence[str], grid: Readings | None, band: Readings | None
 ) -> tuple[PlaceResult, ...]:
     """Return the fits at each place where measurement and simulations have values."""
-    results: list[PlaceResult | None] = []
+    asked: list[tuple[str, Readings, NDArray[np.bool_]]] = []
     if grid is not None and grid.depth is not None:
         face = np.zeros(grid.measured.values.shape, dtype=np.bool_)
         face[0] = True
         reach = grid.depth[0] * 2e6
-        results.append(_judged(f"at the rake face, up to {reach:.3g} µm deep,", labels, grid, face))
-        results.append(
-            _judged(f"in the chip, over {reach:.3g} µm from the face,", labels, grid, ~face)
-        )
+        asked.append((f"at the rake face, up to {reach:.3g} µm deep", grid, face))
+        asked.append((f"in the chip, over {reach:.3g} µm from the face", grid, ~face))
     if band is not None:
         near, reach = band.distance < TIP_REACH, 1e6 * TIP_REACH
-        results.append(
-            _judged(f"in the shear band, under {reach:.3g} µm from the edge,", labels, band, near)
-        )
-        results.append(
-            _judged(f"in the shear band, {reach:.3g} µm and farther,", labels, band, ~near)
-        )
+        asked.append((f"in the shear band, under {reach:.3g} µm from the edge", band, near))
+        asked.append((f"in the shear band, {reach:.3g} µm and farther", band, ~near))
+    results = (_judged(place, labels, pair, where) for place, pair, where in asked)
     return tuple(result for result in results if result is not None)
 
 

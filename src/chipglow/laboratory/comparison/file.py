@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from chipglow.camera import Measurement
 from chipglow.laboratory.comparison.comparison import Comparison
@@ -28,24 +27,22 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
 def write_comparison(comparison: Comparison, folder: Path) -> None:
     """Write a comparison into an existing folder."""
     write_frame(comparison.to_frame(), folder / "comparison.csv")
+    fits = comparison.fit_frame().set_index("place")
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
-        "places": [_place(comparison, number) for number in range(len(comparison.places))],
+        "places": [
+            {
+                "place": one.place,
+                "sentence": one.sentence,
+                "best": one.fits[one.best].label,
+                "confidence": one.confidence,
+                "fits": fits.loc[[one.place]].to_dict("records"),
+            }
+            for one in comparison.places
+        ],
         "assumed": comparison.notes.assumed,
         "warnings": comparison.notes.warnings,
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
     (folder / "summary.json").write_text(f"{text}\n", encoding="utf-8")
-
-
-def _place(comparison: Comparison, number: int) -> dict[str, Any]:
-    result, fits = comparison.places[number], comparison.fit_frame()
-    place = result.place.rstrip(",")
-    return {
-        "place": place,
-        "sentence": result.sentence,
-        "best": result.fits[result.best].label,
-        "confidence": result.confidence,
-        "fits": fits[fits["place"] == place].drop(columns="place").to_dict("records"),
-    }

@@ -13,8 +13,11 @@ from chipglow.laboratory.emissivity.file import (
     EmissivityMapFile as EmissivityMapFile,
     MeasuredEmissivity as MeasuredEmissivity,
     emissivity_trend as emissivity_trend,
+    measured_features as measured_features,
+    measured_text as measured_text,
     read_emissivity_lines as read_emissivity_lines,
     read_emissivity_map as read_emissivity_map,
+    surface_text as surface_text,
     write_emissivity as write_emissivity,
 )
 from chipglow.laboratory.emissivity.region_emissivities import (
@@ -24,11 +27,6 @@ from chipglow.laboratory.emissivity.region_emissivities import (
 from chipglow.laboratory.emissivity.regions import (
     RegionSection as RegionSection,
     load_regions as load_regions,
-)
-from chipglow.laboratory.emissivity.study_sections import (
-    measured_features as measured_features,
-    measured_text as measured_text,
-    surface_text as surface_text,
 )
 from chipglow.laboratory.emissivity.temperature import (
     RegionTemperatures as RegionTemperatures,

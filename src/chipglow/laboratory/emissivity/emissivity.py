@@ -112,19 +112,6 @@ class EmissivityMap:
     recordings: int = 1
     """Number of recordings that the observations are from."""
 
-    @property
-    def hidden(self) -> float:
-        """Lowest emissivity that the camera's range measures; 0 without a lower limit."""
-        if self.lower_limit <= self.heating.reflected:
-            return 0.0
-        radiance = np.asarray(self.band.radiance(np.array(self.lower_limit)), np.float64)
-        return float(emissivity_of_radiance(radiance, self.heating, self.band))
-
-    @property
-    def observations(self) -> int:
-        """Number of frames of one image, or of images."""
-        return len(self.radiance)
-
     @cached_property
     def identity(self) -> str:
         """Hash that tells these observations from others."""
@@ -153,15 +140,16 @@ class EmissivityMap:
         drift = None if relative is None else relative * effect
         systematic = self._systematic(self.emissivity, self.mean_radiance, self.calibration)
         found = with_drift(systematic, drift, self.identity)
-        if self.observations == 1:
+        count = len(self.radiance)
+        if count == 1:
             return found.with_unevaluated("noise")
-        noise = self.radiance.std(axis=0, ddof=1) / sqrt(self.observations) / self._contrast
+        noise = self.radiance.std(axis=0, ddof=1) / sqrt(count) / self._contrast
         return found.with_component(
             "noise",
             noise,
             independent="per element",
             identity=self.identity,
-            degrees_of_freedom=self.observations - 1.0,
+            degrees_of_freedom=count - 1.0,
             pooled=False,
         )
 
@@ -196,9 +184,11 @@ class EmissivityMap:
     def _warnings(self, used: UsedPixels, outside: tuple[int, int], mean: float) -> Iterator[str]:
         for text in used.warnings():
             if used.flagged[Flag.UNDER_RANGE]:
+                radiance = np.asarray(self.band.radiance(np.array(self.lower_limit)), np.float64)
+                hidden = float(emissivity_of_radiance(radiance, self.heating, self.band))
                 text += (
                     " The remaining pixels are brighter than the region, as the camera's range "
-                    f"hides emissivities below {self.hidden:.3g}."
+                    f"hides emissivities below {max(0.0, hidden):.3g}."
                 )
             elif used.flagged[Flag.SATURATED]:
                 text += " The remaining pixels are darker than the region."
@@ -360,12 +350,6 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         Images of the object at one true temperature; several of them are repetitions.
     heating : Heating
         Temperatures of the object and its surroundings.
-
-    Raises
-    ------
-    ValueError
-        If there is no image, the images are of different pixels or bands, or the true temperature
-        is under the camera's lower range limit.
     """
     check_same_pixels(measurements, "emissivity")
     for measurement in measurements:

@@ -1,13 +1,15 @@
-"""Determined emissivities in files: maps and regions as NetCDF-4, the table of regions as CSV."""
+"""Determined emissivities in NetCDF-4 files, and as surfaces and sections of a study."""
 
 import os
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import xarray as xr
+import yaml
 
 from chipglow.io import write_dataset
 from chipglow.io.measurement_file import Made, read_dataset
@@ -17,6 +19,7 @@ from chipglow.laboratory.emissivity.emissivity import (
     CONSTANT,
     EmissivityLine,
     Heating,
+    RegionEmissivity,
     emissivity_covariance,
     emissivity_line,
 )
@@ -35,6 +38,18 @@ from chipglow.surface import (
 from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
+_FIELDS: Final[Mapping[str, str]] = {
+    "chip": "body",
+    "chip body": "body",
+    "body": "body",
+    "shear band": "shear_band",
+    "shear_band": "shear_band",
+    "workpiece": "workpiece",
+    "tool": "tool",
+}
+_CHIP: Final = "measured chip"
+_DIGITS: Final = 4
+_GREATEST_DEVIATION: Final = 0.5
 _HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty")
 
 
@@ -179,13 +194,6 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     -------
     MapSurface
         Emissivities limited to 0 to 1, with the mean standard uncertainty of the pixels.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If the file is truncated or no emissivity map.
     """
 
     def surface(data: xr.Dataset) -> MapSurface:
@@ -239,7 +247,7 @@ class EmissivityMapFile(SurfaceChoice):
     file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
 
     def surface(self) -> MapSurface:
-        """The surface."""
+        """Return the surface."""
         return read_emissivity_map(self.file)
 
 
@@ -254,10 +262,60 @@ class MeasuredEmissivity(SurfaceChoice):
     region: Annotated[str, Parameter("Name of a region in it.")]
 
     def surface(self) -> TrendSurface:
-        """The surface."""
+        """Return the surface."""
         areas = read_emissivity_lines(self.file)
         if self.region not in areas:
             raise ValueError(
                 f"region: {self.region!r} is not in {self.file}, expected one of {', '.join(areas)}"
             )
         return TrendSurface(emissivity_trend(areas[self.region]))
+
+
+def surface_text(rows: Iterable[RegionEmissivity]) -> str:
+    """Return sections of a study with the emissivities of its features, as YAML."""
+    found = {
+        _FIELDS[row.feature.lower()]: {
+            "mean": round(row.mean, _DIGITS),
+            "standard_deviation": round(row.standard_deviation, _DIGITS),
+        }
+        for row in rows
+        if row.whole and row.feature.lower() in _FIELDS
+        if 0 <= row.mean <= 1 and row.standard_deviation <= _GREATEST_DEVIATION
+    }
+    surface: dict[str, Any] = {}
+    sections: dict[str, Any] = {"surface": surface}
+    if {"body", "shear_band"} <= set(found):
+        surface["chips"] = {_CHIP: {name: found[name] for name in ("body", "shear_band")}}
+        sections["analysis"] = {"rake_chip": _CHIP, "band_chip": _CHIP}
+    surface |= {name: found[name] for name in ("workpiece", "tool") if name in found}
+    if not surface:
+        return ""
+    return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
+
+
+def measured_text(file: str | os.PathLike[str]) -> str:
+    """Return sections of a study with the chip of a file of `write_emissivity`, as YAML."""
+    sections = {
+        "surface": {"measured": {_CHIP: os.fspath(file)}},
+        "analysis": {"rake_chip": _CHIP, "band_chip": _CHIP},
+    }
+    return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
+
+
+def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
+    """Return measured areas by the features of a study: body, shear_band, workpiece, tool.
+
+    Of several areas of a feature the one of the same name counts.
+    """
+    number = Counter(area.feature for area in areas.values())
+    found = {
+        _FIELDS[area.feature.lower()]: area
+        for area in areas.values()
+        if area.feature.lower() in _FIELDS
+        and (number[area.feature] == 1 or area.name == area.feature)
+    }
+    if not {"body", "shear_band"} <= set(found):
+        raise ValueError(
+            f"is of the features {', '.join(number)}, expected chip body and shear band among them"
+        )
+    return found

@@ -103,31 +103,22 @@ def _line_row(line: EmissivityLine) -> Mapping[str, float | str]:
 
 
 def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivity]]) -> Notes:
-    heating, notes = maps[0].heating, Notes()
-    said = notes.assumed.append
-    if not heating.reference_uncertainty:
-        said("The true temperature is exact (reference_uncertainty).")
-    if not heating.reflected_uncertainty:
-        said(
-            f"The object reflects exactly {heating.reflected - ZERO_CELSIUS:.4g} degC; 100 K more "
-            f"would shift the emissivity by {_of_reflected(maps[0]):+.2g} (reflected, "
-            "reflected_uncertainty)."
-        )
-    if heating.drift is None and any(one.recordings == 1 for one in maps):
-        said(
-            "The camera does not drift between recordings: a single image does not show it, and u "
-            "does not include it (drift)."
-        )
-    if any(one.calibration is None for one in maps):
-        said(
-            "The camera's calibration is exact, as the measurement states no uncertainty of it "
-            "(camera_uncertainty)."
-        )
-    if any(one.observations == 1 for one in maps):
-        said(
-            "Nothing changes between frames, as there is only one; noise is at most the "
-            "standard deviation over the pixels."
-        )
+    heating = maps[0].heating
+    room, change = heating.reflected - ZERO_CELSIUS, _of_reflected(maps[0])
+    texts = {
+        "The true temperature is exact (reference_uncertainty).": not heating.reference_uncertainty,
+        f"The object reflects exactly {room:.4g} degC; 100 K more would shift the emissivity by "
+        f"{change:+.2g} (reflected, reflected_uncertainty).": not heating.reflected_uncertainty,
+        "The camera does not drift between recordings: a single image does not show it, and u "
+        "does not include it (drift).": (
+            heating.drift is None and any(one.recordings == 1 for one in maps)
+        ),
+        "The camera's calibration is exact, as the measurement states no uncertainty of it "
+        "(camera_uncertainty).": any(one.calibration is None for one in maps),
+        "Nothing changes between frames, as there is only one; noise is at most the standard "
+        "deviation over the pixels.": any(len(one.radiance) == 1 for one in maps),
+    }
+    notes = Notes([text for text, applies in texts.items() if applies])
     for of in rows:
         own = Notes(warnings=[warning for row in of for warning in row.estimate.warnings])
         several = f"Object at {of[0].heating.reference - ZERO_CELSIUS:.6g} °C"

@@ -130,12 +130,5 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
     ----------
     path : str or Path
         YAML file of polygons, rectangles and circles.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or a region is not possible.
-    OSError
-        If the file cannot be read.
     """
     return load_described(RegionsDescription, path).build()

@@ -115,13 +115,6 @@ def true_temperature(
         Relative standard uncertainty of the radiance from one recording to the next, by default
         as several recordings show; of one it is unknown and not in the uncertainty.
 
-    Raises
-    ------
-    ValueError
-        If there is no image, the images are of different pixels, fewer than two pixels can be
-        used, or the area is darker than what it reflects; if by a line the radiance does not
-        rise with the temperature.
-
     Notes
     -----
     L(T) = (L_app − (1 − ε) L_env) / ε: Equation 2 of Heigel and Whitenton (2010), solved. The
@@ -178,7 +171,7 @@ class RegionTemperatures:
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
-        """Every region; one row each."""
+        """Return every region; one row each."""
         return pd.DataFrame(
             {
                 "region": row.name,
@@ -226,7 +219,7 @@ def true_temperatures(
         np.isnan(line.at(line.middle).contribution("drift")).any() for line in lines
     )
     assumed = _assumptions(rows, lines, surroundings is None, unknown_drift)
-    return RegionTemperatures(rows, Notes(list(assumed), warnings))
+    return RegionTemperatures(rows, Notes(assumed, warnings))
 
 
 def _far(row: TrueTemperature, line: EmissivityLine) -> Iterator[str]:
@@ -249,33 +242,40 @@ def _assumptions(
     lines: Sequence[EmissivityLine],
     same_surroundings: bool,
     unknown_drift: bool,
-) -> Iterator[str]:
+) -> list[str]:
+    def plays_a_part(cause: str) -> bool:
+        return any(row.estimate.contribution(cause) for row in rows)
+
     known = not any(line.heatings for line in lines)
-    yield "Every region is of uniform temperature and emissivity."
-    if any(len(line.heatings) > 1 for line in lines):
-        yield "The emissivity is a straight line over the temperature."
-    elif not known:
-        yield "The emissivity is the same at all temperatures."
-    if known and not any(row.estimate.contribution("emissivity") for row in rows):
-        yield "The emissivity is exact (emissivity_uncertainty)."
-    if known and same_surroundings:
-        yield "The object reflects 293 K exactly (reflected, reflected_uncertainty)."
-    if not known and same_surroundings:
-        yield "The object reflects what it did when its emissivity was determined."
-    if not any(row.estimate.contribution("calibration") for row in rows):
-        yield "The camera's calibration is exact, as the measurement states no uncertainty of it."
-    elif not known and rows[0].correlation is None:
-        yield (
-            "The calibration's errors in the emissivity and here are independent, which makes u "
-            "too large rather than too small (calibration)."
-        )
-    if unknown_drift:
-        yield (
-            "The camera does not drift between recordings: a single image, here or of the "
-            "emissivity, does not show it, and u does not include it (drift)."
-        )
-    if any(isnan(row.estimate.contribution("repeatability")) for row in rows):
-        yield "Nothing changes between frames, as there is only one."
+    straight = any(len(line.heatings) > 1 for line in lines)
+    calibrated = plays_a_part("calibration")
+    texts = {
+        "Every region is of uniform temperature and emissivity.": True,
+        "The emissivity is a straight line over the temperature.": straight,
+        "The emissivity is the same at all temperatures.": not straight and not known,
+        "The emissivity is exact (emissivity_uncertainty).": (
+            known and not plays_a_part("emissivity")
+        ),
+        "The object reflects 293 K exactly (reflected, reflected_uncertainty).": (
+            known and same_surroundings
+        ),
+        "The object reflects what it did when its emissivity was determined.": (
+            not known and same_surroundings
+        ),
+        "The camera's calibration is exact, as the measurement states no uncertainty of it.": (
+            not calibrated
+        ),
+        "The calibration's errors in the emissivity and here are independent, which makes u too "
+        "large rather than too small (calibration).": (
+            calibrated and not known and rows[0].correlation is None
+        ),
+        "The camera does not drift between recordings: a single image, here or of the emissivity, "
+        "does not show it, and u does not include it (drift).": unknown_drift,
+        "Nothing changes between frames, as there is only one.": any(
+            isnan(row.estimate.contribution("repeatability")) for row in rows
+        ),
+    }
+    return [text for text, applies in texts.items() if applies]
 
 
 def _mean_radiance(

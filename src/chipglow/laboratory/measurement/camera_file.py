@@ -42,13 +42,6 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         camera's file.
     settings : iterable of str
         Fields of the description, such as ``band=3.8-5.1 um``, which override a YAML file.
-
-    Raises
-    ------
-    ValueError
-        If it is not a measurement, or cannot become one.
-    OSError
-        If a file cannot be read.
     """
     settings = list(settings)
     if is_measurement(source):
@@ -149,30 +142,21 @@ def pixel_correction(
     read: "FlatFieldReader | None" = None,
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
     """Return the pixel correction and the bad pixels that a description defines."""
-    fields = _flat_fields(description, recording, read or read_flat_fields)
-    correction = fields.correction if fields and description.flat_field.correct else None
-    if fields is not None and description.bad_pixels == "find":
-        return correction, fields.bad_pixels.mask
+    section, finds = description.flat_field, description.bad_pixels == "find"
     rows, columns = recording.signal.shape[1:]
-    return correction, description.listed_bad_pixels((rows, columns))
-
-
-def _flat_fields(
-    description: MeasurementDescription, recording: Recording, read: "FlatFieldReader"
-) -> "FlatFields | None":
-    """Read the frames of the flat-field sources that a description names, if any."""
-    section = description.flat_field
+    bad = None if finds else description.listed_bad_pixels((rows, columns))
     if section.low is None:
-        if section.high is not None or description.bad_pixels == "find":
+        if section.high is not None or finds:
             raise ValueError("flat_field.low: is missing, expected frames of a flat-field source")
-        return None
+        return None, bad
     # The correction does not depend on the file and frames that are corrected.
-    fields = read(replace(description, file=None, frames=None))
+    fields = (read or read_flat_fields)(replace(description, file=None, frames=None))
     for name, frames in (("high", fields.high), ("low", fields.low)):
         problem = None if frames is None else _unsuitable(frames, recording)
         if problem is not None:
             raise ValueError(f"flat_field.{name}: {problem}")
-    return fields
+    correction = fields.correction if section.correct else None
+    return correction, fields.bad_pixels.mask if finds else bad
 
 
 @dataclass(frozen=True, eq=False)

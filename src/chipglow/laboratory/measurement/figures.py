@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from chipglow.camera import CalibrationFit, FittedCalibration, Flag, Measurement
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.frames import shown_frame
-from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION, VOID
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION, VOID, shown_frame
 from chipglow.quantities import ZERO_CELSIUS, Array
 
 _FLAGS: Final = {

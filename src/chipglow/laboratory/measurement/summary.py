@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chipglow.camera import Flag, Measurement
-from chipglow.drawing.frames import shown_frame
+from chipglow.drawing.scales import shown_frame
 from chipglow.laboratory.measurement.radiometric_calibration import flag_fractions
 from chipglow.quantities import Array
 

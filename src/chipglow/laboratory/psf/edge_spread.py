@@ -16,20 +16,15 @@ _FREQUENCIES: Final = 65
 
 
 def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
-    """Return the edge-spread, line-spread and modulation transfer function of an edge, in SI units.
+    """Return edge-spread, line-spread and modulation transfer function of an edge, in SI units.
 
     The edge-spread function ``esf``, 0 on the dark and 1 on the bright side, is the mean of the
-    ``pixels`` in bins of a quarter of the pitch along the fitted edge's normal, at their mean
-    ``distance``; ``esf_residual`` is what the model leaves. Its uncertainty comes from the scatter
-    of the bin's pixels about the model where there are enough of them, but is not less than the
-    noise of all equally bright pixels. The line-spread function ``lsf`` is the difference of
-    neighbouring bins over their distance.
-
-    The ``mtf`` of optics and pixel goes up to twice the Nyquist frequency. The transform of the
-    edge-spread function is that of the fitted model plus that of the residuals within a window,
-    times 2πif in place of the derivative. A plain transform of the measured bins would end at the
-    window, and lack at low frequencies what the tails hold beyond. The mean over a bin is corrected
-    by its sinc; differences, for which ISO 12233 has a factor, are not taken.
+    pixels in bins of a quarter of the pitch, at their mean ``distance``; ``esf_residual`` is what
+    the model leaves. The line-spread function ``lsf`` is the difference of neighbouring bins over
+    their distance. The ``mtf`` of optics and pixel is that of the fitted model plus the transform
+    of the residuals within a window: a transform of the bins alone would lack, at low frequencies,
+    what the tails hold beyond. It goes up to twice the Nyquist frequency; the mean over a bin is
+    corrected by its sinc.
     """
     edge = fit.edges[index]
     every = edge.line.distance(pixels.x, pixels.y)

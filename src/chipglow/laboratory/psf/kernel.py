@@ -1,6 +1,6 @@
 """The point spread function of a knife edge as a kernel, with what makes it uncertain."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -9,9 +9,8 @@ from chipglow.camera import MeasuredPSF, PointSpreadFunction
 from chipglow.camera.optics.kernel import normalised
 from chipglow.laboratory.psf.knife_edge import RADIAL, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
-from chipglow.laboratory.psf.radial_psf import FIT, psf_cause
+from chipglow.laboratory.psf.radial_psf import FIT, kernel_component
 from chipglow.quantities import Array
-from chipglow.uncertainty import Component
 from chipglow.uncertainty.estimate import factor
 
 MODEL: Final = "psf model"
@@ -50,7 +49,7 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     if knife.unexplained:
         radial = knife.radial
         parts[UNEXPLAINED] = [kernel(radial.psf()) - kernel(radial.model_psf())]
-    components = [_component(name, effects) for name, effects in parts.items() if effects]
+    components = [kernel_component(name, effects) for name, effects in parts.items() if effects]
     return MeasuredPSF(middle, spacing, tuple(components))
 
 
@@ -79,11 +78,6 @@ def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Arra
         for other, weight in zip(knife.fits, knife.weights, strict=True)
         if other is not fit and weight > _NO_WEIGHT
     ]
-
-
-def _component(name: str, effects: Sequence[Array]) -> Component:
-    columns = np.stack([one.ravel() for one in effects], axis=1)
-    return Component(psf_cause(name, columns, len(effects)), columns)
 
 
 def _of_side(kernel: Array, side: int) -> Array:

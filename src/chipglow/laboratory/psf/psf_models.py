@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from math import ceil, cos, exp, pi, sin, sqrt
+from math import ceil, cos, exp, inf, pi, sin, sqrt
 from typing import Final
 
 import numpy as np
@@ -44,13 +44,28 @@ class PSFModel(ABC):
     parameters: tuple[str, ...]
     """Names of its parameters; `is_length` tells which are in m, others are pure numbers."""
 
-    @abstractmethod
-    def starts(self, fwhm: float) -> list[list[float]]:
-        """Return initial parameters of fits for about this full width at half maximum in m."""
+    shapes: tuple[tuple[float, ...], ...] = ()
+    """Parameters from which fits start; lengths over the full width at half maximum."""
+    lowest: tuple[float, ...] = ()
+    """Smallest parameters; lengths over the pitch."""
+    highest: tuple[float, ...] = ()
+    """Largest parameters; lengths have limits of their own."""
 
-    @abstractmethod
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """Return parameters from which fits start, for about this width in m."""
+        return [self._scaled(shape, fwhm) for shape in self.shapes]
+
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         """Return the smallest and largest parameters for a pitch and an image's extent in m."""
+        high = [
+            min(extent, _LARGEST_WIDTH) if is_length(name) else most
+            for name, most in zip(self.parameters, self.highest, strict=False)
+        ]
+        return self._scaled(self.lowest, pitch), high
+
+    def _scaled(self, values: tuple[float, ...], length: float) -> list[float]:
+        pairs = zip(self.parameters, values, strict=False)
+        return [value * length if is_length(name) else value for name, value in pairs]
 
     @abstractmethod
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
@@ -95,12 +110,7 @@ class GaussianModel(PSFModel):
 
     name = "gaussian"
     parameters = ("fwhm",)
-
-    def starts(self, fwhm: float) -> list[list[float]]:
-        return [[fwhm]]
-
-    def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        return [0.02 * pitch], [min(extent, _LARGEST_WIDTH)]
+    shapes, lowest, highest = ((1.0,),), (0.02,), (inf,)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         return _gaussian_transfer(values[0], frequency)
@@ -123,12 +133,12 @@ class GaussianTailModel(PSFModel):
 
     name = "gaussian with tail"
     parameters = ("core_fwhm", "tail_fraction", "tail_ratio")
-
-    def starts(self, fwhm: float) -> list[list[float]]:
-        return [[0.9 * fwhm, fraction, ratio] for fraction, ratio in ((0.1, 4.0), (0.25, 1.5))]
+    shapes = (0.9, 0.1, 4.0), (0.9, 0.25, 1.5)
+    lowest, highest = (0.02, 0.0, 0.72), (inf, 0.95, inf)
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        return [0.02 * pitch, 0.0, 0.72], [min(extent, _LARGEST_WIDTH), 0.95, extent / pitch]
+        low, high = super().bounds(pitch, extent)
+        return low, [*high[:2], extent / pitch]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         core, fraction, ratio = values
@@ -192,12 +202,8 @@ class MoffatModel(PSFModel):
 
     name = "moffat"
     parameters = ("fwhm", "exponent")
-
-    def starts(self, fwhm: float) -> list[list[float]]:
-        return [[fwhm, 1.8], [fwhm, 3.5]]
-
-    def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        return [0.02 * pitch, 1.2], [min(extent, _LARGEST_WIDTH), 20.0]
+    shapes = (1.0, 1.8), (1.0, 3.5)
+    lowest, highest = (0.02, 1.2), (inf, 20.0)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         cycles = 2 * pi * self._radius(values) * frequency
@@ -242,12 +248,8 @@ class DefocusedDiscModel(PSFModel):
 
     name = "defocused disc"
     parameters = ("disc_diameter", "blur_fwhm")
-
-    def starts(self, fwhm: float) -> list[list[float]]:
-        return [[fwhm, 0.2 * fwhm], [fwhm, 0.6 * fwhm]]
-
-    def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        return [0.1 * pitch, 0.02 * pitch], [min(extent, _LARGEST_WIDTH)] * 2
+    shapes = (1.0, 0.2), (1.0, 0.6)
+    lowest, highest = (0.1, 0.02), (inf, inf)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         return disc_transfer(values[0] / 2 * frequency) * _gaussian_transfer(values[1], frequency)
@@ -273,18 +275,13 @@ class EllipticalModel(PSFModel):
     are those of the image.
     """
     name = "elliptical gaussian"
+    shapes = ((1.0, 1.0, 0.0),)
+    lowest, highest = (0.02, 0.02, -0.99), (inf, inf, 0.99)
 
     @property
     def parameters(self) -> tuple[str, ...]:  # type: ignore[override]
         """Widths along x and y and, if the axes may be tilted, their correlation."""
         return ("fwhm_x", "fwhm_y", "correlation") if self.tilted else ("fwhm_x", "fwhm_y")
-
-    def starts(self, fwhm: float) -> list[list[float]]:
-        return [[fwhm, fwhm, 0.0] if self.tilted else [fwhm, fwhm]]
-
-    def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
-        low, high = [0.02 * pitch] * 2, [min(extent, _LARGEST_WIDTH)] * 2
-        return ([*low, -0.99], [*high, 0.99]) if self.tilted else (low, high)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         along = np.array([cos(angle), sin(angle)])

@@ -45,6 +45,12 @@ def psf_cause(name: str, content: Array, errors: int) -> Cause:
     return Cause(name, hashlib.sha256(content.tobytes()).hexdigest()[:16], errors)
 
 
+def kernel_component(name: str, effects: Sequence[Array]) -> Component:
+    """Return a component of uncertainty from its effects on a kernel."""
+    columns = np.stack([one.ravel() for one in effects], axis=1)
+    return Component(psf_cause(name, columns, len(effects)), columns)
+
+
 @dataclass(frozen=True, eq=False)
 class RadialPSF:
     """A round point spread function of the optics, ring by ring."""
@@ -95,9 +101,8 @@ class RadialPSF:
         directions, sizes, _ = np.linalg.svd(found.effects, full_matrices=False)
         kept = 1 + int(np.searchsorted(np.cumsum(sizes**2), _KEPT * np.sum(sizes**2)))
         errors = (directions * sizes)[:, :kept]
-        effects = np.stack([self._kernel(error)[0].ravel() for error in errors.T], axis=1)
-        cause = psf_cause(FIT, effects, kept)
-        return MeasuredPSF(kernel, spacing, (Component(cause, effects),))
+        component = kernel_component(FIT, [self._kernel(error)[0] for error in errors.T])
+        return MeasuredPSF(kernel, spacing, (component,))
 
     def model_psf(self) -> MeasuredPSF:
         """Return the same kernel of the best model: with what the rings are too coarse for."""

@@ -1,37 +1,33 @@
 """Infrared images on visible ones: which point is where, and when."""
 
-from chipglow.laboratory.registration.dots import DotFit, Dots, find_dots, fit_dots
-from chipglow.laboratory.registration.file import load_registration, write_registration
-from chipglow.laboratory.registration.input_files import read_pictures, read_points
-from chipglow.laboratory.registration.mutual_information import ImageFit, fit_images
-from chipglow.laboratory.registration.registration import PointFit, Registration, fit_points
-from chipglow.laboratory.registration.time_alignment import (
-    RecordingAlignment,
-    TimeAlignment,
-    align_recordings,
-    align_times,
-    infrared_radiance,
-    simultaneous_frames,
+from chipglow.laboratory.registration.dots import (
+    DotFit as DotFit,
+    Dots as Dots,
+    find_dots as find_dots,
+    fit_dots as fit_dots,
 )
-
-__all__ = [
-    "DotFit",
-    "Dots",
-    "ImageFit",
-    "PointFit",
-    "RecordingAlignment",
-    "Registration",
-    "TimeAlignment",
-    "align_recordings",
-    "align_times",
-    "find_dots",
-    "fit_dots",
-    "fit_images",
-    "fit_points",
-    "infrared_radiance",
-    "load_registration",
-    "read_pictures",
-    "read_points",
-    "simultaneous_frames",
-    "write_registration",
-]
+from chipglow.laboratory.registration.file import (
+    load_registration as load_registration,
+    write_registration as write_registration,
+)
+from chipglow.laboratory.registration.input_files import (
+    read_pictures as read_pictures,
+    read_points as read_points,
+)
+from chipglow.laboratory.registration.mutual_information import (
+    ImageFit as ImageFit,
+    fit_images as fit_images,
+)
+from chipglow.laboratory.registration.registration import (
+    PointFit as PointFit,
+    Registration as Registration,
+    fit_points as fit_points,
+)
+from chipglow.laboratory.registration.time_alignment import (
+    RecordingAlignment as RecordingAlignment,
+    TimeAlignment as TimeAlignment,
+    align_recordings as align_recordings,
+    align_times as align_times,
+    infrared_radiance as infrared_radiance,
+    simultaneous_frames as simultaneous_frames,
+)

@@ -63,15 +63,12 @@ def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
     tree = KDTree(second.pixels)
     spacing = float(np.median(tree.query(second.pixels, 2)[0][:, 1]))
     nominal = second.shape[1] / first.shape[1]
-    starts = _hypotheses(first.pixels, second.pixels, nominal, tree, spacing)
-    fits = [
-        _fitted(start, first.pixels, tree, spacing)
-        for start in _distinct(starts, first.pixels, spacing)
-    ]
-    judged = [
-        _Placement(matrix, pairs, _contradictions(matrix, first, second, pairs))
-        for matrix, pairs in (fit for fit in fits if fit is not None)
-    ]
+    starts: list[Array] = []
+    for matrix in _hypotheses(first.pixels, second.pixels, nominal, tree, spacing):
+        if all(_distance(matrix, other, first.pixels) > spacing / 2 for other in starts):
+            starts.append(matrix)
+    fits = [_fitted(start, first, second, tree, spacing) for start in starts[:_DISTINCT]]
+    judged = [fit for fit in fits if fit is not None]
     best = max(judged, key=_Placement.worth, default=None)
     if best is None or best.count < max(_FEWEST, best.contradictions):
         raise ValueError(
@@ -84,7 +81,7 @@ def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
 
 @dataclass(frozen=True)
 class _Placement:
-    """An affine map (2, 3), the pairs that match, and the dots that speak against it."""
+    """An affine map (2, 3), the pairs that match (2, n), and the dots that speak against it."""
 
     matrix: Array
     pairs: NDArray[np.int64]
@@ -149,21 +146,11 @@ def _hypotheses(
     return [matrix for _, matrix in found[:_TRIED]]
 
 
-def _distinct(matrices: list[Array], first: Array, spacing: float) -> list[Array]:
-    kept: list[Array] = []
-    for matrix in matrices:
-        if all(_distance(matrix, other, first) > spacing / 2 for other in kept):
-            kept.append(matrix)
-        if len(kept) == _DISTINCT:
-            break
-    return kept
-
-
 def _fitted(
-    matrix: Array, first: Array, tree: KDTree, spacing: float
-) -> tuple[Array, NDArray[np.int64]] | None:
-    """Return the affine map of the matches near a placement, and these: (2, n)."""
-    whole = np.column_stack([first, np.ones(len(first))])
+    matrix: Array, first: Arrangement, second: Arrangement, tree: KDTree, spacing: float
+) -> _Placement | None:
+    """Return the affine map of the matches near a placement; None if they are too few."""
+    whole = np.column_stack([first.pixels, np.ones(len(first.pixels))])
     pairs = _pairs(whole @ matrix.T, tree, spacing)
     for _ in range(_ROUNDS):
         if pairs.shape[1] < _FEWEST:
@@ -172,7 +159,10 @@ def _fitted(
         before, pairs = pairs, _pairs(whole @ matrix.T, tree, spacing)
         if np.array_equal(before, pairs):
             break
-    return matrix, pairs
+    linear, shift = matrix[:, :2], matrix[:, 2]
+    there = np.delete(first.pixels, pairs[0], axis=0) @ linear.T + shift
+    back = np.linalg.solve(linear, (np.delete(second.pixels, pairs[1], axis=0) - shift).T).T
+    return _Placement(matrix, pairs, second.shows(there) + first.shows(np.asarray(back)))
 
 
 def _pairs(placed: Array, tree: KDTree, spacing: float) -> NDArray[np.int64]:
@@ -181,19 +171,6 @@ def _pairs(placed: Array, tree: KDTree, spacing: float) -> NDArray[np.int64]:
     back = KDTree(placed).query(tree.data)[1]
     mutual = (distance < _NEAR * spacing) & (back[which] == np.arange(len(placed)))
     return np.stack([np.flatnonzero(mutual), which[mutual]])
-
-
-def _contradictions(
-    matrix: Array,
-    first: Arrangement,
-    second: Arrangement,
-    pairs: NDArray[np.int64],
-) -> int:
-    """Return the number of dots that the other image should show and does not."""
-    linear, shift = matrix[:, :2], matrix[:, 2]
-    there = np.delete(first.pixels, pairs[0], axis=0) @ linear.T + shift
-    back = np.linalg.solve(linear, (np.delete(second.pixels, pairs[1], axis=0) - shift).T).T
-    return second.shows(np.asarray(there)) + first.shows(np.asarray(back))
 
 
 def _distance(one: Array, other: Array, places: Array) -> float:

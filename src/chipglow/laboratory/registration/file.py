@@ -1,19 +1,17 @@
 """A registration as a file: written by ``chipglow register``, read by whoever maps images."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Final, NotRequired
 
 import numpy as np
 import yaml
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from typing_extensions import TypedDict
 
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
-from chipglow.quantities import Parameter, Part
-from chipglow.text import DescriptionError, Notes, read_yaml, validated
-
-_Row = tuple[float, ...]
-_Rows = tuple[_Row, ...]
+from chipglow.quantities import problem
+from chipglow.text import DescriptionError, Notes, read_yaml
 
 _HEAD: Final = """\
 # Map from the infrared image onto the visible picture, by chipglow register.
@@ -22,47 +20,26 @@ _HEAD: Final = """\
 """
 
 
-@dataclass(frozen=True)
-class RegistrationDescription(Part):
-    """A registration."""
+class _Fields(TypedDict):
+    """What the file states; no degrees of freedom are infinitely many."""
 
-    model: Annotated[Model, Parameter("What the matrix may be.")] = "affine"
-    method: Annotated[Method, Parameter("How it was found.")] = "points"
-    matrix: Annotated[_Rows, Parameter("The map.")] = (
-        (1.0, 0.0, 0.0),
-        (0.0, 1.0, 0.0),
-        (0.0, 0.0, 1.0),
-    )
-    covariance: Annotated[_Rows, Parameter("Of the elements of the matrix.")] = ((0.0,) * 9,) * 9
-    degrees_of_freedom: Annotated[float | None, Parameter("Of the covariance; none: infinite.")] = (
-        None
-    )
-    assumed: Annotated[tuple[str, ...], Parameter("Assumptions.")] = ()
-    warnings: Annotated[tuple[str, ...], Parameter("Reasons why it may be wrong.")] = ()
+    model: Model
+    method: Method
+    matrix: list[list[float]]
+    covariance: list[list[float]]
+    degrees_of_freedom: NotRequired[float | None]
+    assumed: NotRequired[list[str]]
+    warnings: NotRequired[list[str]]
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.build()
 
-    def build(self) -> Registration:
-        """Return the registration."""
-        for name, rows in (("matrix", self.matrix), ("covariance", self.covariance)):
-            if len({len(row) for row in rows}) != 1:
-                raise ValueError(f"{name}: expected rows of one length")
-        return Registration(
-            np.array(self.matrix, np.float64),
-            np.array(self.covariance, np.float64),
-            self.model,
-            self.method,
-            np.inf if self.degrees_of_freedom is None else self.degrees_of_freedom,
-            Notes(list(self.assumed), list(self.warnings)),
-        )
+_Fields.__pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[attr-defined]
+_FIELDS: Final = TypeAdapter(_Fields)
 
 
 def write_registration(registration: Registration, path: str | Path) -> None:
     """Write a registration to a YAML file."""
     finite = np.isfinite(registration.degrees_of_freedom)
-    data = {
+    data: _Fields = {
         "model": registration.model,
         "method": registration.method,
         "matrix": registration.matrix.tolist(),
@@ -87,8 +64,19 @@ def load_registration(path: str | Path) -> Registration:
         If it cannot be read.
     """
     path = Path(path)
-    data = read_yaml(path)
-    for name in ("matrix", "covariance"):
-        if not isinstance(data, dict) or name not in data:
-            raise DescriptionError(f"{path.name}: {name} is missing, expected a registration")
-    return validated(RegistrationDescription, data, path.name, path.parent).build()
+    given = read_yaml(path)
+    try:
+        data = _FIELDS.validate_python(given)
+        freedom = data.get("degrees_of_freedom")
+        return Registration(
+            np.array(data["matrix"], np.float64),
+            np.array(data["covariance"], np.float64),
+            data["model"],
+            data["method"],
+            np.inf if freedom is None else freedom,
+            Notes(data.get("assumed", []), data.get("warnings", [])),
+        )
+    except ValidationError as error:
+        raise DescriptionError(f"{path.name}: {problem(error)}") from None
+    except ValueError as error:
+        raise DescriptionError(f"{path.name}: {error}") from None

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import cos, hypot, log, radians, sin
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
@@ -122,7 +123,7 @@ def fit_images(
     candidates = _narrowed(coarse, middle, frame, placements)
     starts = _surveyed(fine, frame, candidates[0])
     starts += [other for other in candidates[1:] if _apart(other, starts[0], fine, frame) > _FAR]
-    fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=_last)
+    fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=itemgetter(1))
     matrix, _ = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity")[0], model)
     basis = _scaled_basis(fine, frame, matrix, model)
     spread, flat = _sandwich(fine, frame, matrix, basis)
@@ -230,7 +231,7 @@ def _level(
 
 
 def _edges(image: Array, scale: float, faint: float) -> Array:
-    """Gradient a sample, over the contrast of the surroundings and what is faint: (2, y, x)."""
+    """Return the gradient a sample, over the contrast around and what is faint: (2, y, x)."""
     down, right = np.gradient(image)
     mean = gaussian_filter(image, _WINDOW * scale)
     variance = gaussian_filter((image - image.mean()) ** 2, _WINDOW * scale)
@@ -239,7 +240,7 @@ def _edges(image: Array, scale: float, faint: float) -> Array:
 
 
 def _sharp(edges: Array) -> NDArray[np.bool_]:
-    """The fewest samples that have nearly all of the squares of the edges."""
+    """Return the fewest samples that have nearly all of the squares of the edges."""
     squares = (edges**2).sum(axis=-1)
     order = np.argsort(squares)[::-1]
     least = squares[order][np.searchsorted(squares[order].cumsum(), _NEARLY_ALL * squares.sum())]
@@ -247,12 +248,12 @@ def _sharp(edges: Array) -> NDArray[np.bool_]:
 
 
 def _noise(image: Array) -> float:
-    """Standard deviation of the noise: of a pixel's distance from the median around it."""
+    """Return the standard deviation of the noise: of pixels from the median around them."""
     return 1.4826 * float(np.median(np.abs(image - median_filter(image, 3))))
 
 
 def _binned(image: Array) -> NDArray[np.int64]:
-    """Bins of equal width from nearly the least to nearly the largest value."""
+    """Return bins of equal width from nearly the least to nearly the largest value."""
     low, high = np.percentile(image, _ENDS)
     fraction = (image - low) / max(high - low, np.finfo(float).tiny)
     return np.asarray(np.clip(fraction * _BINS, 0, _BINS - 1), np.int64)
@@ -272,7 +273,7 @@ def _pixels(level: _Level, frame: NormalisedFrame, matrix: Array) -> Array:
 
 
 def _sample(level: _Level, frame: NormalisedFrame) -> float:
-    """Distance of the level's samples in the frame's units."""
+    """Return the distance of the level's samples in the frame's units."""
     return level.pitch / frame.scale
 
 
@@ -280,7 +281,7 @@ def _sample(level: _Level, frame: NormalisedFrame) -> float:
 
 
 def _placements(level: _Level, frame: NormalisedFrame) -> list[Array]:
-    """The best placements on a grid that are apart from each other, the best first."""
+    """Return the best placements on a grid that are apart from each other, the best first."""
     found: list[tuple[float, Array]] = []
     for scale, turn in product(_SCALES, _TURNS):
         matrix = np.eye(3)
@@ -290,7 +291,7 @@ def _placements(level: _Level, frame: NormalisedFrame) -> list[Array]:
         found += [(score, _shifted(matrix, shift)) for score, shift in scores]
     if not found:
         raise ValueError("images: they do not lie on each other, expected views of one thing")
-    found.sort(key=lambda entry: entry[0], reverse=True)
+    found.sort(key=itemgetter(0), reverse=True)
     kept: list[Array] = []
     for _, matrix in found:
         if all(_apart(matrix, other, level, frame) > _APART for other in kept):
@@ -307,7 +308,7 @@ def _shifted_scores(
     bins: NDArray[np.int64],
     edges: Array,
 ) -> Iterator[tuple[float, tuple[float, float]]]:
-    """Mutual information times common edges for each shift on the grid."""
+    """Return the mutual information times common edges for each shift on the grid."""
     pixels = _pixels(level, frame, matrix)
     reach = int(_REACH * level.bin_image.shape[1])
     for across, down in product(range(-reach, reach + 1), repeat=2):
@@ -318,27 +319,32 @@ def _shifted_scores(
 
 
 def _score(level: _Level, pixels: Array, bins: NDArray[np.int64], edges: Array) -> float | None:
-    """Mutual information times common edges of samples at pixels; None if too few overlap."""
-    column, row = np.rint(pixels).astype(np.int64).T
-    rows, columns = level.codes.shape
-    here = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    """Return mutual information times common edges at pixels; None if too few overlap."""
+    here, place = _seen(level, pixels)
     if here.mean() < _LEAST_OVERLAP:
         return None
-    place = row[here], column[here]
     joint = np.bincount(bins[here] * _BINS + level.codes[place], None, _BINS**2) / here.size
     along = (edges[here] * level.directions[place]).sum(axis=1)
     return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
 
 
+def _seen(level: _Level, pixels: Array) -> tuple[NDArray[np.bool_], tuple[Array, Array]]:
+    """Return which samples lie in the picture, and the rows and columns of these."""
+    column, row = np.rint(pixels).astype(np.int64).T
+    rows, columns = level.codes.shape
+    here = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    return here, (row[here], column[here])
+
+
 def _shared(joint: Array) -> float:
-    """Mutual information in nats of a joint histogram, times its sum: all that is shared."""
+    """Return the mutual information in nats of a joint histogram, times its sum."""
     apart = np.outer(joint.sum(axis=1), joint.sum(axis=0))
     filled = joint > 0
     return float((joint[filled] * np.log(joint[filled] * joint.sum() / apart[filled])).sum())
 
 
 def _against_chance(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[float, Array]:
-    """Best score over all shifts: of the image, and of images that have nothing to do with it."""
+    """Return the best score over all shifts: of the image, and of unrelated images."""
     linear = matrix.copy()
     linear[:2, 2] = 0.0
 
@@ -365,7 +371,7 @@ def _shifted(matrix: Array, shift: tuple[float, float]) -> Array:
 
 
 def _apart(one: Array, other: Array, level: _Level, frame: NormalisedFrame) -> float:
-    """Distance of two maps of the image in samples: where it is largest, of two corners."""
+    """Return the distance of two maps of the image in samples, at the worse of two corners."""
     corners = frame.unit(level.places[[0, -1]])
     apart = mapped_places(one, corners) - mapped_places(other, corners)
     return float(np.hypot(apart[:, 0], apart[:, 1]).max()) / _sample(level, frame)
@@ -374,12 +380,8 @@ def _apart(one: Array, other: Array, level: _Level, frame: NormalisedFrame) -> f
 # The climb
 
 
-def _last(fit: tuple[Array, float]) -> float:
-    return fit[1]
-
-
 def _settled(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[Array, float]:
-    """The similarity near a matrix with the best score, and that."""
+    """Return the similarity near a matrix with the best score, and that."""
     basis = _scaled_basis(level, frame, matrix, "similarity")
 
     def moved(parameters: Array) -> Array:
@@ -396,14 +398,14 @@ def _settled(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[Arra
 def _narrowed(
     coarse: _Level, middle: _Level, frame: NormalisedFrame, candidates: list[Array]
 ) -> list[Array]:
-    """Candidates after a search at a quarter and at half of the resolution, the best first."""
+    """Settle candidates at a quarter and at half of the resolution; the best first."""
     found = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
-    fits = sorted((_settled(middle, frame, matrix) for matrix in found), key=_last)
+    fits = sorted((_settled(middle, frame, matrix) for matrix in found), key=itemgetter(1))
     return [matrix for matrix, _ in fits[::-1]]
 
 
 def _surveyed(level: _Level, frame: NormalisedFrame, matrix: Array) -> list[Array]:
-    """The best similarities on a grid of shifts, turns and scales around a matrix."""
+    """Return the best similarities on a grid of shifts, turns and scales around a matrix."""
     basis = _scaled_basis(level, frame, matrix, "similarity")
     unit, thin = frame.unit(level.places[::_THINNED]), slice(None, None, _THINNED)
     found = []
@@ -419,7 +421,7 @@ def _surveyed(level: _Level, frame: NormalisedFrame, matrix: Array) -> list[Arra
 def _climb(
     level: _Level, frame: NormalisedFrame, matrix: Array, model: Model
 ) -> tuple[Array, float]:
-    """Matrix of the most common edges near a matrix, and those."""
+    """Return the matrix of the most common edges near a matrix, and their mean."""
     basis = _scaled_basis(level, frame, matrix, model)
 
     def loss(parameters: Array) -> tuple[float, Array]:
@@ -432,7 +434,7 @@ def _climb(
 
 
 def _scaled_basis(level: _Level, frame: NormalisedFrame, matrix: Array, model: Model) -> Array:
-    """Basis by which a parameter of 1 moves the image's corner by one sample."""
+    """Return the basis by which a parameter of 1 moves the image's corner by one sample."""
     mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
     return parameter_basis(model, mirrored) * _sample(level, frame)
 
@@ -440,7 +442,7 @@ def _scaled_basis(level: _Level, frame: NormalisedFrame, matrix: Array, model: M
 def _common_edges(
     level: _Level, frame: NormalisedFrame, matrix: Array, basis: Array
 ) -> tuple[float, Array, NDArray[np.bool_]]:
-    """Mean of (g_i . g_v)^2, what each sharp sample adds to its slope, and which of them do."""
+    """Return the mean of (g_i . g_v)², what each sharp sample adds to its slope, and which do."""
     places, edges = frame.unit(level.places[level.sharp]), level.edges[level.sharp]
     pixels = mapped_places(matrix, places) * frame.pixel_scale + frame.pixel_centre
     weight, fading = _window(pixels, level.codes.shape, _FADE * level.scale)
@@ -458,7 +460,7 @@ def _common_edges(
 
 
 def _between(fields: Array, pixels: Array) -> Array:
-    """Fields of shape (rows, columns, k) between their pixels, bilinear, shape (n, k)."""
+    """Return fields (rows, columns, k) between their pixels, bilinear, shape (n, k)."""
     first = np.floor(np.minimum(pixels, np.array(fields.shape[1::-1]) - 1.000001)).astype(np.int64)
     (right, down), (column, row) = (pixels - first).T[..., None], first.T
     upper = fields[row, column] * (1 - right) + fields[row, column + 1] * right
@@ -467,7 +469,7 @@ def _between(fields: Array, pixels: Array) -> Array:
 
 
 def _window(pixels: Array, shape: tuple[int, ...], fade: float) -> tuple[Array, Array]:
-    """Weight of samples, falling to 0 at the picture's border, and its slope by the pixel."""
+    """Return weights of samples, falling to 0 at the picture's border, and their slopes."""
     last = np.array([shape[1] - 1.0, shape[0] - 1.0])
     room = np.minimum(pixels, last - pixels) / fade
     weight = np.clip(room, 0.0, 1.0)
@@ -479,11 +481,9 @@ def _window(pixels: Array, shape: tuple[int, ...], fade: float) -> tuple[Array, 
 
 
 def _information(level: _Level, frame: NormalisedFrame, matrix: Array) -> float:
-    """Mutual information in bits a sample."""
-    column, row = np.rint(_pixels(level, frame, matrix)).astype(np.int64).T
-    rows, columns = level.codes.shape
-    here = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-    cells = level.bins[here] * _BINS + level.codes[row[here], column[here]]
+    """Return the mutual information in bits a sample."""
+    here, place = _seen(level, _pixels(level, frame, matrix))
+    cells = level.bins[here] * _BINS + level.codes[place]
     joint = np.bincount(cells, None, _BINS**2).reshape(_BINS, _BINS) / here.sum()
     return _shared(joint) / log(2)
 
@@ -491,7 +491,7 @@ def _information(level: _Level, frame: NormalisedFrame, matrix: Array) -> float:
 def _rivals(
     fits: list[tuple[Array, float]], level: _Level, frame: NormalisedFrame
 ) -> tuple[str, ...]:
-    """A warning for the best other placement that is nearly as good."""
+    """Return a warning for the best other placement that is nearly as good."""
     best, most = fits[0]
     for matrix, common in fits[1:]:
         distance = _apart(best, matrix, level, frame)
@@ -516,7 +516,7 @@ def _unsure(found: Registration, raster: Raster) -> tuple[str, ...]:
 def _sandwich(
     level: _Level, frame: NormalisedFrame, matrix: Array, basis: Array
 ) -> tuple[Array, bool]:
-    """Covariance of the parameters, and whether there is no optimum."""
+    """Return the covariance of the parameters, and whether there is no optimum."""
     count, step = basis.shape[1], 0.25
 
     def slope(parameters: Array) -> Array:
