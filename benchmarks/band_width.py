@@ -1,17 +1,18 @@
 """How the width of the shear band and the camera's errors depend on the cell.
 
-    python benchmarks/band_width.py [28 20 14 10 7]
+    python benchmarks/band_width.py [--study STUDY.yaml] [28 20 14 10 7]
 
-For each cell (in um) the paper's cut is made, and looked at as the paper's study does, with frames
-and samples as coarse as those of the quick study: mean and standard deviation over its segments,
-textures and pixel phases. Scenes are kept in chipglow's cache. Prints a Markdown table.
+For each cell (in um) the study is run, by default the quick one: mean and standard deviation over
+its segments, textures and pixel phases. Scenes are kept in chipglow's cache. Prints a Markdown
+table.
 """
 
-import sys
+import argparse
+from pathlib import Path
 
 from chipglow.quantities import changed
 from chipglow.report import result_rows
-from chipglow.study import Study, run
+from chipglow.study import Study, load_study, run
 
 CELLS = (28.0, 20.0, 14.0, 10.0, 7.0)
 SHOWN = {
@@ -24,23 +25,18 @@ SHOWN = {
 }
 
 
-def study_with(cell):
-    """The quick study with another cell in um."""
-    return changed(Study.quick(), {"cutting.numerics.cell": cell * 1e-6})
-
-
-def row(cell):
-    """Cut and look, and return the cell's row of the table."""
-    found = {each.key: each.cells["mean"] for each in result_rows(run(study_with(cell)))}
-    return [f"{cell:g}", *(found[key] for key in SHOWN)]
-
-
 def main():
-    cells = [float(text) for text in sys.argv[1:]] or CELLS
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--study", type=Path, help="a study with a cut")
+    parser.add_argument("cells", nargs="*", type=float, help="in um")
+    given = parser.parse_args()
+    study = load_study(given.study) if given.study else Study.quick()
     print("| cell / um | " + " | ".join(SHOWN.values()) + " |")
     print("|---" * (1 + len(SHOWN)) + "|")
-    for cell in cells:
-        print("| " + " | ".join(row(cell)) + " |", flush=True)
+    for cell in given.cells or CELLS:
+        results = run(changed(study, {"cutting.numerics.cell": cell * 1e-6}))
+        means = {row.key: row.cells["mean"] for row in result_rows(results)}
+        print("| " + " | ".join([f"{cell:g}", *(means[key] for key in SHOWN)]) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Fit what no source gives of AISI 1045 in a cut: onset, loss and energy of its failure.
+"""Fit the onset, loss and energy of failure of AISI 1045 to measured cuts.
 
     python benchmarks/calibrate_cutting.py [--processes 2] [--markdown]
 
@@ -20,6 +20,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from math import exp, log, sqrt
 from multiprocessing import get_context
+from typing import TypeAlias
 
 import numpy as np
 from experiments import Experiment, Means, aligned, markdown, means_of, read_experiments
@@ -28,12 +29,14 @@ from scipy.optimize import minimize
 
 from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation
 
+Array: TypeAlias = NDArray[np.float64]
+
 CELL = 20e-6
 LENGTHS = {"amm-200-0.15": 1.0e-3, "amm-200-0.30": 1.5e-3, "paper": 2.8e-3}
 """Cutting lengths by the beginning of a cut's name: several segments, or a steady force."""
 
 FORCES = {"cutting_force": 0.05, "thrust_force": 0.1}
-"""Measured forces, and the relative standard uncertainty taken for each: none is told."""
+"""Measured forces and their assumed relative standard uncertainties (none is published)."""
 
 PERIOD, PERIOD_UNCERTAINTY = 90e-6, 15e-6
 LEAST_DEGREE = 0.1
@@ -51,7 +54,7 @@ FRONT_LOSSES = (0.3, 0.35, 0.4, 0.45)
 
 @dataclass(frozen=True)
 class Range:
-    """A number that is fitted: its unit in SI, and where it is looked for (on a log scale)."""
+    """A fitted number: its unit in SI and its range (on a log scale)."""
 
     name: str
     unit: str
@@ -60,7 +63,7 @@ class Range:
     high: float
 
     def at(self, place: float) -> float:
-        """Value in SI at a place from -1 to 1."""
+        """Return the value in SI at a place from -1 to 1."""
         return self.scale * exp(log(self.low) + 0.5 * (place + 1) * log(self.high / self.low))
 
 
@@ -75,7 +78,7 @@ BASE = {"d1": 0.006, "d2": 0.331}
 
 
 def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulation:
-    """A cut at a place of the design."""
+    """Return a cut at a place of the design."""
     onset, loss, energy, edge = (r.at(p) for r, p in zip(RANGES, place, strict=True))
     length = next(value for name, value in LENGTHS.items() if experiment.name.startswith(name))
     cut = experiment.simulation(CELL, length)
@@ -91,20 +94,20 @@ def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulat
 
 
 def compute(task: tuple[Experiment, tuple[float, ...]]) -> Means:
-    """Means of a cut at a place, kept or computed now."""
+    """Return the means of a cut at a place, stored or computed."""
     experiment, place = task
     return means_of(simulation(experiment, place), f"fit-{experiment.name}")
 
 
 def design() -> list[tuple[float, ...]]:
-    """Places of the design: the middle, then each number alone below and above it."""
+    """Return the design: the middle, then each number alone below and above it."""
     axes = np.eye(len(RANGES)) * AXIAL
     return [(0.0,) * len(RANGES), *(tuple(sign * axis) for axis in axes for sign in (-1, 1))]
 
 
 @dataclass(frozen=True)
 class Observation:
-    """What is compared: a cut's quantity, its measured value and relative standard uncertainty."""
+    """A cut's quantity, its measured value and relative standard uncertainty."""
 
     cut: str
     quantity: str
@@ -113,7 +116,7 @@ class Observation:
 
 
 def observations(experiments: Iterable[Experiment]) -> list[Observation]:
-    """Measured forces of the four cuts, and the period of the paper's."""
+    """Return the measured forces of the four cuts, and the period of the paper's."""
     forces = [
         Observation(one.name, entry.quantity, entry.value, FORCES[entry.quantity])
         for one in experiments
@@ -123,85 +126,74 @@ def observations(experiments: Iterable[Experiment]) -> list[Observation]:
     return [*forces, Observation("paper", "period", PERIOD, PERIOD_UNCERTAINTY / PERIOD)]
 
 
-def terms(places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Terms of the surface: one, each number, each squared; shape (n, 1 + 2 numbers)."""
+def terms(places: Array) -> Array:
+    """Return the terms of a surface: one, each number, each squared; (n, 1 + 2 numbers)."""
     return np.column_stack([np.ones(len(places)), places, places**2])
 
 
 @dataclass(frozen=True)
-class Surface:
-    """Logarithm of a quantity over the numbers: at most quadratic, without their products."""
+class Fit:
+    """Quadratic surfaces through the logarithms of what is observed, without products of numbers.
 
-    weights: NDArray[np.float64]
-    scatter: float
+    `weights` has the shape (terms, observations); `scatter` is the standard deviation of each.
+    """
+
+    observed: list[Observation]
+    weights: Array
+    scatter: Array
 
     @classmethod
-    def through(cls, places: NDArray[np.float64], values: NDArray[np.float64]) -> "Surface":
-        """Least squares over the points."""
+    def through(cls, places: Array, values: Array, observed: list[Observation]) -> "Fit":
+        """Fit computed values of shape (places, observations) by least squares."""
         basis, logs = terms(places), np.log(values)
         weights, *_ = np.linalg.lstsq(basis, logs, rcond=None)
-        rest = logs - basis @ weights
-        free = max(len(values) - np.linalg.matrix_rank(basis), 1)
-        return cls(weights, float(np.sqrt((rest**2).sum() / free)))
+        residuals = logs - basis @ weights
+        free = max(len(places) - np.linalg.matrix_rank(basis), 1)
+        return cls(observed, weights, np.sqrt((residuals**2).sum(axis=0) / free))
 
-    def at(self, place: NDArray[np.float64]) -> float:
-        """Logarithm of the quantity."""
-        return float((terms(place[None]) @ self.weights)[0])
+    def logs(self, place: Array) -> Array:
+        """Return the logarithms of the quantities at a place."""
+        return np.asarray(terms(place[None])[0] @ self.weights)
 
+    def differences(self, place: Array) -> Array:
+        """Return differences of the logarithms over their uncertainty and the surfaces' scatter."""
+        measured = np.log([one.value for one in self.observed])
+        widths = np.hypot([one.uncertainty for one in self.observed], self.scatter)
+        return np.asarray((self.logs(place) - measured) / widths)
 
-def differences(
-    place: NDArray[np.float64], surfaces: list[Surface], observed: list[Observation]
-) -> NDArray[np.float64]:
-    """Differences of the logarithms over their uncertainty, with the surface's own scatter."""
-    wanted = np.log([one.value for one in observed])
-    widths = np.hypot([one.uncertainty for one in observed], [one.scatter for one in surfaces])
-    return (np.array([surface.at(place) for surface in surfaces]) - wanted) / widths
-
-
-def best_place(surfaces: list[Surface], observed: list[Observation]) -> NDArray[np.float64]:
-    """Least squares of the differences within the ranges."""
-    limits = [(-1.0, 1.0)] * len(RANGES)
-    found = [
-        minimize(
-            lambda place: float((differences(place, surfaces, observed) ** 2).sum()),
-            np.array(start),
-            bounds=limits,
-        )
-        for start in design()
-    ]
-    return np.asarray(min(found, key=lambda result: result.fun).x)
-
-
-def covariance_at(
-    place: NDArray[np.float64], surfaces: list[Surface], observed: list[Observation]
-) -> NDArray[np.float64]:
-    """Covariance of the logarithms of the numbers: by the observations, and by the ranges.
-
-    A range counts as a rectangular distribution: from -1 to 1 its variance is 1/3.
-    """
-    step = 1e-4 * np.eye(len(RANGES))
-    slopes = np.array(
-        [
-            differences(place + axis, surfaces, observed)
-            - differences(place - axis, surfaces, observed)
-            for axis in step
+    def best_place(self) -> Array:
+        """Return the place of least squares of the differences within the ranges."""
+        results = [
+            minimize(
+                lambda place: float((self.differences(place) ** 2).sum()),
+                np.array(start),
+                bounds=[(-1.0, 1.0)] * len(RANGES),
+            )
+            for start in design()
         ]
-    ) / (2 * 1e-4)
-    covariance = np.linalg.inv(slopes @ slopes.T + 3.0 * np.eye(len(RANGES)))
-    half = np.array([0.5 * log(one.high / one.low) for one in RANGES])
-    return np.asarray(covariance * np.outer(half, half))
+        return np.asarray(min(results, key=lambda result: result.fun).x)
 
+    def covariance_at(self, place: Array) -> Array:
+        """Return the covariance of the numbers' logarithms, by observations and ranges.
 
-def column(runs: list[dict[str, Means]], one: Observation) -> NDArray[np.float64]:
-    """A quantity of a cut at all places."""
-    values = [getattr(run[one.cut], one.quantity) for run in runs]
-    return np.array(values, dtype=np.float64)
+        A range counts as a rectangular distribution: from -1 to 1 its variance is 1/3.
+        """
+        step = 1e-4
+        slopes = np.array(
+            [
+                self.differences(place + axis) - self.differences(place - axis)
+                for axis in step * np.eye(len(RANGES))
+            ]
+        ) / (2 * step)
+        covariance = np.linalg.inv(slopes @ slopes.T + 3.0 * np.eye(len(RANGES)))
+        half = np.array([0.5 * log(one.high / one.low) for one in RANGES])
+        return np.asarray(covariance * np.outer(half, half))
 
 
 def computed(
     experiments: list[Experiment], places: list[tuple[float, ...]], processes: int
 ) -> list[dict[str, Means]]:
-    """Means of every cut at every place. The paper's edge is known: it does not vary."""
+    """Return the means of every cut at every place; the paper's edge radius is fixed."""
     tasks = [
         (one, (*place[:-1], 0.0) if one.name == "paper" else place)
         for place in places
@@ -216,10 +208,8 @@ def computed(
     ]
 
 
-def number_table(
-    free: NDArray[np.float64], chosen: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> list[list[str]]:
-    """Rows of what was found: each number, its standard uncertainty and correlations."""
+def number_table(free: Array, chosen: Array, covariance: Array) -> list[list[str]]:
+    """Return the table of fitted numbers, standard uncertainties and correlations."""
     deviations = np.sqrt(np.diag(covariance))
     correlations = covariance / np.outer(deviations, deviations)
     rows = [["number", "range", "forces alone", "chosen", "standard uncertainty / %", *"1234"]]
@@ -236,8 +226,8 @@ def number_table(
     return rows
 
 
-def valley_table(covariance: NDArray[np.float64]) -> list[list[str]]:
-    """Rows of the axes of the covariance: along the longest sets are as good."""
+def valley_table(covariance: Array) -> list[list[str]]:
+    """Return the table of the principal axes of the covariance."""
     squares, axes = np.linalg.eigh(covariance)
     rows = [["axis", "standard deviation / %", *(one.name for one in RANGES)]]
     for k in range(len(squares) - 1, -1, -1):
@@ -250,7 +240,7 @@ def valley_table(covariance: NDArray[np.float64]) -> list[list[str]]:
 def run_table(
     places: list[tuple[float, ...]], runs: list[dict[str, Means]], observed: list[Observation]
 ) -> list[list[str]]:
-    """Rows of all places: the numbers, and the difference from each measured value."""
+    """Return the table of all places: numbers and differences from measured values."""
     heads = [f"{one.cut} {one.quantity.split('_')[0]}" for one in observed]
     rows = [[*(one.name for one in RANGES), *heads, "degree of the paper's / %"]]
     for place, run in zip(places, runs, strict=True):
@@ -264,12 +254,12 @@ def run_table(
 
 
 def front() -> list[tuple[float, ...]]:
-    """Places that trade force for segments: the loss, with the other numbers as chosen."""
+    """Return the places at which only the loss differs."""
     return [place_of((*FRONT[:1], loss, *FRONT[1:])) for loss in FRONT_LOSSES]
 
 
 def place_of(values: Iterable[float]) -> tuple[float, ...]:
-    """Place of values in SI."""
+    """Return the place of values in SI."""
     return tuple(
         2 * log(value / one.scale / one.low) / log(one.high / one.low) - 1
         for value, one in zip(values, RANGES, strict=True)
@@ -277,7 +267,7 @@ def place_of(values: Iterable[float]) -> tuple[float, ...]:
 
 
 def segments(run: dict[str, Means]) -> bool:
-    """Whether the paper's cut is segmented, with the period that it should have."""
+    """Return whether the paper's cut is segmented with the published period."""
     paper = run["paper"]
     return abs(paper.period - PERIOD) <= PERIOD_UNCERTAINTY and paper.degree >= LEAST_DEGREE
 
@@ -297,17 +287,17 @@ def main() -> None:
     places = [*design(), *front()]
     runs = computed(experiments, places, given.processes)
     forces = observed[:-1]
-    surfaces = [Surface.through(np.array(places), column(runs, one)) for one in forces]
-    free = best_place(surfaces, forces)
+    values = [[getattr(run[one.cut], one.quantity) for one in forces] for run in runs]
+    fit = Fit.through(np.array(places), np.array(values, dtype=np.float64), forces)
     along = zip(places[-len(FRONT_LOSSES) :], runs[-len(FRONT_LOSSES) :], strict=True)
     segmented = [(place, run) for place, run in along if segments(run)]
     chosen, _ = min(segmented, key=lambda point: abs(point[1]["paper"].period - PERIOD))
-    covariance = covariance_at(np.array(chosen), surfaces, forces)
+    covariance = fit.covariance_at(np.array(chosen))
     table = markdown if given.markdown else aligned
     print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.\n")
     print(f"{table(run_table(places, runs, observed))}\n")
     print("By the forces alone, and the front's point that segments the paper's cut in time:\n")
-    print(f"{table(number_table(free, np.array(chosen), covariance))}\n")
+    print(f"{table(number_table(fit.best_place(), np.array(chosen), covariance))}\n")
     print(table(valley_table(covariance)))
 
 

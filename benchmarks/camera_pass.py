@@ -1,4 +1,4 @@
-"""Cost of what a user waits for: a frame, a study, a new image. Other programs stand beside it.
+"""Cost of a frame, a study and a new image, compared with other programs.
 
 python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--sub-frames 50] [--scene SCENE.nc]
 
@@ -76,7 +76,7 @@ LIMITS = {"temperature": (293.0, 1100.0), "plastic_strain": (0.0, 3.0)}
 
 
 class GivenSurface(Surface, EmissivityField):
-    """Emissivity as it is given."""
+    """A surface with given emissivities."""
 
     needs = ()
 
@@ -91,13 +91,13 @@ class GivenSurface(Surface, EmissivityField):
 
 
 def lattice_of(raster):
-    """Nodes about a raster, and a tool in its corner."""
+    """Return nodes around a raster, with a tool in its corner."""
     in_tool = ToolGeometry().signed_distance(*np.meshgrid(raster.x, raster.y)) < 0.0
     return Lattice.within(raster, (-0.8e-3, -0.6e-3), CELL, in_tool, 293.15)
 
 
 def spline_frame(lattice, time):
-    """A chip that slides past: a hot shear band across it, sheared and strained above."""
+    """Return a sliding chip with a hot shear band, sheared and strained above it."""
     x = lattice.left + CELL * np.arange(lattice.columns)[None, :]
     y = lattice.top - CELL * np.arange(lattice.rows)[:, None]
     along = x - SPEED * time + 0.0 * y
@@ -131,7 +131,7 @@ def stored_scene(path, instants, sub_frames):
 
 
 def open_cold(path):
-    """Open a file of which nothing is in memory, as far as the system can be told."""
+    """Open a file after asking the system to drop it from memory."""
     if hasattr(os, "posix_fadvise"):
         with path.open("rb") as file:
             os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
@@ -139,19 +139,19 @@ def open_cold(path):
 
 
 def arrays_of(scene, names, sub_frames):
-    """Fields of the first sub-frames as contiguous arrays."""
+    """Return fields of the first sub-frames as contiguous arrays."""
     return {n: np.stack([scene.field(n, i) for i in range(sub_frames)]) for n in names}
 
 
 def table_radiance():
-    """Equation 1 by `numpy.interp` in a table of 0.25 K."""
+    """Return Equation 1 by `numpy.interp` in a table of 0.25 K."""
     nodes = np.arange(250.0, 2000.0, 0.25)
     values = CAMERA.band.radiance(nodes)
     return lambda temperature: np.interp(temperature, nodes, values)
 
 
 def scipy_image(radiance, kernel):
-    """A new image in the optics' order by SciPy: a convolution and the means of 9 x 9."""
+    """Form an image in the optics' order by SciPy: a convolution and means of 9 x 9."""
     reach = kernel.shape[0] // 2
     blurred = fftconvolve(np.pad(radiance, reach, mode="edge"), kernel, mode="valid")
     return blurred.reshape(90, 9, 100, 9).mean(axis=(1, 3))
@@ -178,7 +178,7 @@ def read_once(arrays):
 
 
 def study(scene, instants):
-    """Frames of both chips at instants over a scene, as the paper's study has them."""
+    """Measure both chips at instants over a scene, as in the paper's study."""
     camera = Camera.paper()
     fields = [camera.lay(chip, scene) for chip in (CHIP_1, CHIP_2)]
     starts = spread_starts(scene, camera.integration_time, instants)
@@ -187,7 +187,7 @@ def study(scene, instants):
 
 
 def peers_there():
-    """Modules of the programs that are installed, by name; of the others it is said."""
+    """Return modules of the installed programs by name; print the missing ones."""
     found = {}
     for name, (package, module) in PEERS.items():
         if find_spec(package):
@@ -198,14 +198,14 @@ def peers_there():
 
 
 def timed(call):
-    """Wall and processor time of a call."""
+    """Return wall and processor time of a call."""
     begin, busy = perf_counter(), process_time()
     call()
     return perf_counter() - begin, process_time() - busy
 
 
 def best_of(calls, rounds):
-    """Least wall and processor time of calls by name."""
+    """Return least wall and processor times of calls by name."""
     for call in calls.values():
         call()
     taken = {name: [] for name in calls}
@@ -234,7 +234,7 @@ def main():
 
 
 def compare_frames(path, rounds, sub_frames):
-    """Time one frame; its exposure."""
+    """Time one frame and return its exposure."""
     stored = open_scene(path)
     arrays, times = arrays_of(stored, NEEDED, sub_frames), stored.times[:sub_frames]
     whole = Scene.from_fields(RASTER, times, arrays)
@@ -295,7 +295,7 @@ def compare_studies(path, instants, rounds):
 
 
 def compare_images(kept, rounds):
-    """Time what cameras and other programs make of an exposure, and compare the images."""
+    """Time images of an exposure by chipglow and other programs, and compare them."""
     print("\nImages of 810 x 900 samples, at 90 x 100 pixels")
     peers, radiance = peers_there(), kept.mean_radiance
     calls, images = counted(radiance, peers), same_images(radiance, peers)
@@ -313,18 +313,10 @@ def compare_images(kept, rounds):
         print(line)
     if "Pyxel" in peers:
         print(f"counts of chipglow and Pyxel apart, over their noise: {counts_apart(calls):.3f}")
-    frames = np.geomspace(1.0, 1e3, 900000).reshape(100, 90, 100)
-    inverses = {
-        "inverse, 100 frames of 90 x 100": lambda: [CAMERA.band.temperature(f) for f in frames],
-        "inverse, the same as one array": lambda: CAMERA.band.temperature(frames),
-    }
-    print(f"\n{'':50}{'wall ms':>10}{'processor ms':>14}{'ns/pixel':>11}")
-    for name, (wall, busy) in best_of(inverses, rounds).items():
-        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}{busy / frames.size * 1e9:11.2f}")
 
 
 def new_images(kept):
-    """New images of a kept exposure; with "new PSF" also one that was not used before."""
+    """Return calls that form a new image of an exposure, with a new PSF or a cached one."""
     scales = (1 + i / 1000 for i in count())
     kinds = {
         "": lambda scale: GaussianPSF(14e-6 * scale),
@@ -344,7 +336,7 @@ def new_images(kept):
 
 
 def same_images(radiance, peers):
-    """The image behind a Gaussian on square pixels, as each program makes it."""
+    """Return each program's call that forms the image behind a Gaussian on square pixels."""
     camera = replace(CAMERA, psf_order="optics")
     kernel, given = camera.psf.kernel(RASTER.spacing), (camera.psf.fwhm, RASTER.spacing, 9)
     calls = {
@@ -358,7 +350,7 @@ def same_images(radiance, peers):
 
 
 def counted(radiance, peers):
-    """Image, point spread function from pixel to pixel, noise and digitiser, in counts."""
+    """Return calls that make counts: PSF from pixel to pixel, noise and digitiser."""
     camera, generator = replace(CAMERA, psf_order="detector"), np.random.default_rng(1)
     sensors, point = camera.pixels(RASTER), OperationPoint(band=CAMERA.band)
     kernel = camera.psf.kernel(camera.pitch)
@@ -374,7 +366,7 @@ def counted(radiance, peers):
 
 
 def apart(image, expected):
-    """Root of the mean square and the most of differences of radiance temperature in K."""
+    """Return RMS and greatest difference of radiance temperature in K."""
     inner = (slice(BORDER, -BORDER),) * 2
     found, ours = (CAMERA.band.temperature(one[inner]) for one in (image, expected))
     differences = np.abs(found - ours)[ours > LEAST]
@@ -382,7 +374,7 @@ def apart(image, expected):
 
 
 def counts_apart(calls):
-    """Differences of counts over the standard deviation that the noise of both gives them: 1."""
+    """Return the RMS difference of counts over the standard deviation expected from noise."""
     inner = (slice(BORDER, -BORDER),) * 2
     ours, theirs = (
         calls[f"counts: {name}"]()[inner].astype(float) for name in ("chipglow", "Pyxel")

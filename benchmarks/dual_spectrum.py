@@ -31,7 +31,7 @@ TOOL = ToolGeometry()
 
 @dataclass(frozen=True)
 class DualSpectrum:
-    """One experiment; what is random follows the seed.
+    """One experiment; the seed determines all random values.
 
     `matrix` maps a position in m to a visible pixel.
     """
@@ -50,7 +50,7 @@ class DualSpectrum:
 
     @classmethod
     def drawn(cls, seed: int) -> Self:
-        """An experiment whose settings are drawn, too.
+        """Draw an experiment with random settings.
 
         The chip's brightness is 0.4 to 1 beside the workpiece's 0.45 and the tool's 0.30.
         """
@@ -82,12 +82,12 @@ class DualSpectrum:
         return matrix
 
     def pixels(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where positions in m truly are in the visible picture."""
+        """Return the true visible pixels of positions in m."""
         return np.asarray(positions @ self.matrix[:2, :2].T + self.matrix[:2, 2])
 
     @cached_property
     def infrared(self) -> Measurement:
-        """What the infrared camera measures of the chip, with noise."""
+        """Measurement of the infrared camera, with noise."""
         camera = Camera(pitch=PITCH, psf=GaussianPSF(12e-6), shape=(ROWS, COLUMNS))
         clean = camera.measure(self.scene, replace(CHIP_1, follow="mean"), 0.0)
         generator = np.random.default_rng([self.seed, 1])
@@ -99,7 +99,7 @@ class DualSpectrum:
 
     @cached_property
     def visible(self) -> NDArray[np.uint8]:
-        """What the visible camera sees: bright flanks with grain, dark gaps, the tool's edge."""
+        """Visible picture: bright flanks with grain, dark gaps, the tool's edge."""
         rows, columns = np.indices(VISIBLE_SHAPE)
         pixels = np.stack([columns, rows], axis=-1)
         back = np.linalg.inv(self.matrix[:2, :2])
@@ -120,7 +120,7 @@ class DualSpectrum:
 
     @cached_property
     def scene(self) -> Scene:
-        """One frame of the chip as it truly is."""
+        """One frame of the true scene."""
         place = np.stack(np.meshgrid(FINE.x, FINE.y), axis=-1)
         chip, work, tool, phase = shapes(place, self.tool, self.band_spacing)
         depth = self.tool.signed_distance(place[..., 0], place[..., 1])
@@ -156,7 +156,7 @@ CAMERA = {"integration_time": 10e-6, "frame_rate": 600.0}
 def shapes(
     place: NDArray[np.float64], tool: Tool, band_spacing: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
-    """Chip, workpiece and tool, and how far a point of the chip is between two shear bands."""
+    """Return masks of chip, workpiece and tool, and the phase between two shear bands."""
     x, y = place[..., 0], place[..., 1]
     depth = tool.signed_distance(x, y)
     inside = depth < 0
@@ -176,7 +176,7 @@ def shapes(
 def texture(
     generator: np.random.Generator, place: NDArray[np.float64], size: float
 ) -> NDArray[np.float64]:
-    """Grain of about a size in m, mean 0, standard deviation 1, the same at the same place."""
+    """Return grain of a size in m, with mean 0 and standard deviation 1."""
     side = 512
     field = gaussian_filter(generator.standard_normal((side, side)), 1.5, mode="wrap")
     field /= field.std()
@@ -186,7 +186,7 @@ def texture(
 
 
 def errors(found: Registration, pair: DualSpectrum) -> tuple[float, float]:
-    """Root of the mean square over the pixels of the error, and of its uncertainty, in pixels."""
+    """Return the RMS over the pixels of the error and of its uncertainty, in pixels."""
     raster = pair.infrared.raster
     places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
     off = found.pixels(places) - pair.pixels(places)

@@ -1,4 +1,4 @@
-"""Cuts of AISI 1045 that others have published, beside the same cuts computed here.
+"""Published cuts of AISI 1045 compared with the same cuts computed by chipglow.
 
     python benchmarks/experiments.py [--cell 20] [--length 2] [--figure F] [--markdown] [NAME ...]
 
@@ -10,14 +10,14 @@ on with the next cut. Cells in um, lengths of cut in mm.
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from inspect import getmodule, getsource
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import yaml
@@ -65,12 +65,13 @@ STEPS_A_FRAME = 2
 BUILD_UP = 0.4  # fraction of the cut before the frames
 SAMPLE = 4e-6
 NOT_READ = "†"
+Entry = TypeVar("Entry")
 METRICS = (chip_metrics, contact_length, segmentation)
 
 
 @dataclass(frozen=True)
 class Published:
-    """One number of the literature: a key of `QUANTITIES`, in SI, and where it stands."""
+    """A published number: a key of `QUANTITIES`, its value in SI and its source."""
 
     quantity: str
     value: float
@@ -81,16 +82,20 @@ class Published:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Published":
-        for key, allowed in (("quantity", tuple(QUANTITIES)), ("kind", KINDS)):
-            if data.get(key) not in allowed:
-                raise ValueError(f"{key} {data.get(key)!r}, expected one of {', '.join(allowed)}")
-        value = QUANTITIES[data["quantity"]].parse(data["value"])
-        return cls(**{**data, "value": value})
+        check_choices(data, {"quantity": tuple(QUANTITIES), "kind": KINDS})
+        return cls(**{**data, "value": QUANTITIES[data["quantity"]].parse(data["value"])})
+
+
+def check_choices(data: Mapping[str, Any], choices: Mapping[str, tuple[str, ...]]) -> None:
+    """Raise a ValueError if an entry is not one of its choices."""
+    for key, allowed in choices.items():
+        if data.get(key) not in allowed:
+            raise ValueError(f"{key} {data.get(key)!r}, expected one of {', '.join(allowed)}")
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A published cut: its conditions in SI, where they stand, and what is published of it."""
+    """A published cut: its conditions in SI, their source, and the published numbers."""
 
     name: str
     source: str
@@ -114,7 +119,7 @@ class Experiment:
         )
 
     def simulation(self, cell: float, length: float) -> CuttingSimulation:
-        """The cut at these conditions, with the solver's own material, friction and numerics."""
+        """Return the cut at these conditions with the default material, friction and numerics."""
         return CuttingSimulation(
             conditions=CuttingConditions(self.speed, self.feed, length),
             tool=ToolGeometry(self.rake, self.clearance, self.edge_radius),
@@ -126,7 +131,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Means:
-    """What was computed, in SI: forces per width of cut, NaN for what the view does not show."""
+    """Computed values in SI: forces per width of cut, NaN where the view shows none."""
 
     cutting_force: float
     thrust_force: float
@@ -141,37 +146,43 @@ class Means:
 
 
 def read_experiments(path: Path = DATA) -> tuple[dict[str, str], list[Experiment]]:
-    """Sources by their key, and the experiments, checked.
-
-    Raises
-    ------
-    ValueError
-        If an entry breaks the form of the file; the message names file and experiment.
-    """
+    """Return sources by their key, and the experiments, checked."""
     data = yaml.safe_load(path.read_text(encoding="utf-8"))
     sources = {key: " ".join(text.split()) for key, text in data["sources"].items()}
-    experiments = []
-    for entry in data["experiments"]:
-        where = f"{path.name}: {entry.get('name', 'an experiment without a name')}"
-        try:
-            experiments.append(Experiment.of(entry))
-        except (KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{where}: {error}") from None
-        for source in (entry["source"], *(value["source"] for value in entry["published"])):
+
+    def experiment(entry: Mapping[str, Any]) -> Experiment:
+        found = Experiment.of(entry)
+        for source in (found.source, *(value.source for value in found.published)):
             if source not in sources:
-                raise ValueError(f"{where}: source {source!r}, expected one of {list(sources)}")
-    return sources, experiments
+                raise ValueError(f"source {source!r}, expected one of {list(sources)}")
+        return found
+
+    return sources, read_entries(path, data["experiments"], experiment)
+
+
+def read_entries(
+    path: Path, entries: Iterable[Mapping[str, Any]], build: Callable[[Mapping[str, Any]], Entry]
+) -> list[Entry]:
+    """Build entries of a file; a ValueError names file and entry."""
+    found = []
+    for entry in entries:
+        try:
+            found.append(build(entry))
+        except (KeyError, TypeError, ValueError) as error:
+            name = entry.get("name", "an entry without a name")
+            raise ValueError(f"{path.name}: {name}: {error}") from None
+    return found
 
 
 def view(simulation: CuttingSimulation) -> Raster:
-    """Samples over the chip, from the rake face to the left border."""
+    """Return a raster over the chip, from the rake face to the left border."""
     numerics = simulation.numerics
     left, top = -(numerics.upstream - 2 * numerics.cell), numerics.height - 4 * numerics.cell
     return Raster(left, top, SAMPLE, int((top + 1e-4) / SAMPLE), int((1.5e-4 - left) / SAMPLE))
 
 
 def compute(simulation: CuttingSimulation) -> Means:
-    """Run a cut and take its means over what follows the first build-up of the chip."""
+    """Run a cut and return its means after the chip's build-up."""
     length = simulation.conditions.cutting_length
     window = OutputWindow(
         BUILD_UP * length, length, STEP / simulation.conditions.speed, later_bands=0
@@ -194,7 +205,7 @@ def compute(simulation: CuttingSimulation) -> Means:
 def cut(
     simulation: CuttingSimulation, window: OutputWindow
 ) -> tuple[ChipMetrics, ForceHistory, float]:
-    """Run a cut: its chip, its forces, and the seconds it took."""
+    """Run a cut; return its chip, its forces and the time in s."""
     frames: list[Frame] = []
     passed = iter(range(1_000_000))
 
@@ -212,7 +223,7 @@ def cut(
 def scene_of(
     frames: list[Frame], history: ForceHistory, raster: Raster, tool: ToolGeometry
 ) -> Scene:
-    """The frames and the forces as a scene."""
+    """Return frames and forces as a scene."""
     fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in FIELD_UNITS}
     scene = Scene.from_fields(raster, [frame.time for frame in frames], fields, tool)
     forces = {"cutting_force": history.cutting, "thrust_force": history.thrust}
@@ -224,21 +235,21 @@ def scene_of(
 
 
 def drift(history: ForceHistory) -> float:
-    """Change of the mean cutting force from the first to the second half after the build-up."""
+    """Return the relative change of the mean cutting force between halves after the build-up."""
     steady = history.time > BUILD_UP * history.time[-1] * (1 + 1e-9)
     first, second = np.array_split(history.cutting[steady], 2)
     return float(second.mean() / first.mean() - 1)
 
 
 def result_path(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Path:
-    """Where the means of a cut are kept; another solver, metric or condition is another file."""
+    """Return the file of a cut's means, named by solver, metrics and conditions."""
     metrics = [getsource(getmodule(metric)) for metric in METRICS]
     state = repr((SOLVER_VERSION, metrics, STEP, STEPS_A_FRAME, BUILD_UP, SAMPLE, simulation))
     return folder / f"{name}-{sha256(state.encode()).hexdigest()[:16]}.json"
 
 
 def means_of(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Means:
-    """Kept means of a cut, or those of a run now, which are then kept."""
+    """Return stored means of a cut, or run it and store them."""
     path = result_path(simulation, name, folder)
     if path.exists():
         return Means(**json.loads(path.read_text(encoding="utf-8")))
@@ -250,7 +261,7 @@ def means_of(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -
 
 
 def comparison(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
-    """Rows of the table, its head first: every published number, and what has none beside it."""
+    """Return the table of published and computed numbers, its head first."""
     head = ["cut", "quantity", "published", "kind", "source", "computed", "difference"]
     rows = [head]
     for experiment, means in computed:
@@ -272,7 +283,7 @@ def _sides(entry: Published | None, here: float, unit: Quantity) -> list[str]:
 
 
 def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
-    """Rows of the table of conditions and of how each cut went, its head first."""
+    """Return the table of conditions and quality of each cut, its head first."""
     head = ["cut", "speed / (m/min)", "feed / mm", "rake / °", "conditions from", "assumed"]
     rows = [[*head, "segments", "degree / %", "drift / %", "unaccounted work / %", "time / s"]]
     for experiment, means in computed:
@@ -297,7 +308,7 @@ def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
 
 @style()
 def draw_residuals(computed: Iterable[tuple[Experiment, Means]], path: Path) -> None:
-    """Draw how far every computed force is from each published one, and write the figure."""
+    """Draw the relative difference of computed from published forces; write the figure."""
     rows = [
         (f"{one.name}, {entry.source.partition('-')[0]}", entry, getattr(means, entry.quantity))
         for one, means in computed
@@ -323,7 +334,7 @@ def draw_residuals(computed: Iterable[tuple[Experiment, Means]], path: Path) -> 
 
 
 def number(value: float, unit: Quantity) -> str:
-    """Three digits in the quantity's unit; a dash for NaN."""
+    """Return three digits in the quantity's unit; a dash for NaN."""
     if not isfinite(value):
         return "–"
     scaled = value / unit.parse(f"1 {unit.unit}")
@@ -346,22 +357,23 @@ def aligned(rows: list[list[str]]) -> str:
     return "\n".join("  ".join(row).rstrip() for row in padded)
 
 
-def arguments(names: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def parsed(parser: argparse.ArgumentParser, names: list[str], cell: float) -> argparse.Namespace:
+    """Parse the arguments that the programs of published cuts share, and the parser's own."""
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
-    parser.add_argument("--cell", type=float, default=20.0, help="side of a cell in um")
-    parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
-    parser.add_argument("--figure", type=Path, help="draw the residuals of the forces, a PNG file")
+    parser.add_argument("--cell", type=float, default=cell, help="side of a cell in um")
     parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
     given = parser.parse_args()
     if unknown := sorted(set(given.names) - set(names)):
-        parser.error(f"no experiment {unknown[0]!r}, expected some of {', '.join(names)}")
+        parser.error(f"no cut {unknown[0]!r}, expected some of {', '.join(names)}")
     return given
 
 
 def main() -> None:
     sources, experiments = read_experiments()
-    given = arguments([experiment.name for experiment in experiments])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
+    parser.add_argument("--figure", type=Path, help="draw the residuals of the forces, a PNG file")
+    given = parsed(parser, [experiment.name for experiment in experiments], 20.0)
     computed = []
     for experiment in experiments:
         if given.names and experiment.name not in given.names:

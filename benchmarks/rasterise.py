@@ -1,7 +1,7 @@
 """Time to sample a mesh: the rasteriser beside VTK's probe and SciPy's interpolator.
 
 ``python benchmarks/rasterise.py`` prints a table; ``--file`` adds a whole frame of a million
-elements from a VTK file, ``--fine`` sets how many columns of elements that mesh has.
+elements from a VTK file. ``--coarse`` and ``--fine`` set the columns of elements of the meshes.
 """
 
 import argparse
@@ -10,13 +10,14 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyvista
 from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
-from chipglow.io.sources.mesh import Meshes, MeshSource
+from chipglow.io.sources.mesh import MeshSource
 from chipglow.scene import Raster
 from chipglow.scene.rasterise import rasterise
 
@@ -43,20 +44,19 @@ def linear(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return 300.0 + 1.234567e6 * points[..., 0] + 0.7654321e6 * points[..., 1]
 
 
-def timed(action: Callable[[], object], repeats: int = REPEATS) -> tuple[float, float]:
-    """Least and median time in ms; the first run compiles or warms up and does not count."""
-    action()
+def timed(action: Callable[[], Any], repeats: int = REPEATS) -> tuple[Any, float, float]:
+    """Result, least and median time in ms; the first run, which may compile, does not count."""
+    found = action()
     times = []
     for _ in range(repeats):
         start = time.perf_counter()
         action()
         times.append(1e3 * (time.perf_counter() - start))
-    return min(times), statistics.median(times)
+    return found, min(times), statistics.median(times)
 
 
 def row(name: str, action: Callable[[], NDArray[np.float32]], repeats: int = REPEATS) -> None:
-    least, median = timed(action, repeats)
-    found = action()
+    found, least, median = timed(action, repeats)
     expected = linear(np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1))
     error = np.nanmax(np.abs(found - expected))
     void = np.isnan(found).mean()
@@ -110,25 +110,19 @@ def whole_frame(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> No
         grid.save(path)
         source = MeshSource(path)
         size = path.stat().st_size / 1e6
-        meshes = Meshes(source)
-        least, median = timed(lambda: meshes.reader.read(0), 3)
+        _, least, median = timed(lambda: next(source.frames(RASTER)), 3)
         print(f"\nA frame of {len(triangles)} triangles from a file of {size:.0f} MB:")
-        print(f"read {least:.0f} ms least, {median:.0f} ms median;", end=" ")
-
-        def sampled():
-            return meshes.sampled(meshes.flat(0, meshes.read(0)), 0.0, RASTER)
-
-        least, median = timed(sampled, 3)
         print(f"read and sampled {least:.0f} ms least, {median:.0f} ms median")
 
 
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--file", action="store_true", help="a frame from a file too")
+    arguments.add_argument("--coarse", type=int, default=236, help="columns of the peers' mesh")
     arguments.add_argument("--fine", type=int, default=745, help="columns of the fine mesh")
     chosen = arguments.parse_args()
     fine = mesh_of(chosen.fine, round(chosen.fine * 674 / 745))
-    compare(*mesh_of(236, 215), peers=True)
+    compare(*mesh_of(chosen.coarse, round(chosen.coarse * 215 / 236)), peers=True)
     compare(*fine, peers=False)
     if chosen.file:
         whole_frame(*fine)

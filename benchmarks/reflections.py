@@ -1,7 +1,6 @@
 """How much of the paper's missing 100 °C at the rake face reflections explain.
 
-    python benchmarks/reflections.py [--draws 40] [--angles 30 45 60 75] [--study quick.yaml]
-        [--cell 40]
+    python benchmarks/reflections.py [--draws 40] [--angles 30 45 60 75] [--study STUDY.yaml]
 
 Measures the hottest square of the row beside the rake face (its Figure 7) in one instant of the
 quick study, or of a study's cut or scene, with the light that rake face and chip's side reflect on
@@ -12,9 +11,8 @@ and tool are drawn; the tool is as warm as it was cut, or as the chip that it to
 """
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from math import pi, radians
 from pathlib import Path
 
@@ -24,7 +22,6 @@ from experiments import aligned
 from chipglow.camera import Camera
 from chipglow.io import open_scene
 from chipglow.laboratory.chip import rake_grid
-from chipglow.quantities import changed
 from chipglow.scene import Material, Scene
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, cut, load_study
@@ -75,11 +72,6 @@ class Face:
         measured = self.camera.measure(self.scene, surface, 0.0)
         assert measured.tool is not None
         return float(np.nanmax(rake_grid(measured, measured.tool).frame_mean[0]))
-
-
-def on_cells(study: Study, cell: float) -> Study:
-    """The study with a cut on cells of another side in m."""
-    return changed(study, {"cutting.numerics.cell": cell})
 
 
 def with_hot_tool(scene: Scene, temperature: np.ndarray, material: np.ndarray) -> np.ndarray:
@@ -159,21 +151,16 @@ def explained(faces: dict[str, Face], draws: int) -> list[list[str]]:
 def by_shape(faces: dict[str, Face], angles: Iterable[float]) -> list[list[str]]:
     """Table of what one wedge adds, by its angle and its kind of reflection."""
     rows = [["angle / °", *(f"{tool}, {name} / K" for tool in faces for name in CHIPS), "mirror"]]
-    for mirror in (0.0, 1.0):
-        for angle in angles:
-            wedge = Wedge(angle=radians(angle), mirror=mirror)
-            added = [
-                _added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()
-            ]
-            rows.append([f"{angle:.0f}", *(f"{one:.0f}" for one in added), f"{mirror:.0f}"])
-    upright = Wedge(angle=pi / 2, overhang=30e-6)
-    added = _all_added(faces, upright)
-    rows.append(["90, 30 um behind", *(f"{one:.0f}" for one in added), "0"])
+    wedges = [
+        (f"{angle:.0f}", Wedge(angle=radians(angle), mirror=mirror))
+        for mirror in (0.0, 1.0)
+        for angle in angles
+    ]
+    wedges.append(("90, 30 um behind", Wedge(angle=pi / 2, overhang=30e-6)))
+    for label, wedge in wedges:
+        added = [_added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()]
+        rows.append([label, *(f"{one:.0f}" for one in added), f"{wedge.mirror:.0f}"])
     return rows
-
-
-def _all_added(faces: dict[str, Face], wedge: Wedge) -> list[float]:
-    return [_added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()]
 
 
 def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
@@ -186,15 +173,14 @@ def main() -> None:
     parser.add_argument("--draws", type=int, default=40, help="draws of each row, 2 or more")
     parser.add_argument("--angles", nargs="*", type=float, default=SHAPES, help="in degrees")
     parser.add_argument("--study", type=Path, help="a study whose cut or scene is looked at")
-    parser.add_argument("--cell", type=float, help="side of a cell of the cut in um")
     given = parser.parse_args()
     study = Study.quick() if given.study is None else load_study(given.study)
-    if given.cell is not None:
-        study = on_cells(study, 1e-6 * given.cell)
     path = cut(study) if study.scene is None else study.scene
     scene, camera = open_scene(path), study.camera.build()
-    make: Callable[[bool], Face] = partial(Face.of, scene, camera)
-    faces = {"as cut": make(False), "as warm as the chip": make(True)}
+    faces = {
+        "as cut": Face.of(scene, camera, hot_tool=False),
+        "as warm as the chip": Face.of(scene, camera, hot_tool=True),
+    }
     print(aligned(by_shape(faces, given.angles)))
     print(aligned(explained(faces, given.draws)))
 

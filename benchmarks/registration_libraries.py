@@ -58,7 +58,7 @@ BINS, COARSE, FINE, WINDOW = 32, 1.0, 0.6, 5.0
 
 @dataclass(frozen=True)
 class Pair:
-    """What a method is given: images, the pixels and the model of the map."""
+    """Input of a method: images, raster of the pixels and model of the map."""
 
     infrared: Image
     raster: Raster
@@ -76,12 +76,12 @@ class Pair:
         return np.array([columns - 1, rows - 1]) / 2
 
     def placed(self, scale: float, turn: float, across: float, down: float) -> Matrix:
-        """Sensor to visible pixel: a similarity about the middle, the turn in radians."""
+        """Return a similarity about the middle from pixel to visible pixel; turn in radians."""
         linear = scale * np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
         return self.to_pixels(linear, self.middle + np.array([across, down]) - linear @ self.middle)
 
     def to_pixels(self, linear: Matrix, offset: NDArray[np.float64]) -> Matrix:
-        """Sensor to visible pixel, of a map to where the visible picture lies at first."""
+        """Return the matrix from pixel to visible pixel for a map in units of pixels."""
         matrix = np.eye(3)
         rows, columns = self.visible.shape
         matrix[:2, :2] = linear / self.pitch
@@ -89,7 +89,7 @@ class Pair:
         return matrix
 
     def registration(self, matrix: Matrix, warnings: Iterable[str]) -> Registration:
-        """A map from pixels to visible pixels as one from m, its covariance 0."""
+        """Return a map from pixels to visible pixels as one from m, without covariance."""
         step = self.raster.spacing
         before = np.array(
             [[1 / step, 0, -self.raster.x[0] / step], [0, -1 / step, self.raster.y[0] / step]]
@@ -106,14 +106,14 @@ def mapped(matrix: Matrix, places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def distance(one: Matrix, other: Matrix, pair: Pair) -> float:
-    """Distance of two maps in pixels: where it is greatest, of two corners."""
+    """Return the greater distance of two maps in pixels at two corners."""
     corners = np.stack([np.zeros(2), 2 * pair.middle])
     apart = mapped(one, corners) - mapped(other, corners)
     return float(np.hypot(*apart.T).max()) * pair.pitch
 
 
 def overlap(matrix: Matrix, pair: Pair) -> float:
-    """Fraction of the pixels that lie on the visible picture."""
+    """Return the fraction of the pixels that lie on the visible picture."""
     rows, columns = np.indices(pair.infrared.shape)[:, ::8, ::8]
     column, row = mapped(matrix, np.stack([columns, rows], axis=-1).reshape(-1, 2)).T
     height, width = pair.visible.shape
@@ -126,7 +126,7 @@ def best_first(tried: Tried) -> Tried:
 
 
 def rivals(tried: Tried, pair: Pair) -> Iterator[str]:
-    """A warning for each placement far from the first that is nearly as good."""
+    """Yield a warning for each distant placement that is nearly as good as the first."""
     most, best = tried[0]
     for good, matrix in tried[1:]:
         if good > RIVAL * most and distance(best, matrix, pair) > FAR:
@@ -137,7 +137,7 @@ def rivals(tried: Tried, pair: Pair) -> Iterator[str]:
 
 
 def itk_images(pair: Pair, edges: float = 0.0) -> tuple[Any, Any]:
-    """Both images in pixels, one in the middle of the other; or their edges at a width."""
+    """Return both images in pixels, centred on each other, or their edges of a width."""
     fixed, moving = (
         sitk.GetImageFromArray(image.astype(np.float32)) for image in (pair.infrared, pair.visible)
     )
@@ -154,7 +154,7 @@ def itk_images(pair: Pair, edges: float = 0.0) -> tuple[Any, Any]:
 
 
 def itk_contrast(image: Any, edges: float, faint: float) -> Any:
-    """Magnitude of the gradient over the contrast of the surroundings and what is faint."""
+    """Return the gradient's magnitude over the contrast of the surroundings."""
     smooth = sitk.SmoothingRecursiveGaussian
     variance = sitk.Abs(smooth(sitk.Square(image - smooth(image, WINDOW)), WINDOW))
     magnitude = sitk.GradientMagnitudeRecursiveGaussian(image, edges)
@@ -180,7 +180,7 @@ def itk_similarity(place: Place, pair: Pair) -> Any:
 
 
 def itk_scores(images: tuple[Any, Any], metric: str, pair: Pair) -> dict[Place, float]:
-    """How good each placement of the grid is, at a quarter of the resolution."""
+    """Return the metric of each placement of the grid at a quarter of the resolution."""
     coarse = [
         sitk.Shrink(sitk.SmoothingRecursiveGaussian(image, 2.0), [factor] * 2)
         for image, factor in zip(images, (STEP, round(STEP / pair.pitch)), strict=True)
@@ -202,7 +202,7 @@ def itk_scores(images: tuple[Any, Any], metric: str, pair: Pair) -> dict[Place, 
 
 
 def itk_starts(scores: Mapping[Place, float], pair: Pair) -> list[Place]:
-    """The best placements that are apart and overlap enough, the best first."""
+    """Return the best distinct placements that overlap enough, the best first."""
     kept: list[tuple[Place, Matrix]] = []
     for place in sorted(scores, key=scores.__getitem__, reverse=True):
         matrix = pair.placed(*place)
@@ -218,7 +218,7 @@ def itk_starts(scores: Mapping[Place, float], pair: Pair) -> list[Place]:
 def itk_climb(
     images: tuple[Any, Any], transform: Any, metric: str, levels: list[int]
 ) -> tuple[float, bool]:
-    """What the metric is after the climb, which moves the transform, and whether it ended."""
+    """Optimise the transform; return the metric and whether the steps converged."""
     method = itk_method(metric)
     method.SetShrinkFactorsPerLevel(levels)
     method.SetSmoothingSigmasPerLevel([level // 2 for level in levels])
@@ -235,7 +235,7 @@ def itk_climb(
 def itk_refined(
     images: tuple[Any, Any], place: Place, metric: str, pair: Pair
 ) -> tuple[float, Matrix, bool]:
-    """From a placement to the map: how good, the map and whether the climb ended."""
+    """Refine a placement; return the metric, the map and whether the steps converged."""
     transform = itk_similarity(place, pair)
     good, ended = itk_climb(images, transform, metric, LEVELS)
     if pair.model == "affine":
@@ -253,14 +253,14 @@ def itk_refined(
 
 
 def itk_grid(pair: Pair) -> Registration:
-    """Mutual information from a grid of placements."""
+    """Maximise mutual information from a grid of placements."""
     images = itk_images(pair)
     starts = itk_starts(itk_scores(images, "information", pair), pair)
     return itk_best(pair, images, starts, "information")
 
 
 def itk_edges(pair: Pair) -> Registration:
-    """Correlation of edges, from placements chosen by it times mutual information."""
+    """Maximise the correlation of edges, from placements with a high product of both metrics."""
     information = itk_scores(itk_images(pair), "information", pair)
     correlation = itk_scores(itk_images(pair, COARSE), "edges", pair)
     scores = {place: information[place] * correlation[place] for place in correlation}
@@ -281,20 +281,20 @@ def itk_best(pair: Pair, images: tuple[Any, Any], starts: list[Place], metric: s
 
 
 def edge_images(pair: Pair) -> tuple[Image, Image]:
-    """Edges of the infrared image and of the visible picture, at the pixels' resolution."""
+    """Return the edges of both images at the resolution of the pixels."""
     seen = gaussian_gradient_magnitude(pair.visible.astype(float), COARSE / pair.pitch)
     found = gaussian_gradient_magnitude(pair.infrared, COARSE)
     return found / found.std(), seen / seen.std()
 
 
 def laid(image: Image, matrix: Matrix, pair: Pair) -> Image:
-    """A visible picture on the pixels."""
+    """Resample a visible picture on the pixels."""
     inverse = AffineTransform(matrix=matrix)
     return np.asarray(warp(image, inverse, output_shape=pair.infrared.shape, mode="edge"))
 
 
 def correlated(pair: Pair) -> Tried:
-    """Shift by cross-correlation of edges for each turn and scale, the best first."""
+    """Return the shift by cross-correlation for each turn and scale, the best first."""
     hot, seen = edge_images(pair)
     taper = window(("tukey", 0.3), hot.shape)
     tried = []
@@ -333,7 +333,7 @@ METHODS: dict[str, Callable[[Pair], Registration | None]] = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """How far off a map is and says it may be, in pixels; infinite for no map."""
+    """Error and stated uncertainty of a map in pixels; infinite for no map."""
 
     error: float
     stated: float

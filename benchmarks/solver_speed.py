@@ -42,7 +42,7 @@ when the last point of a batch has converged: that changes the return of stress 
 
 
 class Start(NamedTuple):
-    """What every implementation starts from."""
+    """Starting state of every implementation."""
 
     points: Points
     velocity: np.ndarray
@@ -56,7 +56,7 @@ class Start(NamedTuple):
 
 
 def sheared_block(side):
-    """A square of `side` x `side` points in shear that alternates every 80 µm, half plastic."""
+    """Return `side` x `side` points in shear that alternates every 80 µm, half plastic."""
     block = Block((side * CELL / 2, side * CELL / 2), CELL, STEEL)
     step = block.step
     block.step = step._replace(
@@ -148,14 +148,14 @@ def copy(source, target):  # type: ignore[no-untyped-def]
 
 
 def copy_bandwidth(threads):
-    """Bytes read and written a second by a plain copy that fits in no cache."""
+    """Return bytes read and written a second by a copy larger than the caches."""
     source, target = np.ones(1 << 25), np.empty(1 << 25)
     set_num_threads(threads)
     return 2 * source.nbytes / fastest(lambda: copy(source, target), 8)
 
 
 def sort_seconds(start):
-    """Seconds to sort the points by cell once."""
+    """Return the seconds to sort the points by cell once."""
     starts = np.zeros(start.grid.columns * start.grid.rows + 1, np.int64)
     target = np.empty_like(start.points)
     return fastest(lambda: sort_points(start, target, starts), 3)

@@ -1,4 +1,4 @@
-"""Whether the laboratory's procedures find a hidden truth, and as often as they say.
+"""Coverage of the laboratory procedures' 95 % intervals in a synthetic laboratory.
 
     python benchmarks/synthetic_laboratory.py [--first 0] [--repeats 100] [--markdown]
     python benchmarks/synthetic_laboratory.py --first 0 --write FOLDER
@@ -117,7 +117,7 @@ QUANTITIES = {
     "MTF at 31 /mm": "",
     "temperature of the shear band": "K",
 }
-"""What is recovered, and the unit in which it is told."""
+"""Recovered quantities and the unit in which they are printed."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def mirror_optics(aperture: float, obscuration: float) -> Optics:
 
 
 def hidden_optics(generator: np.random.Generator) -> Optics:
-    """One of the kinds, of any width."""
+    """Draw one of the kinds with a random width."""
     kind = generator.choice(["gaussian", "tail", "mirror"])
     if kind == "gaussian":
         return gaussian_optics(generator.uniform(7e-6, 14e-6))
@@ -201,7 +201,7 @@ def hidden_optics(generator: np.random.Generator) -> Optics:
 
 
 class Laboratory:
-    """A laboratory of which everything is known; `perform` writes what others may see.
+    """A laboratory whose true values are known; `perform` writes its files.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ class Laboratory:
         self.normals = tilts + [0.0, 90.0] + 180.0 * generator.integers(0, 2, 2)
 
     def _surface(self, body: float, shear_band: float) -> NDArray[np.float64]:
-        """Emissivity of every sample, which varies from place to place."""
+        """Return the emissivity of every sample, with texture."""
         shape = tuple(SAMPLES * count for count in SHAPE)
         texture = gaussian_filter(self._generator.standard_normal(shape), 4.0, mode="reflect")
         emissivity = np.full(shape, body)
@@ -248,7 +248,7 @@ class Laboratory:
         return np.asarray(emissivity + 0.015 * texture / texture.std())
 
     def reference(self) -> dict[str, float]:
-        """What the procedures shall find, by `QUANTITIES`."""
+        """Return the true values by `QUANTITIES`."""
         shape = (SHAPE[0], SAMPLES, SHAPE[1], SAMPLES)
         pixels = self.emissivity.reshape(shape).mean(axis=(1, 3))
         body = np.concatenate([pixels[4:44, 1:9], pixels[4:44, 55:63]])
@@ -262,13 +262,13 @@ class Laboratory:
         }
 
     def _transfer(self) -> float:
-        """Of optics and pixel, across the first edge."""
+        """Return the transfer function of optics and pixel across the first edge."""
         angle = radians(float(self.normals[0]))
         across, down = FREQUENCY * PITCH * cos(angle), FREQUENCY * PITCH * sin(angle)
         return self.optics.transfer(FREQUENCY) * float(np.sinc(across) * np.sinc(down))
 
     def perform(self, folder: Path) -> None:
-        """Do the experiment, and write its files and notes."""
+        """Write the files and notes of the experiment."""
         self._calibrate(folder)
         for name, celsius in (("cold", 240.0), ("hot", 640.0)):
             self._record(folder / f"{name}.hcc", _even(celsius + CELSIUS), UNIFORM_FRAMES)
@@ -294,7 +294,7 @@ class Laboratory:
         (folder / "points.csv").write_text("\n".join(lines) + "\n")
 
     def _record(self, path: Path, radiance: NDArray[np.float64], count: int) -> None:
-        """Counts of an image of radiance, in the format that the name tells."""
+        """Write counts of an image of radiance in the format of the file's suffix."""
         drift = DRIFT / self.slope * self._generator.standard_normal()
         frames = np.broadcast_to(radiance + drift, (count, *SHAPE))
         counts = self.detector.counts(frames, self._generator).astype(np.uint16)
@@ -311,7 +311,7 @@ class Laboratory:
             )
 
     def _field(self) -> NDArray[np.float64]:
-        """True temperature of the hot chip: even in the middle, colder about it."""
+        """Return the true temperature of the hot chip, uniform in the middle."""
         rows, columns = self.emissivity.shape
         x = PITCH / SAMPLES * (np.arange(columns) - (columns - 1) / 2)
         y = PITCH / SAMPLES * (np.arange(rows) - (rows - 1) / 2)
@@ -319,7 +319,7 @@ class Laboratory:
         return np.asarray(self.hot - 60.0 * (1 - np.exp(-((beyond / 60e-6) ** 2))))
 
     def _seen(self, kelvins: float | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Radiance of the chip at every pixel."""
+        """Return the radiance of the chip at every pixel."""
         reflected = float(BAND.radiance(np.array(self.room)))
         own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
         radiance = self.emissivity * own + (1 - self.emissivity) * reflected
@@ -327,7 +327,7 @@ class Laboratory:
         return Camera(BAND, PITCH, psf=self.optics.psf).form_image(radiance, raster)
 
     def _edge(self, normal: float) -> NDArray[np.float64]:
-        """Radiance of a hot plate half behind a warm blade, at every pixel's square."""
+        """Return each pixel's radiance of a hot plate half behind a warm blade."""
         position = self._generator.uniform(-6e-6, 6e-6)
         blade, plate = self._generator.uniform(230.0, 280.0), self._generator.uniform(520.0, 600.0)
         dark, bright = BAND.radiance(np.array([blade, plate]) + CELSIUS)
@@ -338,7 +338,7 @@ class Laboratory:
 
 
 def _even(kelvins: float) -> NDArray[np.float64]:
-    """Radiance of a blackbody."""
+    """Return the radiance of a blackbody."""
     return np.full(SHAPE, float(BAND.radiance(np.array(kelvins))))
 
 
@@ -353,13 +353,13 @@ STACK_FIELDS = ("unit=counts", "interval=2 ms", "saturation=4094")
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What the procedures find in a folder; it knows nothing of `Laboratory`."""
+    """Results of the procedures in a folder, independent of `Laboratory`."""
 
     folder: Path
 
     @cached_property
     def calibration(self) -> FittedCalibration:
-        """Of the blackbodies; ``chipglow calibrate``."""
+        """Calibration by the blackbodies, as ``chipglow calibrate`` makes it."""
         points = read_calibration_points(
             self.folder / "points.csv",
             lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
@@ -372,14 +372,14 @@ class Evaluation:
             points["count_uncertainty"],
             points["temperature_uncertainty"],
             CERTIFICATE,
-            INTEGRATION_TIME,
+            integration_time=INTEGRATION_TIME,
         )
         path = self.folder / "calibration.yaml"
         path.write_text(calibration_text(CalibrationDescription.of(fit)))
         return load_calibration(path)
 
     def images(self, pattern: str) -> list[Measurement]:
-        """Recordings as measurements; ``chipglow convert``."""
+        """Return recordings as measurements, as ``chipglow convert`` does."""
         fields = [*CAMERA_FIELDS, "calibration=calibration.yaml"]
         paths = sorted(self.folder.glob(pattern))
         if not pattern.endswith("hcc"):
@@ -387,7 +387,7 @@ class Evaluation:
         return [load_measurement(path, fields) for path in paths]
 
     def results(self) -> dict[str, Found]:
-        """What is found, by `QUANTITIES`."""
+        """Return the results by `QUANTITIES`."""
         calibration = self.calibration
         heated, chip = self.images("heated-*.hcc"), self.images("chip-*.npy")
         notes = yaml.safe_load((self.folder / "notes.yaml").read_text())
@@ -416,7 +416,7 @@ class Evaluation:
         }
 
     def _spread(self) -> dict[str, Found]:
-        """Point spread function; ``chipglow psf``."""
+        """Return width and MTF of the optics, as ``chipglow psf`` does."""
         factor = NormalDist().inv_cdf(0.975)
         images = self.images("edge-*")
         result = knife_edge([edge_image(image, f"edge {k}") for k, image in enumerate(images, 1)])
@@ -431,7 +431,7 @@ class Evaluation:
 
 
 def repeat(seed: int) -> dict[str, tuple[float, float, float]]:
-    """Truth, value and expanded uncertainty of each quantity in a laboratory of this seed."""
+    """Return truth, value and expanded uncertainty of each quantity for a seed."""
     laboratory = Laboratory(seed)
     reference = laboratory.reference()
     with TemporaryDirectory() as name:
@@ -443,9 +443,9 @@ def repeat(seed: int) -> dict[str, tuple[float, float, float]]:
 Row = dict[str, tuple[float, float, float]]
 
 
-def kept(seed: int) -> Row:
-    """Result of a repeat, computed or as it was kept."""
-    path = RESULTS / f"{seed}.json"
+def kept(seed: int, folder: Path = RESULTS) -> Row:
+    """Return the result of a repeat, computed or as it was kept."""
+    path = folder / f"{seed}.json"
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(repeat(seed)))
@@ -453,12 +453,12 @@ def kept(seed: int) -> Row:
 
 
 def hits(rows: Sequence[Row], name: str) -> int:
-    """How often the truth is in the stated interval."""
+    """Count the rows whose interval contains the truth."""
     return sum(abs(row[name][1] - row[name][0]) <= row[name][2] for row in rows)
 
 
 def table(rows: Sequence[Row]) -> Iterable[tuple[str, ...]]:
-    """Quantity, hits, and medians of the error and of the half width of the interval."""
+    """Yield quantity, hits, and medians of the error and of the interval's half width."""
     yield "quantity", "within", "median |error|", "median U (95 %)"
     for name, unit in QUANTITIES.items():
         scale = 1e6 if unit == "um" else 1.0
@@ -468,19 +468,21 @@ def table(rows: Sequence[Row]) -> Iterable[tuple[str, ...]]:
         yield name, f"{hits(rows, name)} of {len(rows)}", *told
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Repeat, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--repeats", type=int, default=100, help="how many seeds")
     parser.add_argument("--markdown", action="store_true", help="print a table for a page")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of kept repeats")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="only write a seed's files")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if options.write is not None:
         options.write.mkdir(parents=True, exist_ok=True)
         Laboratory(options.first).perform(options.write)
         return
-    rows = [kept(seed) for seed in range(options.first, options.first + options.repeats)]
+    seeds = range(options.first, options.first + options.repeats)
+    rows = [kept(seed, options.results) for seed in seeds]
     for number, line in enumerate(table(rows)):
         if options.markdown:
             print("|", " | ".join(line), "|")

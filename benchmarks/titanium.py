@@ -1,4 +1,4 @@
-"""Measured orthogonal cuts of Ti-6Al-4V beside the same cuts computed here.
+"""Measured orthogonal cuts of Ti-6Al-4V compared with the same cuts computed by chipglow.
 
     python benchmarks/titanium.py [--cell 10] [--markdown] [NAME ...]
 
@@ -19,7 +19,19 @@ from statistics import fmean, stdev
 from typing import Any, NamedTuple
 
 import yaml
-from experiments import CONDITIONS, FORCE, LENGTH, Means, aligned, markdown, means_of, number
+from experiments import (
+    CONDITIONS,
+    FORCE,
+    LENGTH,
+    Means,
+    aligned,
+    check_choices,
+    markdown,
+    means_of,
+    number,
+    parsed,
+    read_entries,
+)
 
 from chipglow.cutting import (
     SOLVER_VERSION,
@@ -70,9 +82,7 @@ class Trial:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Trial":
-        for key, allowed in ALLOWED.items():
-            if data.get(key) not in allowed:
-                raise ValueError(f"{key} {data.get(key)!r}, expected one of {', '.join(allowed)}")
+        check_choices(data, ALLOWED)
         return cls(**{**data, **{name: unit.parse(data[name]) for name, unit in FIELDS.items()}})
 
 
@@ -83,12 +93,23 @@ class Condition(NamedTuple):
     feed: float
 
     @property
+    def m_a_minute(self) -> str:
+        return f"{60 * self.speed:.4g}"
+
+    @property
+    def mm(self) -> str:
+        return f"{1e3 * self.feed:.3g}"
+
+    @property
     def name(self) -> str:
-        return f"{_m_a_minute(self.speed)}-{_mm(self.feed)}"
+        return f"{self.m_a_minute}-{self.mm}"
+
+    def __str__(self) -> str:
+        return f"{self.m_a_minute} m/min, {self.mm} mm"
 
 
 class Cut(NamedTuple):
-    """What is compared, measured or computed: forces of any one width, thickness in m."""
+    """Measured values: forces of an unknown width in N, thickness in m."""
 
     cutting_force: float
     thrust_force: float
@@ -96,26 +117,13 @@ class Cut(NamedTuple):
 
 
 def read_trials(path: Path = DATA) -> tuple[str, list[Trial]]:
-    """The source of the tests, and the tests, checked.
-
-    Raises
-    ------
-    ValueError
-        If an entry breaks the form of the file; the message names file and test.
-    """
+    """Return the source of the tests, and the tests, checked."""
     data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    trials = []
-    for entry in data["tests"]:
-        try:
-            trials.append(Trial.of(entry))
-        except (KeyError, TypeError, ValueError) as error:
-            name = entry.get("name", "a test without a name")
-            raise ValueError(f"{path.name}: {name}: {error}") from None
-    return " ".join(data["source"].split()), trials
+    return " ".join(data["source"].split()), read_entries(path, data["tests"], Trial.of)
 
 
 def repeats(trials: Iterable[Trial]) -> dict[Condition, list[Trial]]:
-    """The tests by condition, from the least feed and speed on."""
+    """Group the tests by condition, in order of feed and speed."""
     found: dict[Condition, list[Trial]] = {}
     for trial in sorted(trials, key=lambda one: (one.feed, one.speed)):
         found.setdefault(Condition(trial.speed, trial.feed), []).append(trial)
@@ -123,7 +131,7 @@ def repeats(trials: Iterable[Trial]) -> dict[Condition, list[Trial]]:
 
 
 def mean(trials: list[Trial]) -> Cut:
-    """Mean of the repeats."""
+    """Return the mean of the repeats."""
     return Cut(
         fmean(trial.cutting_force for trial in trials),
         fmean(trial.feed_force for trial in trials),
@@ -131,33 +139,34 @@ def mean(trials: list[Trial]) -> Cut:
     )
 
 
-def ratios(cuts: Mapping[Condition, Cut]) -> dict[str, float]:
-    """What does not depend on the width of cut, by what it is.
+def ratios(cuts: Mapping[Condition, Cut | Means]) -> dict[str, float]:
+    """Return ratios that do not depend on the width of cut, by their name.
 
     Thrust over cutting force and thickness over feed of every cut, and its cutting force over that
     of the next smaller feed at the same speed and of the next lower speed at the same feed.
     """
-    found = {}
     ordered = sorted(cuts, key=lambda at: (at.feed, at.speed))
-    for at in ordered:
-        found[f"Ff / Fc at {_at(at)}"] = cuts[at].thrust_force / cuts[at].cutting_force
-    for at in ordered:
-        found[f"thickness / feed at {_at(at)}"] = cuts[at].thickness / at.feed
-    for low, high in pairwise(sorted(cuts)):
-        if low.speed == high.speed:
-            what = f"Fc({_mm(high.feed)} mm) / Fc({_mm(low.feed)} mm)"
-            change = cuts[high].cutting_force / cuts[low].cutting_force
-            found[f"{what} at {_m_a_minute(low.speed)} m/min"] = change
-    for slow, fast in pairwise(ordered):
-        if slow.feed == fast.feed:
-            what = f"Fc({_m_a_minute(fast.speed)} m/min) / Fc({_m_a_minute(slow.speed)} m/min)"
-            change = cuts[fast].cutting_force / cuts[slow].cutting_force
-            found[f"{what} at {_mm(slow.feed)} mm"] = change
-    return found
+    forces = {f"Ff / Fc at {at}": cuts[at].thrust_force / cuts[at].cutting_force for at in ordered}
+    thicknesses = {f"thickness / feed at {at}": cuts[at].thickness / at.feed for at in ordered}
+    by_feed = {
+        f"Fc({high.mm} mm) / Fc({low.mm} mm) at {low.m_a_minute} m/min": (
+            cuts[high].cutting_force / cuts[low].cutting_force
+        )
+        for low, high in pairwise(sorted(cuts))
+        if low.speed == high.speed
+    }
+    by_speed = {
+        f"Fc({fast.m_a_minute} m/min) / Fc({slow.m_a_minute} m/min) at {slow.mm} mm": (
+            cuts[fast].cutting_force / cuts[slow].cutting_force
+        )
+        for slow, fast in pairwise(ordered)
+        if slow.feed == fast.feed
+    }
+    return {**forces, **thicknesses, **by_feed, **by_speed}
 
 
 def simulation(trials: list[Trial], rake: float, cell: float) -> CuttingSimulation:
-    """The cut of the tests; materials are the library's, friction the solver's own."""
+    """Return the cut of the tests with the library's materials and default friction."""
     speed, feed = trials[0].speed, trials[0].feed
     edge_radius = fmean(trial.edge_radius for trial in trials)
     return CuttingSimulation(
@@ -170,14 +179,14 @@ def simulation(trials: list[Trial], rake: float, cell: float) -> CuttingSimulati
 
 
 def measurements(tests: Mapping[Condition, list[Trial]]) -> list[list[str]]:
-    """Rows of the table of what was measured, its head first."""
+    """Return the table of measured values, its head first."""
     head = ["speed / (m/min)", "feed / mm", "tests", "wear", "edge radius / µm"]
     rows = [[*head, "Fc / N", "Ff / Fc", "thickness / feed"]]
     for at, trials in tests.items():
         rows.append(
             [
-                _m_a_minute(at.speed),
-                _mm(at.feed),
+                at.m_a_minute,
+                at.mm,
                 ", ".join(trial.name for trial in trials),
                 "".join(sorted({trial.wear for trial in trials})),
                 spread([1e6 * trial.edge_radius for trial in trials], 1),
@@ -190,7 +199,7 @@ def measurements(tests: Mapping[Condition, list[Trial]]) -> list[list[str]]:
 
 
 def spread(values: list[float], decimals: int) -> str:
-    """Mean, and the standard deviation where there are repeats."""
+    """Return the mean, with the standard deviation of repeats."""
     deviation = f" ± {stdev(values):.{decimals}f}" if len(values) > 1 else ""
     return f"{fmean(values):.{decimals}f}{deviation}"
 
@@ -198,7 +207,7 @@ def spread(values: list[float], decimals: int) -> str:
 def comparison(
     measured: Mapping[str, float], computed: Mapping[float, Mapping[str, float]]
 ) -> list[list[str]]:
-    """Rows of the table of measured ratios beside those computed at each rake angle, head first."""
+    """Return the table of measured ratios and those computed at each rake angle, head first."""
     rows = [["quantity", "measured"]]
     for rake in computed:
         rows[0] += [f"rake {rake:g}°", "difference"]
@@ -215,12 +224,12 @@ def cuts_made(
     outcomes: Mapping[tuple[Condition, float], Means | SolverError],
     tests: Mapping[Condition, list[Trial]],
 ) -> list[list[str]]:
-    """Rows of the table of how each cut went, its head first."""
+    """Return the table of the quality of each cut, its head first."""
     head = ["speed / (m/min)", "feed / mm", "rake / °", "Fc / (N/mm)", "Ff / (N/mm)"]
     head += ["Fc measured / computed / mm", "segment / µm", "segments", "drift / %"]
     rows = [[*head, "unaccounted work / %", "time / s"]]
     for (at, rake), means in outcomes.items():
-        row = [_m_a_minute(at.speed), _mm(at.feed), f"{rake:g}"]
+        row = [at.m_a_minute, at.mm, f"{rake:g}"]
         if isinstance(means, SolverError):
             rows.append([*row, str(means), *["–"] * 7])
             continue
@@ -240,7 +249,7 @@ def cuts_made(
 
 
 def outcome_of(trials: list[Trial], rake: float, cell: float) -> Means | SolverError:
-    """Means of the cut, kept or computed now, or what stopped it."""
+    """Return the means of the cut, stored or computed, or the error that stopped it."""
     cut = simulation(trials, rake, cell)
     name = f"{Condition(trials[0].speed, trials[0].feed).name}-{rake:g}"
     print(name, file=sys.stderr, flush=True)
@@ -253,11 +262,11 @@ def outcome_of(trials: list[Trial], rake: float, cell: float) -> Means | SolverE
 def computed_ratios(
     outcomes: Mapping[tuple[Condition, float], Means | SolverError],
 ) -> dict[float, dict[str, float]]:
-    """What `ratios` says of the cuts that came to their end, by rake angle."""
+    """Return the ratios of completed cuts by rake angle."""
     return {
         rake: ratios(
             {
-                at: Cut(means.cutting_force, means.thrust_force, means.thickness)
+                at: means
                 for (at, other), means in outcomes.items()
                 if other == rake and isinstance(means, Means)
             }
@@ -266,33 +275,11 @@ def computed_ratios(
     }
 
 
-def _at(condition: Condition) -> str:
-    return f"{_m_a_minute(condition.speed)} m/min, {_mm(condition.feed)} mm"
-
-
-def _m_a_minute(speed: float) -> str:
-    return f"{60 * speed:.4g}"
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.3g}"
-
-
-def arguments(names: list[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
-    parser.add_argument("--cell", type=float, default=10.0, help="side of a cell in um")
-    parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
-    given = parser.parse_args()
-    if unknown := sorted(set(given.names) - set(names)):
-        parser.error(f"no condition {unknown[0]!r}, expected some of {', '.join(names)}")
-    return given
-
-
 def main() -> None:
     source, trials = read_trials()
     tests = repeats(trials)
-    given = arguments([at.name for at in tests])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    given = parsed(parser, [at.name for at in tests], 10.0)
     tests = {at: found for at, found in tests.items() if at.name in given.names or not given.names}
     outcomes = {
         (at, rake): outcome_of(found, rake, given.cell / 1e6)

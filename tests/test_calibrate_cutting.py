@@ -5,7 +5,7 @@ from math import nan
 import calibrate_cutting as calibrate
 import numpy as np
 import pytest
-from calibrate_cutting import Observation, Surface
+from calibrate_cutting import Fit, Observation
 from experiments import Means, read_experiments
 
 SLOPES = np.array([[0.10, -0.08, 0.02, 0.05], [0.05, -0.10, 0.03, 0.30], [0.02, 0.2, 0.0, 0.1]])
@@ -16,41 +16,37 @@ def made_up(place):
     return np.exp(np.array([6.0, 5.0, 4.0]) + SLOPES @ np.asarray(place))
 
 
-def surfaces_and_observations(truth):
+def fit_of_three(truth):
     places = np.array(calibrate.design())
-    values = np.array([made_up(place) for place in places])
-    surfaces = [Surface.through(places, values[:, k]) for k in range(3)]
     observed = [
         Observation(f"cut {k}", "cutting_force", value, 0.05)
         for k, value in enumerate(made_up(truth))
     ]
-    return surfaces, observed
+    return Fit.through(places, np.array([made_up(place) for place in places]), observed)
 
 
 def test_a_surface_meets_a_quadratic_without_products_exactly():
     places = np.array([*calibrate.design(), (0.3, 0.1, -0.4, 0.6), (0.5, -0.5, 0.2, 0.1)])
     logs = 1.0 + places @ np.array([0.1, 0.2, -0.3, 0.4]) + places**2 @ np.full(4, 0.05)
-    surface = Surface.through(places, np.exp(logs))
+    fit = Fit.through(places, np.exp(logs)[:, None], [])
     at = np.array([0.2, -0.6, 0.5, 0.9])
     expected = 1.0 + at @ np.array([0.1, 0.2, -0.3, 0.4]) + (at**2).sum() * 0.05
-    assert surface.at(at) == pytest.approx(expected, abs=1e-9)
-    assert surface.scatter < 1e-9
+    assert fit.logs(at) == pytest.approx(expected, abs=1e-9)
+    assert fit.scatter < 1e-9
 
 
 def test_the_forces_are_met_where_they_can_be():
-    surfaces, observed = surfaces_and_observations((0.4, -0.2, 0.1, 0.5))
-    found = calibrate.best_place(surfaces, observed)
-    # Three forces do not tell four numbers, but each force is met.
-    assert made_up(found) == pytest.approx([one.value for one in observed], rel=1e-3)
+    fit = fit_of_three((0.4, -0.2, 0.1, 0.5))
+    # Three forces do not determine four numbers, but each force is met.
+    assert made_up(fit.best_place()) == pytest.approx([one.value for one in fit.observed], rel=1e-3)
 
 
-def test_the_covariance_is_that_of_linear_least_squares_and_knows_what_is_not_told():
-    surfaces, observed = surfaces_and_observations((0.0, 0.0, 0.0, 0.0))
-    covariance = calibrate.covariance_at(np.zeros(4), surfaces, observed)
+def test_the_covariance_is_that_of_linear_least_squares_and_of_the_ranges():
+    covariance = fit_of_three((0.0, 0.0, 0.0, 0.0)).covariance_at(np.zeros(4))
     weights = SLOPES.T @ SLOPES / 0.05**2 + 3.0 * np.eye(4)
     half = np.array([0.5 * np.log(one.high / one.low) for one in calibrate.RANGES])
     assert covariance == pytest.approx(np.linalg.inv(weights) * np.outer(half, half), rel=1e-6)
-    # Nothing is told of the third number: the standard deviation of its range is left.
+    # The forces hardly depend on the third number: the standard deviation of its range is left.
     assert covariance[2, 2] == pytest.approx(half[2] ** 2 / 3, rel=0.1)
 
 

@@ -13,7 +13,7 @@ from chipglow.camera.exposure import View, expose
 from chipglow.camera.sweep import STEPS_PER_KELVIN
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
-from chipglow.io.chunks import read_chunk
+from chipglow.io.packing import read_chunk
 from chipglow.io.spline_file import STEPS
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, SceneError, ToolGeometry

@@ -4,13 +4,14 @@ A hundred repeats: `python benchmarks/synthetic_laboratory.py`.
 """
 
 import csv
-import json
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
 import synthetic_laboratory
 import yaml
-from synthetic_laboratory import QUANTITIES, Evaluation, Laboratory, hits, repeat
+from synthetic_laboratory import QUANTITIES, Evaluation, Laboratory, hits, kept, main
 from typer.testing import CliRunner
 
 from chipglow.camera import MeasuredPSF
@@ -24,13 +25,20 @@ STACKED = [*DEVELOPED, "--set", "unit=counts", "--set", "interval=2 ms", "--set"
 
 
 @pytest.fixture(scope="module")
-def rows(shared_folder):
-    return json.loads((shared_folder("laboratories", repeat_all) / "rows.json").read_text())
+def results(shared_folder):
+    """Folder with the program's results of `REPEATS` laboratories, and its table."""
+    return shared_folder("laboratories", repeat_all)
 
 
 def repeat_all(folder):
-    """Results of `REPEATS` laboratories."""
-    (folder / "rows.json").write_text(json.dumps([repeat(seed) for seed in range(REPEATS)]))
+    with redirect_stdout(StringIO()) as printed:
+        main(["--repeats", str(REPEATS), "--results", str(folder)])
+    (folder / "table.txt").write_text(printed.getvalue(), encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def rows(results):
+    return [kept(seed, results) for seed in range(REPEATS)]
 
 
 @pytest.fixture
@@ -47,6 +55,14 @@ def experiment(tmp_path, monkeypatch):
 def test_the_truth_is_in_the_stated_interval(rows, name):
     """Of seven 95 % intervals, two or fewer miss with a probability of 0.996."""
     assert hits(rows, name) >= REPEATS - 2
+
+
+@pytest.mark.slow
+def test_the_program_prints_its_table(results, rows):
+    printed = (results / "table.txt").read_text(encoding="utf-8").splitlines()
+    for name, line in zip(QUANTITIES, printed[1:], strict=True):
+        assert line.startswith(name)
+        assert f"{hits(rows, name)} of {REPEATS}" in line
 
 
 @pytest.mark.slow

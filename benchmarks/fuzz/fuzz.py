@@ -1,4 +1,4 @@
-"""Readers of other people's files on damaged files: what becomes of each.
+"""Outcomes of reading damaged files.
 
     python benchmarks/fuzz/fuzz.py [--cases 100000] [--only .vtu .npz]
 
@@ -44,7 +44,7 @@ WORDS = (b"\x00" * 8, b"\xff" * 8, b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\
 
 @st.composite
 def damages(draw):
-    """How a file is damaged: up to four changes, each a kind, two places and what is put there."""
+    """Draw up to four changes of a file, each a kind, two places and a value."""
     return draw(
         st.lists(
             st.tuples(
@@ -60,7 +60,7 @@ def damages(draw):
 
 
 def damaged(content, other, changes):
-    """The content with the changes made to it."""
+    """Return the content with the changes applied."""
     data = bytearray(content)
     for kind, first, second, value in changes:
         size = len(data)
@@ -87,7 +87,7 @@ def damaged(content, other, changes):
 
 
 def replace_number(data, at, number):
-    """Put a number in the place of the next one that is written in digits."""
+    """Replace the next number in digits."""
     digits = b"0123456789.+-eE"
     start = at
     while start < len(data) and data[start] not in b"0123456789":
@@ -99,7 +99,7 @@ def replace_number(data, at, number):
 
 
 def read(source):
-    """Exit code for what becomes of a source."""
+    """Return the index in `OUTCOMES` of reading a source."""
     try:
         source.survey()
         for count, _ in enumerate(source.frames(RASTER)):
@@ -122,7 +122,7 @@ class Reader:
         self._left = 0
 
     def outcome(self, source):
-        """Return what becomes of a source."""
+        """Return the outcome of reading a source."""
         if self._left == 0:
             self._start()
         self._left -= 1
@@ -148,7 +148,7 @@ class Reader:
 
 
 def serve(pipe):
-    """Read sources and answer what became of them, in a fork."""
+    """Read sources in a fork and send the outcomes."""
     devnull = os.open(os.devnull, os.O_WRONLY)
     os.dup2(devnull, 1)
     os.dup2(devnull, 2)
@@ -175,7 +175,7 @@ def read_as_the_product_does(source, name):
 
 
 def fuzz(seed, others, cases, folder, reader, escaped):
-    """Outcomes of damaged copies of one file."""
+    """Count the outcomes of damaged copies of one file."""
     counts = Counter()
     path = folder / seed.name
     twice = Counter()

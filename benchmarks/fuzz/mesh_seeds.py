@@ -39,9 +39,9 @@ def write_meshes(folder: Path) -> None:
     mesh.write(folder / "chip.avs")
     mesh.write(folder / "chip.xdmf", data_format="XML")
     mesh.write(folder / "chip.inp")
+    mesh.write(folder / "chip.dat", file_format="tecplot")
     rows = [f"{number + 1}, {value:.6g}" for number, value in enumerate(grid.point_data["NT11"])]
     (folder / "chip.csv").write_text("\n".join(["node, NT11", *rows]) + "\n")
-    (folder / "chip.dat").write_text(_tecplot(grid))
     _d3plot(grid, folder)
     fields = {"Temperature": grid.point_data["NT11"]}
     write_cgns(folder / "chip.cgns", grid.points, grid.cells_dict[9], fields, {})
@@ -73,19 +73,6 @@ def _ensight(grid, folder):
     writer.Write()
     writer.WriteCaseFile(1)
     next(folder.glob("ensight*.case")).rename(folder / "chip.case")
-
-
-def _tecplot(grid):
-    quads = grid.cells_dict[9] + 1
-    lines = [
-        "TITLE = chip",
-        'VARIABLES = "X", "Y", "NT11"',
-        f"ZONE T=chip, N={grid.n_points}, E={len(quads)}, F=FEPOINT, ET=QUADRILATERAL",
-    ]
-    values = zip(grid.points, grid.point_data["NT11"], strict=True)
-    lines += [f"{point[0]:.6g} {point[1]:.6g} {value:.6g}" for point, value in values]
-    lines += [" ".join(map(str, quad)) for quad in quads]
-    return "\n".join(lines) + "\n"
 
 
 def _tecplot_binary(grid, path):

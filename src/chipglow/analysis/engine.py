@@ -90,6 +90,8 @@ class Analysis:
         Sentences: what limits the validity of the results; what could not be analysed, and why.
     failed : mapping
         Parts of the analysis that failed, by title, with the reason.
+    assumed : tuple of str
+        Sentences on what the scene or the study does not say.
     """
 
     data: xr.Dataset
@@ -104,6 +106,7 @@ class Analysis:
     warnings: tuple[str, ...]
     missing: tuple[str, ...]
     failed: Mapping[str, str]
+    assumed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
