@@ -98,7 +98,7 @@ def expose(
         check,
     )
     _sweep(scene, stack, indices, weights, middles, sums)
-    mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
+    mean, hottest = sums.mean, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
             f"exposure: from {start:g} s, temperature must be {TABLE_COLDEST:g} to "
@@ -107,16 +107,8 @@ def expose(
         )
     hottest[hottest == 0.0] = np.nan
     return tuple(
-        Exposure(
-            start=start,
-            duration=duration,
-            raster=scene.raster,
-            mean_radiance=mean[n],
-            peak_radiance=peak[n],
-            peak_temperature=hottest,
-            centre_radiance=centre[n],
-        )
-        for n in range(len(views))
+        Exposure(start, duration, scene.raster, of_view, peak, hottest, centre)
+        for of_view, peak, centre in zip(mean, sums.peak, sums.centre, strict=True)
     )
 
 

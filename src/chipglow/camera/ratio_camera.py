@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, cast
+from typing import Annotated
 
 import numpy as np
 
@@ -96,19 +96,14 @@ class RatioCamera(Part):
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> tuple[Exposure, Exposure]:
         """Return the exposures of both channels, of one pass if they integrate at the same time."""
-        cameras = self.first, self.second
-        times = [
-            (begin, camera.integration_time)
-            for begin, camera in zip((start, start + self.delay), cameras, strict=True)
-        ]
-        views = views_of(surface, scene, cameras)
-        if times[0] == times[1]:
-            together = expose(scene, views, *times[0])
+        views = views_of(surface, scene, (self.first, self.second))
+        first = start, self.first.integration_time
+        second = start + self.delay, self.second.integration_time
+        if first == second:
+            one, other = expose(scene, views, *first)
         else:
-            together = tuple(
-                expose(scene, [view], *time)[0] for view, time in zip(views, times, strict=True)
-            )
-        return cast(tuple[Exposure, Exposure], together)
+            (one,), (other,) = expose(scene, views[:1], *first), expose(scene, views[1:], *second)
+        return one, other
 
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
