@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import IO, Any, Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import check_samples
@@ -46,6 +45,8 @@ class Snapshot:
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """Return the numbers of the atoms by column, with their places as ``x``, ``y``, ``z``."""
+        import pandas as pd
+
         check_samples(f"{self.path}: a frame", self.count * len(self.labels))
         with self.path.open("rb") as stream, reading(self.path):
             stream.seek(self.start)

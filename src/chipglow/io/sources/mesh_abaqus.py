@@ -5,15 +5,17 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
 from chipglow.io.sources.mesh_reader import Block, MeshReader, grid_of
 from chipglow.io.sources.source import SourceError, reading
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _SOLID: Final = re.compile(r"(?:C3D|DC3D|SC)(\d+)")
 _FLAT: Final = re.compile(r"(?:CPE|CPS|CAX|CGAX|DC2D|DCAX|SAX|S|STRI|R2D|M3D)(\d+)")
@@ -184,8 +186,10 @@ def _block(deck: _Deck, tables: Sequence[Path]) -> Block:
     return Block((), grid, sets)
 
 
-def _read_table(file: Path) -> pd.DataFrame:
+def _read_table(file: Path) -> "pd.DataFrame":
     """Return a table of fields, whose index of labels has the name node or element."""
+    import pandas as pd
+
     with reading(file, "a table of numbers"):
         table = pd.read_csv(
             file, index_col=0, skipinitialspace=True, encoding_errors="replace", dtype=np.float64
@@ -198,7 +202,7 @@ def _read_table(file: Path) -> pd.DataFrame:
     return table.rename_axis(index=label)
 
 
-def _columns(table: pd.DataFrame, labels: Iterable[int]) -> dict[str, NDArray[np.float64]]:
+def _columns(table: "pd.DataFrame", labels: Iterable[int]) -> dict[str, NDArray[np.float64]]:
     """Return the mean of each field at each label, NaN where there is no row."""
     means = table.groupby(level=0).mean().reindex(list(labels))
     return {str(name).strip(): values.to_numpy(np.float64) for name, values in means.items()}

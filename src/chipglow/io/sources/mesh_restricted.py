@@ -7,15 +7,16 @@ divided by the number of all elements there.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from chipglow.io.sources.conventions import COMMON_NAMES, match_names, simple
 from chipglow.io.sources.mesh_reader import Block, fields_of, offsets_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Frames: TypeAlias = Sequence[Sequence[Block]]
 BlockFields: TypeAlias = Mapping[tuple[str, ...], str | None]
@@ -122,6 +123,8 @@ def _is_blank(values: Any) -> NDArray[np.bool_]:
 
 def _elements_at_nodes(blocks: Sequence[Block]) -> "pd.Series[int]":
     """Return how many elements of all blocks are at each node, by the node's number."""
+    import pandas as pd
+
     counts = [
         pd.Series(
             np.bincount(np.asarray(block.grid.cell_connectivity), minlength=block.grid.n_points),
@@ -138,6 +141,8 @@ def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None")
     At a node that blocks share the restored value is taken if it is nearer to the mean of the
     other nodes of the block's elements there.
     """
+    from scipy.sparse import csr_array
+
     values = np.array(values, np.float64)
     if counts is None:
         return values

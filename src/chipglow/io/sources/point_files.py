@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_vtk
@@ -131,6 +130,8 @@ def _of_snapshot(snapshot: Snapshot) -> PointTable:
 
 
 def _read_text(path: Path) -> PointTable:
+    import pandas as pd
+
     with reading(path):
         table = TextTable.look_at(path)
         labels = [re.split(r"[\[(]", cell)[0].strip() or cell for cell in table.cells]

@@ -3,11 +3,12 @@
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, Final
 
 from chipglow.io.sources.source import SourceError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _LARGEST_TABLE: Final = 1_000_000_000
 _LONGEST_LINE: Final = 4_000_000
@@ -47,8 +48,10 @@ class TextTable:
         table._check_end()
         return table
 
-    def read(self, **options: Any) -> pd.DataFrame:
+    def read(self, **options: Any) -> "pd.DataFrame":
         """Read the table by `pandas.read_csv` with more of its options."""
+        import pandas as pd
+
         with self.path.open(encoding="utf-8-sig") as stream:
             return pd.read_csv(
                 stream,
