@@ -26,8 +26,8 @@ from chipglow.cutting import (
     SolverError,
 )
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
+from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import is_intact
-from chipglow.io.interrupts import uninterrupted
 from chipglow.quantities import adapter, unchecked
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
