@@ -13,7 +13,7 @@ from chipglow.camera.exposure import View, expose
 from chipglow.camera.sweep import STEPS_PER_KELVIN
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
-from chipglow.io.chunks import read_chunk
+from chipglow.io.packing import read_chunk
 from chipglow.io.spline_file import STEPS
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, SceneError, ToolGeometry
@@ -105,20 +105,6 @@ def test_samples_are_those_of_the_b_splines():
             expected = np.where(frame.lattice.in_tool, tool, expected)
         scale = np.abs(frame.nodes[number]).max()
         np.testing.assert_allclose(getattr(found, name), expected, rtol=0, atol=4e-7 * scale)
-
-
-def test_linear_coefficients_make_a_linear_field():
-    frame = a_spline_frame()
-    lattice = frame.lattice
-    x = lattice.left + CELL * np.arange(lattice.columns)
-    y = lattice.top - CELL * np.arange(lattice.rows)
-    frame.nodes[1] = 0.4 + 2e3 * x - 3e3 * y[:, None]
-    frame.limits[1] = (-10.0, 10.0)
-    found = frame.frame(("plastic_strain",))
-    exact = 0.4 + 2e3 * RASTER.x - 3e3 * RASTER.y[:, None]
-    there = found.material == Material.WORKPIECE
-    np.testing.assert_allclose(found.plastic_strain[there], exact[there], rtol=0, atol=1e-6)
-    assert found.velocity_x is None and found.material_x is None
 
 
 def test_nodes_that_do_not_reach_the_samples_are_refused():
@@ -359,7 +345,7 @@ def test_the_table_of_radiance_is_close_enough():
     temperature[0, 0] = 250.0 + (np.arange(50) + 0.5) / STEPS_PER_KELVIN  # the worst places
     raster = Raster(0.0, 0.0, 1e-6, 40, 50)
     scene = Scene.from_fields(raster, [0.0], {"temperature": temperature})
-    (found,) = expose(scene, [View(UniformSurface(1.0), BAND)], 0.0, 1e-6)
+    (found,) = expose(scene, [View(UniformSurface(1.0).on(scene), BAND)], 0.0, 1e-6)
     np.testing.assert_allclose(
         found.mean_radiance, BAND.radiance(temperature[0].astype(float)), rtol=6e-7
     )
