@@ -165,8 +165,8 @@ class Reflections:
         black = np.where(void, self.surroundings, black)
         values = np.where(void, 1.0, values)
         result = np.full((len(sections.rows), values.shape[1]), self.surroundings)
-        result[touching] = self.elements.exchange.seen(
-            TOWARD_CAMERA, black, values, self.surroundings, self.mirror
+        result[touching] = self.elements.exchange.incident(
+            black, values, self.surroundings, self.mirror, TOWARD_CAMERA
         )
         return result
 

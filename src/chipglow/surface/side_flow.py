@@ -7,7 +7,7 @@ from math import cos, pi, radians, sin
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from chipglow.quantities import Family, Parameter
 from chipglow.quantities.units import ANGLE, LENGTH, POSITION
@@ -121,16 +121,6 @@ class SideShape(Modifier):
             directions[-1].slope_ratio(cosines) if directions else np.ones(cosines.shape),
         )
 
-    def incident(
-        self,
-        radiance: ArrayLike,
-        emissivity: ArrayLike,
-        surroundings: float = 0.0,
-    ) -> NDArray[np.float64]:
-        """Return the incident radiance whose reflection the camera sees, as `Exchange.seen`."""
-        seen = self.elements.exchange.seen
-        return seen(TOWARD_CAMERA, radiance, emissivity, surroundings, self.mirror)
-
     def effective_emissivity(
         self, chip: float, tool: float, tool_radiance: float = 1.0, surroundings: float = 0.0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -144,7 +134,10 @@ class SideShape(Modifier):
         black[elements.chip], emissivities[elements.chip] = 1.0, chip
         emissivities[elements.face] = tool if self.rake_emissivity is None else self.rake_emissivity
         seen = emissivities * black
-        seen += (1.0 - emissivities) * self.incident(black, emissivities, surroundings)
+        incident = elements.exchange.incident
+        seen += (1.0 - emissivities) * incident(
+            black, emissivities, surroundings, self.mirror, TOWARD_CAMERA
+        )
         return elements.depths[elements.chip], seen[elements.chip]
 
 
