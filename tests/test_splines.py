@@ -188,24 +188,6 @@ def test_xarray_sees_the_samples(tmp_path):
     assert scene.data["velocity_y"].shape == (6, *RASTER.shape)
 
 
-def test_a_second_look_reads_nothing(tmp_path, monkeypatch):
-    for name, options in (("splines.nc", {}), ("samples.nc", {"samples": True})):
-        path = a_file(tmp_path / "first.nc")
-        write_scene(open_scene(path), tmp_path / name, **options)
-        scene = open_scene(tmp_path / name)
-        first = scene.frame(3)
-
-        def refuse(*_):
-            raise AssertionError("read again")
-
-        with monkeypatch.context() as patch:
-            patch.setattr("chipglow.io.scene_file.read_chunk", refuse)
-            again = scene.frame(3)
-            with pytest.raises(AssertionError, match="read again"):
-                scene.frame(4)
-        np.testing.assert_array_equal(again.temperature, first.temperature)
-
-
 def test_splines_go_on_from_a_checkpoint(tmp_path):
     def frames(first, last):
         return [a_spline_frame(index, index * STEP).frame() for index in range(first, last)]

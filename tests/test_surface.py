@@ -20,7 +20,6 @@ from chipglow.surface import (
     shear_band_fraction,
 )
 from chipglow.surface.cubic import cubic_convolution
-from chipglow.surface.emissivity import REACH
 from chipglow.surface.feature import _blend, _sum_velocities
 from chipglow.surface.texture import MAP_SIZE, _look_up
 
@@ -75,15 +74,6 @@ def test_enlarging_is_bicubic(u, v):
     assert map_.at(u, v) == pytest.approx(expected, abs=3e-7)
 
 
-def test_the_map_repeats():
-    map_ = texture()
-    x, y = np.random.default_rng(3).uniform(-1e-3, 1e-3, (2, 500))
-    period = 2.56e-3
-    shifted = map_.at(x + period, y - 2 * period)
-    # Adding a period moves a position in double precision by 1e-13 of a grain.
-    np.testing.assert_allclose(shifted, map_.at(x, y), atol=1e-6)
-
-
 def test_restoring_gives_the_deviation_asked_for():
     # The sampled standard deviation is good to 1e-4 of itself.
     assert texture(0.42, 0.07).standard_deviation == pytest.approx(0.07, rel=1e-4)
@@ -122,18 +112,6 @@ def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, s
     error = 1.25 * standard_deviation / (MAP_SIZE * np.sqrt(12))
     assert values.mean() == pytest.approx(mean, abs=4 * error)
     assert values.std() == pytest.approx(standard_deviation, abs=4 * error * 2)
-
-
-@given(st.floats(-5.0, 5.0))
-def test_the_papers_emissivities_are_normal(deviate):
-    for surface in (CHIP_1, CHIP_2):
-        for feature in (surface.chip, surface.shear_band, surface.workpiece, surface.tool):
-            table = feature.table.astype(np.float64)
-            assert feature.is_normal
-            found = np.interp(deviate, np.linspace(-REACH, REACH, table.size), table)
-            # Entries of the table are float32 numbers below 1, rounded by at most 2^-25.
-            expected = feature.mean + feature.standard_deviation * deviate
-            assert found == pytest.approx(expected, abs=2.0**-24)
 
 
 def test_surfaces_beside_each_other_are_those_alone():

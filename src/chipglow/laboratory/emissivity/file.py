@@ -29,13 +29,7 @@ from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivitie
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
-from chipglow.surface import (
-    SURFACES,
-    EmissivityTrend,
-    MapSurface,
-    Surface,
-    TrendSurface,
-)
+from chipglow.surface import SURFACES, EmissivityTrend, MapSurface, Surface, TrendSurface
 from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
