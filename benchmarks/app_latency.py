@@ -70,7 +70,7 @@ def main():
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
             try:
                 times = measured(browser, server.stdout.readline().split()[-1], given)
-                report(times, time_to(begun, times), server.pid, given.scene)
+                report(times, times.pop("opened") - begun, server.pid, given.scene)
             finally:
                 server.terminate()
         browser.close()
@@ -107,11 +107,6 @@ def turned(page, label, turns):
     page.get_by_text("Exact picture").wait_for(timeout=60_000)
     page.wait_for_timeout(300)
     return page.evaluate("lines => [chipglowLog.first, lines, chipglowLog.last]", lines)
-
-
-def time_to(begun, times):
-    """Seconds from the start of the process to the first exact picture."""
-    return times.pop("opened") - begun
 
 
 def report(times, opened, process, scene):

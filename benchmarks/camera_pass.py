@@ -75,18 +75,16 @@ BORDER, LEAST = 12, 573.15  # pixels and K: images are compared within and above
 LIMITS = {"temperature": (293.0, 1100.0), "plastic_strain": (0.0, 3.0)}
 
 
-class GivenSurface(Surface, EmissivityField):
+class GivenSurface(Surface):
     """A surface with given emissivities."""
-
-    needs = ()
 
     def __init__(self, values, times):
         self.values, self.times = values, times
 
-    def on(self, scene):
-        return self
+    def on(self, scene, band=None, reflected=None):
+        return EmissivityField(self.of, frozenset())
 
-    def emissivity(self, frame):
+    def of(self, frame):
         return self.values[np.argmin(np.abs(self.times - frame.time))]
 
 

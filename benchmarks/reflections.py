@@ -30,7 +30,6 @@ from chipglow.surface import (
     CHIP_2,
     Emissivity,
     FeatureSurface,
-    ReflectingSurface,
     Surface,
     Wedge,
 )
@@ -118,7 +117,7 @@ def differences(face: Face, chip: FeatureSurface, draws: int) -> np.ndarray:
             drawn(chip.chip.mean, chip.chip.standard_deviation, generator),
             drawn(chip.tool.mean, chip.tool.standard_deviation, generator),
         )
-        found.append((face.peak(bare), face.peak(ReflectingSurface(bare, wedge))))
+        found.append((face.peak(bare), face.peak(bare.modified(wedge))))
     return np.array(found)
 
 
@@ -165,7 +164,7 @@ def by_shape(faces: dict[str, Face], angles: Iterable[float]) -> list[list[str]]
 
 def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
     bare = flat(chip, chip.chip.mean, chip.tool.mean)
-    return face.peak(ReflectingSurface(bare, wedge)) - face.peak(bare)
+    return face.peak(bare.modified(wedge)) - face.peak(bare)
 
 
 def main() -> None:

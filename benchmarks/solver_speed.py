@@ -14,16 +14,14 @@ import argparse
 from dataclasses import replace
 from importlib.util import find_spec
 from time import perf_counter
-from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange, set_num_threads
 from solver import DENSITY, FAR, Block
 
 from chipglow.cutting import AISI_1045
-from chipglow.cutting.damage import Damage
-from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
-from chipglow.cutting.points import POINT, Grid, Points, sort_by_cell
+from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, advance_with
+from chipglow.cutting.points import POINT, sort_by_cell
 
 STEEL = replace(AISI_1045, young_modulus=205e9, poisson_ratio=0.29, density=DENSITY)
 """Elastic constants and density of AISI 1045 at room temperature: Warp's step knows no others."""
@@ -39,20 +37,6 @@ the last sorting. Here it is the same: points begin a quarter of a cell from its
 less. The same arithmetic thus gives the same to rounding (3e-14 when Newton's method goes on to the
 end). But Newton's method stops at a change of 2 %, in Warp for each point by itself, in chipglow
 when the last point of a batch has converged: that changes the return of stress by about 2e-5."""
-
-
-class Start(NamedTuple):
-    """Starting state of every implementation."""
-
-    points: Points
-    velocity: np.ndarray
-    grid: Grid
-    step: Step
-    law: Any
-    damage: Damage
-    elastic: np.ndarray
-    capacity: np.ndarray
-    heat_fractions: np.ndarray
 
 
 def sheared_block(side):
@@ -71,23 +55,17 @@ def sheared_block(side):
     strength = 360e6 * (1 - 0.42 * band**2) * (1 - 0.5 * band**2)
     points["dxy"] = strength * np.clip(4 * band, -1, 1)
     block.advance(WARM_UP)
+    points = np.zeros_like(block.points)
+    sort_points(block, points)
+    block.points = points
     return block
 
 
-def start_of(block):
-    points = np.zeros_like(block.points)
-    sort_by_cell(block.points, block.count, block.grid, FAR, FAR, points, block.starts)
-    return Start(
-        points,
-        block.velocity,
-        block.grid,
-        block.step,
-        block.law,
-        block.damage,
-        block.elastic,
-        block.capacity,
-        block.heat_fractions,
-    )
+def sort_points(block, target):
+    """Sort the points of a block by cell into `target`; return where each cell begins."""
+    starts = np.zeros_like(block.starts)
+    sort_by_cell(block.points, block.count, block.grid, FAR, FAR, target, starts)
+    return starts
 
 
 class Chipglow:
@@ -103,11 +81,10 @@ class Chipglow:
         self.points = start.points.copy()
         self.nodes, self.heat = np.zeros((*shape, NODE_VALUES)), np.zeros(shape)
         self.sums = np.zeros(SUMS)
-        self.starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
         self.tool = Block((CELL, CELL), CELL).tool
 
     def reset(self):
-        sort_points(self.start, self.points, self.starts)
+        self.starts = sort_points(self.start, self.points)
         self.velocity = self.start.velocity.copy()
         self.nodes[:] = 0.0
 
@@ -124,11 +101,6 @@ class Chipglow:
 
     def result(self):
         return {name: self.points[name] for name in COMPARED}
-
-
-def sort_points(start, target, starts):
-    """Sort the starting points by cell into `target`."""
-    sort_by_cell(start.points, start.points.size, start.grid, FAR, FAR, target, starts)
 
 
 def fastest(call, rounds):
@@ -156,9 +128,8 @@ def copy_bandwidth(threads):
 
 def sort_seconds(start):
     """Return the seconds to sort the points by cell once."""
-    starts = np.zeros(start.grid.columns * start.grid.rows + 1, np.int64)
     target = np.empty_like(start.points)
-    return fastest(lambda: sort_points(start, target, starts), 3)
+    return fastest(lambda: sort_points(start, target), 3)
 
 
 def check(stepper, ours):
@@ -179,7 +150,7 @@ def check(stepper, ours):
 
 def measure(side, threads, peer, rounds, bandwidth):
     """Time one number of points and print its rows."""
-    start = start_of(sheared_block(side))
+    start = sheared_block(side)
     points, plastic = start.points.size, np.mean(start.points["increment"] > 0)
     failing = np.mean(start.points["damage"] >= 1)
     fraction = sort_seconds(start) / STEPS / points

@@ -41,14 +41,14 @@ ROUNDING = 1e-4
 SECOND_RADIATION_CONSTANT = 1.438777e-2  # m K
 
 
-class Painted(Surface, EmissivityField):
+class Painted(Surface):
     """Emissivity given for every frame."""
 
     def __init__(self, times, values):
         self.times, self.values = times, values
 
-    def on(self, scene):
-        return self
+    def on(self, scene, band=None, reflected=None):
+        return EmissivityField(self.emissivity)
 
     def emissivity(self, frame):
         return self.values[int(np.argmin(np.abs(self.times - frame.time)))]
@@ -145,7 +145,7 @@ def test_the_ends_of_the_tables_are_as_exact(temperature):
 def test_peaks_and_centre():
     scene, surface = random_scene(frames=5)
     band = Camera().band
-    (exposure,) = expose(scene, [View(surface, band)], 0.0, 5 * STEP)
+    (exposure,) = expose(scene, [View(surface.on(scene), band)], 0.0, 5 * STEP)
     temperature = scene.data["temperature"].values
     radiance = surface.values * band.radiance(temperature.astype(np.float64))
     # float32 has a step of 6e-8, the look-up is within 4e-7
@@ -205,7 +205,8 @@ def test_exposures_beside_a_gap_are_taken():
 def test_peaks_count_only_what_the_exposure_covers():
     temperature = np.full((4, 9, 9), 800.0)
     temperature[3] = 1500.0
-    (exposure,) = expose(make_scene(temperature), [View(BLACK, Camera().band)], 0.0, 3 * STEP)
+    scene = make_scene(temperature)
+    (exposure,) = expose(scene, [View(BLACK.on(scene), Camera().band)], 0.0, 3 * STEP)
     assert exposure.peak_temperature.max() == 800.0
 
 

@@ -99,13 +99,11 @@ def test_pixels_and_places_may_differ():
         assert np.isfinite(away).sum() > 30
         # A ten-thousandth of a kelvin for the way through radiance.
         assert np.nanmax(np.abs(away)) < 1e-3
-    assert [fit.agreeing for place in result.places for fit in place.fits] == [
-        fit.count for place in result.places for fit in place.fits
-    ]
-    assert len(result.places) == 4
-    count = sum(place.fits[0].count for place in result.places)
+    assert (result.fits["values_with_E_n_up_to_1"] == result.fits["values"]).all()
+    assert len(result.fits) == 4
+    count = result.fits["values"].sum()
     assert result.statement == f"same: {count} of {count} values agree (E_n up to 1)."
-    assert "same is 0 K too" in result.places[0].sentence
+    assert "same is 0 K too" in result.sentences[0]
 
 
 def test_bias_and_rms_by_hand():
@@ -113,14 +111,14 @@ def test_bias_and_rms_by_hand():
     result = compare(frames(field(X, Y)), {"hotter": frames(hotter)}, TOOL, CURVE, STATED)
     assert result.band is not None
     away = result.band.simulated[0].values - result.band.measured.values
-    near, far = result.places[2:]
+    near, far = result.fits.iloc[2:].iloc
     # The curve rises at 45 degrees, so 100 µm from the edge it is 71 µm up.
-    assert far.fits[0].bias == pytest.approx(20.0, abs=1e-6)
-    assert far.fits[0].rms == pytest.approx(20.0, abs=1e-6)
+    assert far.bias_K == pytest.approx(20.0, abs=1e-6)
+    assert far.rms_K == pytest.approx(20.0, abs=1e-6)
     values = away[np.isfinite(away) & (result.band.distance < 100e-6)]
-    assert near.fits[0].bias == pytest.approx(values.mean())
-    assert near.fits[0].rms == pytest.approx(np.sqrt((values**2).mean()))
-    assert near.fits[0].rms > near.fits[0].bias > 0
+    assert near.bias_K == pytest.approx(values.mean())
+    assert near.rms_K == pytest.approx(np.sqrt((values**2).mean()))
+    assert near.rms_K > near.bias_K > 0
 
 
 # Uncertainty
@@ -148,7 +146,7 @@ def test_the_uncertainty_is_made_of_its_parts():
             part.simulated[0].standard_uncertainty[known], 0.1 * kelvin, rtol=1e-3
         )
     expected = kelvin * hypot(0.03, 0.1)
-    assert result.places[0].fits[0].bias_uncertainty == pytest.approx(expected, rel=1e-3)
+    assert result.fits["bias_standard_uncertainty_K"][0] == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_position_counts_where_the_temperature_rises():
@@ -217,12 +215,11 @@ def test_the_best_set_is_told_for_each_place():
         "b": frames(base - np.where(on_face, 60.0, 0.0)),
     }
     result = compare(frames(base), sets, TOOL, CURVE, STATED)
-    assert [place.fits[place.best].label for place in result.places] == ["a", "b", "b", "b"]
-    assert all(place.is_sure for place in result.places)
-    assert result.places[0].sentence.startswith(
+    assert result.best["simulation"].tolist() == ["a", "b", "b", "b"]
+    assert result.sentences[0].startswith(
         "At the rake face, up to 18 µm deep, a fits best (in 100 % of the draws"
     )
-    assert "b is 60 K too cold" in result.places[0].sentence
+    assert "b is 60 K too cold" in result.sentences[0]
     assert result.statement == (
         "a fits best at the rake face, up to 18 µm deep. b fits best in the chip, over 18 µm from "
         "the face; in the shear band, under 100 µm from the edge; in the shear band, 100 µm and "
@@ -239,12 +236,10 @@ def test_how_sure_the_best_is(cold, hot, stated):
     sets = {"cold": frames(base - cold), "hot": frames(base + hot)}
     result = compare(frames(base), sets, TOOL, CURVE, StatedUncertainties(temperature=stated))
     expected = 0.5 * (1 + erf((hot - cold) / 2 / stated / sqrt(2)))
-    for place in result.places:
-        assert place.best == 0
-        # 4000 draws: 0.8 %.
-        assert place.confidence == pytest.approx(expected, abs=0.025)
-        assert not place.is_sure
-        assert "cannot be distinguished (cold is nearest" in place.sentence
+    assert set(result.best["simulation"]) == {"cold"}
+    # 4000 draws: 0.8 %.
+    np.testing.assert_allclose(result.best["confidence"], expected, atol=0.025)
+    assert all("cannot be distinguished (cold is nearest" in one for one in result.sentences)
     assert result.statement.startswith("The sets cannot be distinguished")
 
 
@@ -281,11 +276,11 @@ def test_the_reference_says_which_frames_are_compared():
     images[1] = images[1] + 30.0
     one, other = measured([images[0], images[1]]), frames(images[0])
     early, late = (
-        compare(one, {"a": other}, TOOL, stated=STATED, reference=number).places[-1].fits[0]
+        compare(one, {"a": other}, TOOL, stated=STATED, reference=number).fits.iloc[-1]
         for number in (0, 1)
     )
-    assert early.bias == pytest.approx(0.0, abs=1e-6)
-    assert late.bias < -10.0
+    assert early.bias_K == pytest.approx(0.0, abs=1e-6)
+    assert late.bias_K < -10.0
 
 
 # What cannot be compared
@@ -298,7 +293,7 @@ def test_without_a_band_the_rake_face_is_left():
     assert any(
         "The shear band is left out: measured:" in warning for warning in result.notes.warnings
     )
-    assert all("rake face" in place.place or "chip" in place.place for place in result.places)
+    assert result.fits["place"].str.contains("rake face|chip").all()
 
 
 COLD = frames(np.full(RASTER.shape, 500.0))

@@ -9,8 +9,8 @@ import pytest
 from test_io import a_file, a_measurement
 
 from chipglow.io import digest, open_scene, write_measurement
-from chipglow.io.chunks import COMPRESSION, chunk_of, read_chunk
 from chipglow.io.digest import is_intact
+from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import open_arrays
 

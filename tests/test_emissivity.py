@@ -343,7 +343,7 @@ DARK = np.full((1, *RASTER.shape), Flag.SATURATED, np.uint8)
             lambda: emissivity_line(2 * [determined().of(WHOLE).line]),
             "the temperatures are all the same",
         ),
-        (lambda: MapSurface(np.full((3, 3), 0.5), RASTER), "has shape"),
+        (lambda: MapSurface(np.full((3, 3), 0.5), RASTER), "have shape"),
         (
             lambda: MapSurface(np.full(RASTER.shape, 1.01), RASTER),
             "goes from 1.01 to 1.01, expected 0 to 1",
@@ -549,9 +549,13 @@ def test_draws_of_a_line_have_its_covariance(folder):
     # 400 draws: their standard deviation is known to 3.5 %; three of them.
     assert np.std(drawn) == pytest.approx(np.sqrt(weights @ body.covariance @ weights), rel=0.11)
     # Both regions were heated by one thermocouple, whose error is nearly all there is.
-    chip = FeatureTrends(replace(CHIP_1, follow="none"), {"chip": body, "shear_band": band})
-    fields = [chip.redrawn(k).on(scene) for k in range(1, 101)]
-    pairs = [[one.at(664.0) for one in field.trends.values()] for field in fields]
+    trends = FeatureTrends({"chip": body, "shear_band": band})
+    scenes = [even_scene(664.0, rate=rate) for rate in (0.0, 5e4)]
+    half = np.full(RASTER.shape, 0.5, np.float32)
+    pairs = []
+    for k in range(1, 101):
+        change = trends.redrawn(k).change(CHIP_1, scene, None, None)
+        pairs.append([change(half, one.frame(0))[0, 0] for one in scenes])
     assert np.corrcoef(np.array(pairs).T)[0, 1] > 0.99
 
 

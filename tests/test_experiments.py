@@ -137,16 +137,6 @@ def test_a_cut_is_computed_once_and_anew_at_other_settings(tmp_path, monkeypatch
     assert asked == [coarse, fine, faster, coarse]
 
 
-def test_an_interrupted_cut_keeps_nothing(tmp_path, monkeypatch):
-    def stop(_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(experiments, "compute", stop)
-    with pytest.raises(KeyboardInterrupt):
-        experiments.means_of(experiment().simulation(20e-6, 2e-3), "ours", tmp_path)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_drift_is_the_change_of_the_mean_from_half_to_half():
     time = 1e-6 * np.arange(1, 101)
     # Forty records do not count; the halves of what is left have means of 340 and 374 kN/m.

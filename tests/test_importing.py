@@ -251,14 +251,14 @@ def test_the_patience_follows_the_size_of_the_files(tmp_path):
 
     small, large = sparse("a/small_1.vtu", 1000), sparse("a/small_2.vtu", 200_000_000)
     sparse("a/store.zarr/c", 50_000_000)
-    assert patience_for(MeshSource(small).inputs) == pytest.approx(30.001)
-    assert patience_for(MeshSource(large).inputs) == pytest.approx(230.0)
+    assert patience_for(MeshSource(small).inputs) == pytest.approx(60.001)
+    assert patience_for(MeshSource(large).inputs) == pytest.approx(260.0)
     # Files of a pattern together; a collection names files of its folder and of those below.
-    assert patience_for(MeshSource(small.parent / "small_*.vtu").inputs) == pytest.approx(230.001)
-    assert patience_for(MeshSource(small.parent / "all.pvd").inputs) == pytest.approx(280.001)
-    assert patience_for(GridSource(str(small.parent / "store.zarr")).inputs) == pytest.approx(80.0)
+    assert patience_for(MeshSource(small.parent / "small_*.vtu").inputs) == pytest.approx(260.001)
+    assert patience_for(MeshSource(small.parent / "all.pvd").inputs) == pytest.approx(310.001)
+    assert patience_for(GridSource(str(small.parent / "store.zarr")).inputs) == pytest.approx(110.0)
     assert patience_for((str(sparse("b/huge.npy", 10**12)),)) == 1800.0
-    assert patience_for((str(tmp_path / "none.vtu"),)) == 30.0
+    assert patience_for((str(tmp_path / "none.vtu"),)) == 60.0
     assert Isolated(MeshSource(large), "large").inputs == (str(large),)
 
 

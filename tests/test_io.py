@@ -110,6 +110,15 @@ def test_scene_comes_back(tmp_path):
     assert leftovers(tmp_path) == ["scene.nc"]
 
 
+def test_fields_of_64_bits_are_kept_in_those_of_the_file(tmp_path):
+    wide = {
+        name: getattr(a_frame(), name).astype(np.float64)
+        for name in ("temperature", "plastic_strain", "velocity_x", "material_x")
+    }
+    write_frame(tmp_path / "scene.nc", a_frame(**wide))
+    assert_as_kept(open_scene(tmp_path / "scene.nc").frame(0), a_frame())
+
+
 def test_the_fast_way_reads_what_xarray_reads(tmp_path):
     scene = open_scene(a_file(tmp_path))
     for name in (*FIELD_UNITS, "material_x", "material_y"):

@@ -8,16 +8,15 @@ from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import (
-    OxidisedSurface,
     ParabolicOxide,
-    ReflectingSurface,
     UniformSurface,
+    Wedge,
 )
 
 RASTER = Raster(0.0, 60e-6, 1e-6, 60, 80)
 OXIDE = ParabolicOxide()
 BARE = 0.42
-SURFACE = OxidisedSurface(UniformSurface(BARE), OXIDE)
+SURFACE = UniformSurface(BARE).modified(OXIDE)
 
 
 def scene(times, temperature, speed=0.0, material=1):
@@ -36,15 +35,15 @@ def scene(times, temperature, speed=0.0, material=1):
     return Scene.from_fields(RASTER, times, fields)
 
 
-def grown(made, index, surface=SURFACE):
-    return surface.on(made).thickness(made.frame(index))
+def grown(made, index, oxide=OXIDE):
+    return oxide.history(made).thickness(made.frame(index))
 
 
 @given(st.floats(500.0, 1400.0), st.floats(1e-6, 1e-3), st.floats(0.0, 20e-9))
 @settings(max_examples=20)
 def test_at_one_temperature_it_is_the_root_of_time(kelvins, duration, initial):
     made = scene(np.linspace(0, duration, 4), lambda t, x, y: np.full(x.shape, kelvins))
-    found = grown(made, 3, OxidisedSurface(UniformSurface(BARE), ParabolicOxide(initial)))
+    found = grown(made, 3, ParabolicOxide(initial))
     expected = np.sqrt(initial**2 + OXIDE.growth(kelvins) * duration)
     # Scenes and sums are float32.
     np.testing.assert_allclose(found, expected, rtol=1e-5)
@@ -83,15 +82,14 @@ def test_oxide_follows_the_material_and_not_the_place():
         return np.where((x > 20e-6) & (x < 32e-6), 1200.0, 300.0)
 
     made = scene(times, strip, speed)
-    field = SURFACE.on(made)
-    thickness = field.thickness(made.frame(30))
+    thickness = grown(made, 30)
     inside = (RASTER.x - 30e-6 > 24e-6) & (RASTER.x - 30e-6 < 28e-6)  # a cell from the edges
     away = (RASTER.x - 30e-6 < 15e-6) | (RASTER.x - 30e-6 > 37e-6)
     expected = np.sqrt(OXIDE.growth(1200.0) * 30e-6)
     # The strip's 30 um come through 30 frames, in each of which the whole cell is in it.
     np.testing.assert_allclose(thickness[:, inside], expected, rtol=1e-4)
     assert thickness[:, away].max() < 1e-3 * expected
-    emissivity = field.emissivity(made.frame(30))
+    emissivity = SURFACE.on(made).emissivity(made.frame(30))
     np.testing.assert_allclose(emissivity[:, inside], OXIDE.of_thickness(BARE, expected), rtol=1e-6)
 
 
@@ -108,9 +106,8 @@ def test_what_comes_into_view_later_grows_from_then_on():
 
 def test_the_tool_has_none_and_none_is_none():
     made = scene([0.0, 1e-3], lambda t, x, y: np.full(x.shape, 1200.0), material=2)
-    field = SURFACE.on(made)
-    assert not field.thickness(made.frame(1)).any()
-    np.testing.assert_allclose(field.emissivity(made.frame(1)), BARE)
+    assert not grown(made, 1).any()
+    np.testing.assert_allclose(SURFACE.on(made).emissivity(made.frame(1)), BARE)
     assert OXIDE.of_thickness(BARE, 0.0) == BARE
     assert OXIDE.of_thickness(BARE, 1e-3) == pytest.approx(OXIDE.emissivity)
 
@@ -131,9 +128,8 @@ def test_a_scene_without_material_coordinates_is_refused():
 def test_a_study_switches_it_on():
     section = {"oxide": {"kind": "parabolic", "initial": "3 nm"}, "reflections": {"kind": "wedge"}}
     surface = surfaces_of(Study(surface=section).surface, 7)["chip 1"]
-    assert isinstance(surface, ReflectingSurface)
-    assert surface.bare.oxide == ParabolicOxide(initial=3e-9)
-    assert surface.redrawn(2).bare.bare.seed == 9
+    assert surface.modifiers == (ParabolicOxide(initial=3e-9), Wedge())
+    assert surface.redrawn(2).bare.seed == 9
     assert Study().surface.oxide is None
     with pytest.raises(ValueError, match="expected an activation energy such as"):
         Study(surface={"oxide": {"kind": "parabolic", "activation_energy": "0 kJ/mol"}})

@@ -72,25 +72,6 @@ def test_samples_on_shared_edges_and_nodes_belong_to_one_triangle():
     assert counts.sum() == 256
 
 
-def test_area_covered_is_that_of_the_mesh():
-    fine = Raster(left=0.0, top=1.0, spacing=1 / 1000, rows=1000, columns=1000)
-    points, triangles = mesh_of(3, 40, on_samples=False)
-    points = (points + np.array((1.5, 0.5))) / 10
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    area = _area(a, b, c)
-    element = rasterise(fine, points, triangles).element
-    counted = np.bincount(element[element != NOTHING], minlength=len(triangles)) * 1e-6
-    # A row's count of samples is off by less than 1: an error of a sample for each row.
-    height = np.ptp(points[triangles][:, :, 1], axis=1)
-    assert (np.abs(counted - area) <= (height * 1000 + 2) * 1e-6).all()
-    assert abs(counted.sum() - area.sum()) < 1e-3
-
-
-def _area(a, b, c):
-    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
-    return np.abs(ux * vy - uy * vx) / 2
-
-
 def test_elements_have_their_own_value_without_blending():
     points, triangles = mesh_of(5, 30, on_samples=False)
     values = np.random.default_rng(1).uniform(0, 1, (len(triangles), 2)).astype(np.float32)

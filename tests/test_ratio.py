@@ -45,9 +45,9 @@ from chipglow.study import Study
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
-    DispersiveSurface,
+    Dispersion,
     HagenRubens,
-    OxidisedSurface,
+    ParabolicOxide,
     SpectralTable,
     UniformSurface,
 )
@@ -184,8 +184,7 @@ def test_diffraction_grows_with_the_wavelength_and_other_blurs_do_not():
 
 
 def emissivity(surface, band):
-    frame = sloping().frame(0)
-    return surface.in_band(band, None).on(sloping()).emissivity(frame)
+    return surface.on(sloping(), band).emissivity(sloping().frame(0))
 
 
 def test_an_emissivity_that_is_the_laws_stays_the_laws():
@@ -193,8 +192,8 @@ def test_an_emissivity_that_is_the_laws_stays_the_laws():
     there = METAL.in_band(SHORT, None)
     # Both are linear between tables every 5 K: where they bend they are 1e-6 apart.
     np.testing.assert_allclose(
-        emissivity(DispersiveSurface(bare, METAL, LONG), SHORT),
-        there.emissivity(sloping().frame(0)),
+        emissivity(bare.modified(Dispersion(METAL, LONG)), SHORT),
+        emissivity(there, SHORT),
         rtol=1e-5,
     )
 
@@ -207,9 +206,9 @@ def test_the_odds_of_emission_follow_the_law():
     for bare in (0.01, 0.5, 0.9):
         factor = (0.3 / 0.7) / (0.15 / 0.85)
         expected = bare * factor / (1 - bare + bare * factor)
-        found = emissivity(DispersiveSurface(UniformSurface(bare), law, **known), seen)
+        found = emissivity(UniformSurface(bare).modified(Dispersion(law, **known)), seen)
         np.testing.assert_allclose(found, expected, rtol=1e-3)
-        same = emissivity(DispersiveSurface(UniformSurface(bare), grey, **known), seen)
+        same = emissivity(UniformSurface(bare).modified(Dispersion(grey, **known)), seen)
         np.testing.assert_allclose(same, bare, rtol=1e-6)
 
 
@@ -221,12 +220,11 @@ def test_a_study_puts_the_law_under_the_oxide():
             "oxide": {"kind": "parabolic"},
         }
     ).surface.build(1)
-    oxidised = surfaces["chip 1"]
-    assert isinstance(oxidised, OxidisedSurface)
-    assert isinstance(oxidised.bare, DispersiveSurface)
-    assert oxidised.bare.law == METAL and oxidised.bare.measured_in == Band(3e-6, 5e-6)
-    with pytest.raises(ValueError, match="spectral: no band is set"):
-        oxidised.bare.on(sloping())
+    expected = Dispersion(METAL, Band(3e-6, 5e-6)), ParabolicOxide()
+    assert surfaces["chip 1"].modifiers == expected
+    for dispersive in (METAL, UniformSurface(0.4).modified(expected[0])):
+        with pytest.raises(ValueError, match="no band is given"):
+            dispersive.on(sloping())
 
 
 # --- the camera of two bands

@@ -213,15 +213,6 @@ def test_what_the_camera_was_told_is_taken_back(
     assert measured.data.attrs["object_parameters"].endswith("taken back")
 
 
-def test_without_object_parameters_it_is_said_what_is_assumed():
-    measured = calibrate_recording(recording(np.full((1, 2, 2), 900.0), "temperature"))
-    np.testing.assert_allclose(measured.radiance_temperature(), 900.0, atol=1e-3)
-    assert "emissivity of 1" in measured.data.attrs["assumed"]
-    assert "lower left corner" in measured.data.attrs["assumed"]
-    assert "not known" in measured.data.attrs["warnings"]
-    assert measured.calibration_uncertainty is None
-
-
 def test_radiance_is_taken_as_it_is():
     radiance = np.array([[[1000.0, np.inf, -5.0]]])
     told = ObjectParameters(emissivity=0.5)
@@ -249,14 +240,6 @@ def test_full_counts_are_doubted_unless_the_saturation_is_known():
     known = calibrate_recording(recording(counts, saturation=4094), LINE)
     assert "warnings" not in known.data.attrs
     assert (known.flags[0, :2, 0] == Flag.SATURATED).all()
-
-
-def test_what_the_file_does_not_say_is_the_calibrations():
-    calibration = replace(LINE, integration_time=1e-5, range_name="A")
-    measured = calibrate_recording(recording(np.ones((1, 2, 2)), band=None), calibration)
-    assert "integration time is the calibration's" in measured.data.attrs["assumed"]
-    assert "range is the calibration's, A" in measured.data.attrs["assumed"]
-    assert measured.data.attrs["integration_time"] == 1e-5
 
 
 def calibrated(quantity="counts", calibration=LINE, arguments=(), **known):

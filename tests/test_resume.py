@@ -22,8 +22,8 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.points import block_of_points, fastest_point, find_trouble
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
+from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink
-from chipglow.io.interrupts import uninterrupted
 from chipglow.scene import Frame, Raster
 from chipglow.study import cut, is_cut, kept_progress, load_study, running
 

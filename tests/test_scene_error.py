@@ -120,18 +120,18 @@ def test_the_pixel_phase_scatters_at_the_edge_and_not_far_from_it():
 
 
 def test_emissivity_follows_the_temperature():
-    metal = TemperatureSurface((600.0, 700.0), (0.2, 0.8))
+    metal = TemperatureSurface(((600.0, 0.2), (700.0, 0.8)))
     ramp = np.linspace(500.0, 800.0, RASTER.columns) * np.ones((RASTER.rows, 1))
     frame = plate(ramp).frame(0)
     expected = np.clip(0.2 + 0.6 * (ramp - 600.0) / 100.0, 0.2, 0.8)
     np.testing.assert_allclose(metal.on(plate()).emissivity(frame), expected, atol=1e-6)
-    for temperatures, emissivities, wrong in (
-        ((600.0,), (0.2,), "2 or more"),
-        ((700.0, 600.0), (0.2, 0.3), "ascending"),
-        ((600.0, 700.0), (0.2, 1.3), "expected 0 to 1"),
+    for table, wrong in (
+        (((600.0, 0.2),), "2 or more"),
+        (((700.0, 0.2), (600.0, 0.3)), "ascending"),
+        (((600.0, 0.2), (700.0, 1.3)), "expected 0 to 1"),
     ):
         with pytest.raises(ValueError, match=wrong):
-            TemperatureSurface(temperatures, emissivities)
+            TemperatureSurface(table)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from chipglow.radiometry import Band
 from chipglow.radiometry.planck import spectral_radiance
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
-from chipglow.surface import HagenRubens, SpectralTable, TemperatureSurface
+from chipglow.surface import HagenRubens, SpectralTable
 
 BAND = Band(3.8e-6, 5.1e-6)
 RASTER = Raster(0.0, 0.0, 2e-6, 4, 5)
@@ -53,7 +53,7 @@ def test_what_a_camera_sees_of_a_table(temperature, reflected):
 def test_a_grey_table_is_grey():
     grey = SpectralTable(((4e-6, 300.0, 0.37),))
     surface = grey.in_band(BAND, 293.0)
-    np.testing.assert_allclose(surface.emissivities, 0.37, rtol=1e-12)
+    np.testing.assert_allclose(surface.columns[1], 0.37, rtol=1e-12)
 
 
 def test_beyond_its_ends_a_table_is_constant():
@@ -75,8 +75,7 @@ def test_hagen_and_rubens():
 def test_resistivity_grows_with_temperature():
     metal = HagenRubens(1.7e-7, 0.005)
     surface = metal.in_band(BAND, None)
-    assert isinstance(surface, TemperatureSurface)
-    values = np.interp([293.15, 1093.15], surface.temperatures, surface.emissivities)
+    values = surface.at(np.array([293.15, 1093.15]))
     # Resistivity is 5 times as large there; the emissivity nearly goes as its root.
     assert values[1] / values[0] == pytest.approx(np.sqrt(5), rel=0.06)
     # The hotter of two equal bands weights shorter waves: another reason to grow, of some permille.

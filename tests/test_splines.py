@@ -13,7 +13,7 @@ from chipglow.camera.exposure import View, expose
 from chipglow.camera.sweep import STEPS_PER_KELVIN
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
-from chipglow.io.chunks import read_chunk
+from chipglow.io.packing import read_chunk
 from chipglow.io.spline_file import STEPS
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, SceneError, ToolGeometry
@@ -107,20 +107,6 @@ def test_samples_are_those_of_the_b_splines():
         np.testing.assert_allclose(getattr(found, name), expected, rtol=0, atol=4e-7 * scale)
 
 
-def test_linear_coefficients_make_a_linear_field():
-    frame = a_spline_frame()
-    lattice = frame.lattice
-    x = lattice.left + CELL * np.arange(lattice.columns)
-    y = lattice.top - CELL * np.arange(lattice.rows)
-    frame.nodes[1] = 0.4 + 2e3 * x - 3e3 * y[:, None]
-    frame.limits[1] = (-10.0, 10.0)
-    found = frame.frame(("plastic_strain",))
-    exact = 0.4 + 2e3 * RASTER.x - 3e3 * RASTER.y[:, None]
-    there = found.material == Material.WORKPIECE
-    np.testing.assert_allclose(found.plastic_strain[there], exact[there], rtol=0, atol=1e-6)
-    assert found.velocity_x is None and found.material_x is None
-
-
 def test_nodes_that_do_not_reach_the_samples_are_refused():
     with pytest.raises(ValueError, match=r"lattice: 5 rows of nodes, expected them to reach"):
         replace(a_lattice(), rows=5)
@@ -200,24 +186,6 @@ def test_xarray_sees_the_samples(tmp_path):
     )
     assert scene.data["material"][2, 5, 7] == scene.frame(2).material[5, 7]
     assert scene.data["velocity_y"].shape == (6, *RASTER.shape)
-
-
-def test_a_second_look_reads_nothing(tmp_path, monkeypatch):
-    for name, options in (("splines.nc", {}), ("samples.nc", {"samples": True})):
-        path = a_file(tmp_path / "first.nc")
-        write_scene(open_scene(path), tmp_path / name, **options)
-        scene = open_scene(tmp_path / name)
-        first = scene.frame(3)
-
-        def refuse(*_):
-            raise AssertionError("read again")
-
-        with monkeypatch.context() as patch:
-            patch.setattr("chipglow.io.scene_file.read_chunk", refuse)
-            again = scene.frame(3)
-            with pytest.raises(AssertionError, match="read again"):
-                scene.frame(4)
-        np.testing.assert_array_equal(again.temperature, first.temperature)
 
 
 def test_splines_go_on_from_a_checkpoint(tmp_path):
@@ -359,7 +327,7 @@ def test_the_table_of_radiance_is_close_enough():
     temperature[0, 0] = 250.0 + (np.arange(50) + 0.5) / STEPS_PER_KELVIN  # the worst places
     raster = Raster(0.0, 0.0, 1e-6, 40, 50)
     scene = Scene.from_fields(raster, [0.0], {"temperature": temperature})
-    (found,) = expose(scene, [View(UniformSurface(1.0), BAND)], 0.0, 1e-6)
+    (found,) = expose(scene, [View(UniformSurface(1.0).on(scene), BAND)], 0.0, 1e-6)
     np.testing.assert_allclose(
         found.mean_radiance, BAND.radiance(temperature[0].astype(float)), rtol=6e-7
     )

@@ -27,16 +27,13 @@ from chipglow.scene import Raster
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
-    DirectionalSurface,
-    DispersiveSurface,
+    Dispersion,
     EmissivityTrend,
     FeatureTrends,
     Fresnel,
     HagenRubens,
     MapSurface,
-    OxidisedSurface,
     ParabolicOxide,
-    ReflectingSurface,
     TrendSurface,
     UniformSurface,
     Wedge,
@@ -82,7 +79,7 @@ CAMERAS = {
     "7 frames of each": reading(frames=7),
 }
 SURFACES = {
-    "UniformSurface(value=0.5)": UniformSurface(0.5),
+    "UniformSurface(emissivity=0.5)": UniformSurface(0.5),
     "chip 0.77 (standard deviation 0.03)": CHIP_2,
     "grain 3e-05 m": replace(CHIP_1, grain=30e-6),
     "follow none": replace(CHIP_1, follow="none"),
@@ -91,11 +88,11 @@ SURFACES = {
     "HagenRubens(resistivity=1.7e-07": HagenRubens(1.7e-7),
     "image of 5 x 4 pixels of 8e-05 m, mean 0.5, elsewhere 0.3": MAP,
     "0.5 at 600 K, changing by 0.0001 1/K": TrendSurface(TREND),
-    "chip 0.5 at 600 K": FeatureTrends(CHIP_1, {"chip": TREND}),
-    "ParabolicOxide(initial=1e-07": OxidisedSurface(CHIP_1, ParabolicOxide(initial=1e-7)),
-    "Fresnel(tilt=0.1": DirectionalSurface(CHIP_1, Fresnel(tilt=0.1, n=4.6, k=15.0)),
-    "3.8 um to 5.1 um, elsewhere by HagenRubens(": DispersiveSurface(CHIP_1, HagenRubens(1.7e-7)),
-    "mirror=0.5": ReflectingSurface(CHIP_1, Wedge(mirror=0.5)),
+    "chip 0.5 at 600 K": CHIP_1.modified(FeatureTrends({"chip": TREND})),
+    "ParabolicOxide(initial=1e-07": CHIP_1.modified(ParabolicOxide(initial=1e-7)),
+    "Fresnel(tilt=0.1": CHIP_1.modified(Fresnel(tilt=0.1, n=4.6, k=15.0)),
+    "3.8 um to 5.1 um, elsewhere by HagenRubens(": CHIP_1.modified(Dispersion(HagenRubens(1.7e-7))),
+    "mirror=0.5": CHIP_1.modified(Wedge(mirror=0.5)),
 }
 
 
@@ -131,7 +128,7 @@ def test_every_switch_of_the_surface_is_printed(shown):
     for text, surface in SURFACES.items():
         assert text in "\n".join(shown(BASE, surface)) and text not in plain, text
     # What is wrapped is stated besides what is added.
-    both = "\n".join(shown(BASE, ReflectingSurface(OxidisedSurface(CHIP_2), Wedge())))
+    both = "\n".join(shown(BASE, CHIP_2.modified(ParabolicOxide(), Wedge())))
     assert all(part in both for part in ("chip 0.77", "ParabolicOxide(", "Wedge("))
 
 

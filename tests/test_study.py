@@ -32,8 +32,8 @@ from chipglow.surface import (
     EmissivityTrend,
     FeatureTrends,
     MapSurface,
-    ReflectingSurface,
     TrendSurface,
+    Wedge,
 )
 from chipglow.text import DescriptionError
 
@@ -536,16 +536,16 @@ def test_a_scene_without_coordinates_is_fitted_under_what_is_seen_over_a_surface
     law = {"kind": "fresnel", "n": 4.6, "k": 15}
     study = Study(surface={"directional": law, "reflections": {"kind": "wedge"}})
     for surface in fit(study, scene).surfaces.values():
-        assert isinstance(surface, ReflectingSurface)
-        assert surface.bare.bare.follow == "mean"
+        assert len(surface.modifiers) == 2
+        assert surface.bare.follow == "mean"
 
 
 def test_where_an_emissivity_was_measured_is_said(monkeypatch):
     scene = AnalyticChip(frames=2).scene()
     for measured, said in (((650.0, 850.0), "at 377 °C to 577 °C"), ((650.0, 650.0), "the same")):
         trend = EmissivityTrend(750.0, 0.5, measured=measured)
-        for surface in (TrendSurface(trend), FeatureTrends(CHIP_1, {"chip": trend})):
-            found = {"heated": ReflectingSurface(surface)}
+        for surface in (TrendSurface(trend), CHIP_1.modified(FeatureTrends({"chip": trend}))):
+            found = {"heated": surface.modified(Wedge())}
             monkeypatch.setattr("chipglow.study.fitting.surfaces_of", lambda *_, of=found: of)
             (sentence,) = fit(Study(), scene).notes.assumed
             assert sentence.startswith("The emissivity of 'heated' was measured at 377 °C")

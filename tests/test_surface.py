@@ -7,30 +7,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene
+from chipglow.scene import FIELD_UNITS, Raster, Scene
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
     Emissivity,
-    FeatureSurface,
+    EmissivityStack,
+    PhaseSurface,
     Texture,
     UniformSurface,
     chip_fraction,
     shear_band_fraction,
 )
 from chipglow.surface.cubic import cubic_convolution
-from chipglow.surface.emissivity import REACH
 from chipglow.surface.feature import _blend, _sum_velocities
 from chipglow.surface.texture import MAP_SIZE, _look_up
 
 RASTER = Raster(left=-60e-6, top=80e-6, spacing=2e-6, rows=50, columns=60)
 VOID, WORKPIECE, TOOL = 0, 1, 2
-FLAT = FeatureSurface(
-    chip=Emissivity(0.77),
-    shear_band=Emissivity(0.85),
-    workpiece=Emissivity(0.40),
-    tool=Emissivity(0.58),
-)
 
 
 def texture(mean=0.5, standard_deviation=0.05, grain=20e-6, seed=1, restore=True):
@@ -80,37 +74,6 @@ def test_enlarging_is_bicubic(u, v):
     assert map_.at(u, v) == pytest.approx(expected, abs=3e-7)
 
 
-def test_enlarging_passes_through_the_nodes_and_keeps_a_plane():
-    map_ = texture(grain=1.0)
-    node = np.arange(MAP_SIZE)
-    at_nodes = map_.at(node[None, :], node[:, None])
-    np.testing.assert_allclose(at_nodes, 0.5 + 0.05 * map_.nodes, atol=1e-7)
-    plane = -4.0 + 0.03 * node[None, :] + 0.02 * node[:, None]
-    inner = Texture(plane.astype(np.float32), 1.0, Emissivity(0.5, 0.1))
-    u, v = np.random.default_rng(2).uniform(2, MAP_SIZE - 3, (2, 500))
-    np.testing.assert_allclose(inner.at(u, v), 0.1 + 0.003 * u + 0.002 * v, atol=1e-6)
-
-
-def test_the_map_repeats():
-    map_ = texture()
-    x, y = np.random.default_rng(3).uniform(-1e-3, 1e-3, (2, 500))
-    assert map_.period == pytest.approx(2.56e-3)
-    shifted = map_.at(x + map_.period, y - 2 * map_.period)
-    # Adding a period moves a position in double precision by 1e-13 of a grain.
-    np.testing.assert_allclose(shifted, map_.at(x, y), atol=1e-6)
-
-
-@pytest.mark.parametrize("restore", [True, False])
-def test_deviation_that_is_told_is_that_of_the_map(restore):
-    map_ = texture(restore=restore)
-    # Ten samples a node, over the whole map: the mean square of products of cubics, by the
-    # trapezoidal rule over a period, is good to 1e-4 of itself.
-    position = np.arange(10 * MAP_SIZE) * map_.grain / 10
-    values = map_.at(position[None, :], position[:, None]).astype(np.float64)
-    assert values.std() == pytest.approx(map_.standard_deviation, rel=1e-3)
-    assert values.mean() == pytest.approx(map_.mean, abs=1e-6)
-
-
 def test_restoring_gives_the_deviation_asked_for():
     # The sampled standard deviation is good to 1e-4 of itself.
     assert texture(0.42, 0.07).standard_deviation == pytest.approx(0.07, rel=1e-4)
@@ -151,18 +114,6 @@ def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, s
     assert values.std() == pytest.approx(standard_deviation, abs=4 * error * 2)
 
 
-@given(st.floats(-5.0, 5.0))
-def test_the_papers_emissivities_are_normal(deviate):
-    for surface in (CHIP_1, CHIP_2):
-        for feature in (surface.chip, surface.shear_band, surface.workpiece, surface.tool):
-            table = feature.table.astype(np.float64)
-            assert feature.is_normal
-            found = np.interp(deviate, np.linspace(-REACH, REACH, table.size), table)
-            # Entries of the table are float32 numbers below 1, rounded by at most 2^-25.
-            expected = feature.mean + feature.standard_deviation * deviate
-            assert found == pytest.approx(expected, abs=2.0**-24)
-
-
 def test_surfaces_beside_each_other_are_those_alone():
     generator = np.random.default_rng(7)
     shape = (1, *RASTER.shape)
@@ -177,17 +128,10 @@ def test_surfaces_beside_each_other_are_those_alone():
     low = replace(CHIP_1, chip=Emissivity(0.05, 0.04))
     for surfaces in ([*many, low], [CHIP_1, UniformSurface(0.3), low], [CHIP_2]):
         fields = [surface.on(scene) for surface in surfaces]
-        found = fields[0].beside(fields[1:]).emissivities(frame)
+        found = EmissivityStack(fields).emissivities(frame)
         for one, field in zip(found, fields, strict=True):
             # The sums of one map and of several are fused in another order: one unit of float32.
             np.testing.assert_allclose(one, field.emissivity(frame), rtol=0, atol=1.2e-7)
-
-
-def test_texture_refuses():
-    with pytest.raises(ValueError, match=r"nodes have shape \(3, 3\), expected \(128, 128\)"):
-        Texture(np.zeros((3, 3), dtype=np.float32), 1.0, Emissivity(0.5))
-    with pytest.raises(ValueError, match=r"grain must be over 0 m, got 0.0 m"):
-        texture(grain=0.0)
 
 
 def test_same_seed_same_maps_and_each_feature_its_own():
@@ -260,16 +204,6 @@ def test_blend_against_plain_numpy(seed):
     np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
 
 
-def test_blend_is_linear_between_its_ends():
-    strain = np.linspace(0.0, 0.8, RASTER.columns)
-    rate = np.linspace(0.0, 4e4, RASTER.rows)[:, None]
-    scene = a_scene(coordinates=at_rest(), plastic_strain=strain, plastic_strain_rate=rate)
-    chip = np.interp(strain, [0.3, 0.5], [0.40, 0.77])
-    fraction = np.interp(rate, [6e3, 30e3], [0.0, 1.0])
-    found = FLAT.on(scene).emissivity(scene.frame(0))
-    np.testing.assert_allclose(found, chip + fraction * (0.85 - chip), rtol=0, atol=1e-6)
-
-
 def test_void_is_0_and_the_tool_does_not_move():
     material = np.full(RASTER.shape, WORKPIECE)
     material[:, :20], material[:, 40:] = VOID, TOOL
@@ -334,7 +268,7 @@ def test_mean_shift_is_velocity_times_time():
     field = replace(CHIP_1, follow="mean").on(scene)
     velocity = np.array([[4.0, 0.0], [1.0, 3.0], [2.0, 1.5]])
     for time in (0.0, 0.4e-6, 2e-6, 4e-6):
-        np.testing.assert_allclose(field.shift(time), velocity * time, rtol=1e-6, atol=1e-18)
+        np.testing.assert_allclose(field.bare.shift(time), velocity * time, rtol=1e-6, atol=1e-18)
 
 
 def test_mean_shift_integrates_a_changing_velocity():
@@ -343,8 +277,8 @@ def test_mean_shift_integrates_a_changing_velocity():
     scene = a_scene(times, velocity_x=speed[:, None, None])
     field = replace(CHIP_1, follow="mean").on(scene)
     # The trapezoidal rule is exact for a velocity that rises linearly.
-    np.testing.assert_allclose(field.shift(4e-6)[0], [2.0 * 4e-6 + 0.5e6 * 4e-6**2, 0.0])
-    np.testing.assert_array_equal(field.shift(4e-6)[1:], 0.0)
+    np.testing.assert_allclose(field.bare.shift(4e-6)[0], [2.0 * 4e-6 + 0.5e6 * 4e-6**2, 0.0])
+    np.testing.assert_array_equal(field.bare.shift(4e-6)[1:], 0.0)
 
 
 def test_a_feature_keeps_its_velocity_while_it_is_not_seen():
@@ -352,7 +286,7 @@ def test_a_feature_keeps_its_velocity_while_it_is_not_seen():
     rate = np.array([5e4, 0.0, 5e4])[:, None, None]
     scene = a_scene(times, plastic_strain=0.9, plastic_strain_rate=rate, velocity_y=3.0)
     field = replace(CHIP_1, follow="mean").on(scene)
-    np.testing.assert_allclose(field.shift(2e-6)[2], [0.0, 6e-6])
+    np.testing.assert_allclose(field.bare.shift(2e-6)[2], [0.0, 6e-6])
 
 
 def test_result_does_not_depend_on_the_number_of_threads():
@@ -365,54 +299,12 @@ def test_result_does_not_depend_on_the_number_of_threads():
         numba.set_num_threads(threads)
         try:
             field = replace(CHIP_2, follow="mean").on(scene)
-            return field.shifts, field.emissivity(scene.frame(1))
+            return field.bare.shifts, field.emissivity(scene.frame(1))
         finally:
             numba.set_num_threads(before)
 
     for one, many in zip(maps(1), maps(numba.config.NUMBA_NUM_THREADS), strict=True):
         np.testing.assert_array_equal(one, many)
-
-
-def test_without_material_coordinates_the_hint_is_given():
-    with pytest.raises(ValueError, match="no material coordinates for 'material', expected 'mean'"):
-        CHIP_1.on(a_scene())
-
-
-def test_a_frame_of_another_scene_is_refused():
-    field = replace(CHIP_1, follow="mean").on(a_scene())
-    other = a_scene(raster=replace(RASTER, rows=10)).frame(0)
-    with pytest.raises(ValueError, match=r"has shape \(10, 60\), expected \(50, 60\)"):
-        field.emissivity(other)
-    bare: Frame = a_scene().frame(0)
-    with pytest.raises(ValueError, match="has no material coordinates"):
-        CHIP_1.on(a_scene(coordinates=at_rest())).emissivity(bare)
-
-
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"grain": 0.0}, "FeatureSurface.grain: 0 m, expected over 0 m"),
-        (
-            {"follow": "chip"},
-            "FeatureSurface.follow: 'chip', expected 'material', 'mean' or",
-        ),
-        ({"seed": -1}, "FeatureSurface.seed: -1, expected 0 or more"),
-    ],
-)
-def test_feature_surface_refuses(changed, message):
-    with pytest.raises(ValueError, match=message):
-        replace(CHIP_1, **changed)
-
-
-def test_emissivities_refuse():
-    with pytest.raises(ValueError, match=r"Emissivity.mean: 1.2, expected 0 to 1"):
-        Emissivity(1.2, 0.1)
-    with pytest.raises(ValueError, match=r"0.45, expected up to 0.441 about a mean of 0.4"):
-        Emissivity(0.4, 0.45)
-    with pytest.raises(ValueError, match=r"deviation: 0.1, expected up to 0 about a mean of 1"):
-        Emissivity(1.0, 0.1)
-    with pytest.raises(ValueError, match=r"emissivity: expected 0 to 1, got -0.5"):
-        UniformSurface(-0.5)
 
 
 def test_a_uniform_surface_is_black_but_for_the_void():
@@ -427,3 +319,34 @@ def test_a_uniform_surface_is_black_but_for_the_void():
 def test_no_kernel_of_the_surface_waits_by_spinning():
     for kernel in (_blend, _sum_velocities, _look_up):
         assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")
+
+
+def emissivity_of_another_shape():
+    other = a_scene(raster=replace(RASTER, rows=10)).frame(0)
+    replace(CHIP_1, follow="none").on(a_scene()).emissivity(other)
+
+
+def emissivity_of_a_bare_frame():
+    CHIP_1.on(a_scene(coordinates=at_rest())).emissivity(a_scene().frame(0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: replace(CHIP_1, grain=0.0), "FeatureSurface.grain: 0 m, expected over 0 m"),
+        (lambda: replace(CHIP_1, follow="chip"), "follow: 'chip', expected 'material', 'mean' or"),
+        (lambda: replace(CHIP_1, seed=-1), "FeatureSurface.seed: -1, expected 0 or more"),
+        (lambda: Emissivity(1.2, 0.1), "Emissivity.mean: 1.2, expected 0 to 1"),
+        (lambda: Emissivity(0.4, 0.45), "0.45, expected up to 0.441 about a mean of 0.4"),
+        (lambda: Emissivity(1.0, 0.1), "deviation: 0.1, expected up to 0 about a mean of 1"),
+        (lambda: UniformSurface(-0.5), "UniformSurface.emissivity: -0.5, expected 0 to 1"),
+        (lambda: texture(grain=0.0), "grain must be over 0 m, got 0.0 m"),
+        (lambda: CHIP_1.on(a_scene()), "no material coordinates for 'material', expected 'mean'"),
+        (emissivity_of_another_shape, r"has shape \(10, 60\), expected \(50, 60\)"),
+        (emissivity_of_a_bare_frame, "frame: has no material coordinates"),
+        (lambda: PhaseSurface(0.4, 0.2, 1700.0, 1600.0), "liquidus: 1600 K, expected over"),
+    ],
+)
+def test_impossible_surfaces_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()

@@ -170,32 +170,6 @@ def test_h3_calibration_of_a_thermometer():
     assert at_30.degrees_of_freedom == pytest.approx(9.0)
 
 
-def test_gtc_gives_the_same():
-    gtc = pytest.importorskip("GTC")
-    with_gtc = [
-        gtc.ureal(50.000623, 25 * NM, 18),
-        gtc.ureal(215 * NM, 5.8 * NM, 24) + gtc.ureal(0, 3.9 * NM, 5) + gtc.ureal(0, 6.7 * NM, 8),
-        gtc.ureal(11.5e-6, 1.2e-6),
-        gtc.ureal(-0.1, 0.2) + gtc.ureal(0, 0.35),
-        gtc.ureal(0, 0.58e-6, 50),
-        gtc.ureal(0, 0.029, 2),
-    ]
-    one, two = length(*with_gtc), length(*end_gauge())
-    assert two.standard_uncertainty == pytest.approx(one.u, rel=1e-12)
-    assert two.degrees_of_freedom == pytest.approx(one.df, rel=1e-9)
-    volts, amperes, phase = gtc.ta.multi_estimate_real((VOLTS, AMPERES, RADIANS))
-    ratio = volts / amperes
-    parts = [ratio * gtc.cos(phase), ratio * gtc.sin(phase), ratio]
-    observed = Estimate.from_observations(np.transpose([VOLTS, AMPERES, RADIANS]), "repeated")
-    found = impedance([observed[n] for n in range(3)])
-    expected = [[gtc.get_covariance(one, two) for two in parts] for one in parts]
-    # Derivatives over one standard uncertainty of 0.1 %: their square.
-    np.testing.assert_allclose(found.covariance(), expected, rtol=1e-5)
-    np.testing.assert_allclose(found.degrees_of_freedom, [one.df for one in parts], rtol=1e-9)
-    line = gtc.ta.line_fit([t - 20.0 for t in CELSIUS], CORRECTIONS).a_b
-    assert (line[0] + 10 * line[1]).u == pytest.approx(0.0041, abs=5e-5)
-
-
 # Errors that are the same, and errors that are not
 
 ESTIMATES = st.builds(
@@ -481,33 +455,6 @@ def test_datasets_of_obsarray_are_read():
         from_xarray(values.drop_vars("u_t"), "t")
     with pytest.raises(ValueError, match="q: there is no such variable"):
         from_xarray(values, "q")
-
-
-def test_obsarray_and_punpy_read_our_datasets():
-    pytest.importorskip("obsarray")
-    punpy = pytest.importorskip("punpy")
-    kelvins = (
-        Estimate([600.0, 700.0, 800.0])
-        .with_component("truth", [1.0, -2.0, 3.0])
-        .with_component("noise", [0.5, 1.0, 2.0], independent="per element")
-    )
-    gain = Estimate([1.0, 1.0, 2.0]).with_component("gain", [0.01, -0.01, 0.02])
-    data = xr.merge([to_xarray(kelvins, "t", ["x"], "K"), to_xarray(gain, "g", ["x"])])
-    np.testing.assert_allclose(
-        data.unc["t"].total_err_cov_matrix().values, kelvins.covariance(), rtol=1e-12
-    )
-
-    class Product(punpy.MeasurementFunction):
-        def meas_function(self, t, g):
-            return t * g
-
-    product = Product(
-        prop=punpy.MCPropagation(100_000), xvariables=["t", "g"], yvariable="y", yunit="K",
-        ydims=["x"],
-    )  # fmt: skip
-    found = product.propagate_ds_total(data, store_unc_percent=False)
-    # 100 000 draws: standard deviations to 0.22 %.
-    np.testing.assert_allclose(found.u_tot_y, (kelvins * gain).standard_uncertainty, rtol=0.01)
 
 
 # Speed

@@ -53,8 +53,12 @@ def main() -> None:
 
 def tell(result: Comparison) -> None:
     """Print the sentences."""
-    places = (place.sentence for place in result.places)
-    for text in (*result.notes.assumed, *result.notes.warnings, *places, result.statement):
+    for text in (
+        *result.notes.assumed,
+        *result.notes.warnings,
+        *result.sentences,
+        result.statement,
+    ):
         print(text)
 
 

@@ -15,7 +15,7 @@ from chipglow.camera import Measurement
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import rake_grid
-from chipglow.surface import CHIP_1, ReflectingSurface, Wedge
+from chipglow.surface import CHIP_1, Wedge
 
 matplotlib.use("Agg")
 HERE = Path(__file__).parent
@@ -30,7 +30,7 @@ def main() -> None:
     scene, camera = chipglow.open_scene(chipglow.cut(study)), study.camera.build()
     start = float(scene.times[len(scene.times) // 2])
     without = camera.measure(scene, CHIP_1, start)
-    reflecting = camera.measure(scene, ReflectingSurface(CHIP_1, SHAPE), start)
+    reflecting = camera.measure(scene, CHIP_1.modified(SHAPE), start)
     with drawing.style():
         figure = drawing.new_figure(6.2)
         upper, lower = figure.subplots(2, 2)

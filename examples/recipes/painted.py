@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.quantities import Parameter
 from chipglow.quantities.units import LENGTH, POSITION
-from chipglow.scene import Frame, Material, Raster, Scene
+from chipglow.scene import Material
 from chipglow.surface import SURFACES, EmissivityField, Surface
 
 
@@ -25,21 +24,12 @@ class PaintedSurface(Surface):
     top: Annotated[float, Parameter("Upper edge of the paint.", POSITION)] = 0.0
     paint: Annotated[float, Parameter("Emissivity of the paint.", least=0.0, most=1.0)] = 0.95
 
-    def on(self, scene: Scene) -> EmissivityField:
-        """Lay the paint on the samples of a scene."""
-        return _Painted(self.emissivities(scene.raster))
-
-    def emissivities(self, raster: Raster) -> NDArray[np.float32]:
-        """Emissivity of the samples, shape (y, x)."""
-        across = np.abs(raster.x - self.left - self.width / 2) <= self.width / 2
-        down = np.abs(self.top - raster.y - self.width / 2) <= self.width / 2
-        return np.where(np.outer(down, across), self.paint, self.bare).astype(np.float32)
-
-
-@dataclass(frozen=True, eq=False)
-class _Painted(EmissivityField):
-    values: NDArray[np.float32]
-
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of a frame's samples, 0 where there is nothing."""
-        return np.where(frame.material == Material.VOID, np.float32(0.0), self.values)
+    def on(self, scene, band=None, reflected=None) -> EmissivityField:
+        """Lay the paint on the samples of a scene: emissivities of shape (y, x), 0 in the void."""
+        across = np.abs(scene.raster.x - self.left - self.width / 2) <= self.width / 2
+        down = np.abs(self.top - scene.raster.y - self.width / 2) <= self.width / 2
+        values = np.where(np.outer(down, across), self.paint, self.bare).astype(np.float32)
+        return EmissivityField(
+            lambda frame: np.where(frame.material == Material.VOID, np.float32(0.0), values),
+            fields=frozenset(),
+        )

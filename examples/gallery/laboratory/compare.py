@@ -41,7 +41,7 @@ figure = draw_comparison(result)
 # The sentences that ``chipglow compare`` prints:
 
 for text in (
-    *(place.sentence for place in result.places),
+    *result.sentences,
     result.statement,
     *result.notes.warnings,
 ):

@@ -19,7 +19,6 @@ from chipglow.analysis.images import (
     ExposureImages as ExposureImages,
     error_images as error_images,
     error_parts as error_parts,
-    pixel_phases as pixel_phases,
     reference_temperature as reference_temperature,
 )
 from chipglow.analysis.places import (

@@ -119,7 +119,7 @@ def find_cut(scene: Scene, duration: float, exposures: int, tell: Progress) -> C
         developed=developed,
         segments=tuple(segment for segment in segments if segment.contact_length > 0),
         moments=tuple(
-            scene.frame(middle_frame(scene, starts[number], duration))
+            scene.frame(scene.frame_at(starts[number] + duration / 2))
             for number in sorted({min(max(number, 0), len(starts) - 1) for number in around})
         ),
     )
@@ -137,12 +137,6 @@ def cutting_forces(scene: Scene) -> CuttingForces | None:
     assert inert is not None
     segments = segmentation(time, cutting, thrust)
     return CuttingForces(time, cutting, thrust, segments, _unaccounted(scene), inert)
-
-
-def middle_frame(scene: Scene, start: float, duration: float) -> int:
-    """Return the number of the frame in the middle of an exposure."""
-    middle = start + duration / 2 + 1e-6 * scene.frame_spacing
-    return max(int(np.searchsorted(scene.times, middle, side="right")) - 1, 0)
 
 
 def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:

@@ -15,7 +15,6 @@ from chipglow.analysis.cut import (
     cutting_forces,
     find_cut,
     lacking,
-    middle_frame,
     spread_starts,
 )
 from chipglow.analysis.heated import heated_objects
@@ -90,6 +89,8 @@ class Analysis:
         Sentences: what limits the validity of the results; what could not be analysed, and why.
     failed : mapping
         Parts of the analysis that failed, by title, with the reason.
+    assumed : tuple of str
+        Sentences on what the scene or the study does not say.
     """
 
     data: xr.Dataset
@@ -104,6 +105,7 @@ class Analysis:
     warnings: tuple[str, ...]
     missing: tuple[str, ...]
     failed: Mapping[str, str]
+    assumed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +182,7 @@ def analyse(
         name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
         for number, (name, images) in enumerate(looked.images.items())
     }
-    middle = middle_frame(scene, schedule.starts[schedule.shown], task.duration)
+    middle = scene.frame_at(schedule.starts[schedule.shown] + task.duration / 2)
     frame = cut.segments[0].frame if cut else scene.frame(middle)
     variables = {
         **_scene_variables(task, frame, fields, looked),
@@ -270,7 +272,7 @@ def _scene_schedule(task: _Task) -> Schedule:
     """Return exposures spread over the scene, all drawn; the hottest one is shown."""
     plan, scene, duration = task.plan, task.scene, task.duration
     starts = spread_starts(scene, duration, plan.exposures)
-    frames = [middle_frame(scene, start, duration) for start in starts]
+    frames = [scene.frame_at(start + duration / 2) for start in starts]
     shown = int(np.argmax([float(scene.field("temperature", i).max()) for i in frames]))
     for place in plan.all_places:
         place.check_within(task.camera.pixels(scene.raster))

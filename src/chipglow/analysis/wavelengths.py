@@ -13,7 +13,7 @@ import pandas as pd
 import xarray as xr
 from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
 
-from chipglow.analysis.cut import Progress, find_cut, middle_frame, spread_starts
+from chipglow.analysis.cut import Progress, find_cut, spread_starts
 from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
 from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera, Exposure, RatioCamera, expose, frame_weights
@@ -485,7 +485,7 @@ def _read(camera: Camera, image: Array, start: float) -> Array:
 
 def true_temperature(scene: Scene, time: float) -> Array:
     """Return the true temperature of a scene's samples in K; NaN in the void."""
-    frame = scene.frame(middle_frame(scene, time, 0.0), ())
+    frame = scene.frame(scene.frame_at(time), ())
     void = frame.material == Material.VOID
     return np.where(void, np.nan, np.asarray(frame.temperature, np.float64))
 

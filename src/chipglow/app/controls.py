@@ -17,7 +17,7 @@ from chipglow.quantities.units import INSTANT, Quantity, is_bare_number
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.study.surface_section import FeaturesSection, surface_names
-from chipglow.surface import UniformEmissivity
+from chipglow.surface import UniformSurface
 
 Texts: TypeAlias = Mapping[str, str]
 """Values of controls by their paths, as a link writes them; without one the initial value."""
@@ -431,7 +431,7 @@ def _first(word: str, options: dict[str, Option]) -> dict[str, Option]:
 
 def _surfaces(study: Study) -> dict[str, Option]:
     section = study.surface
-    uniform = {"uniform": Option("Uniform", {"surface": UniformEmissivity(0.5)})}
+    uniform = {"uniform": Option("Uniform", {"surface": UniformSurface(0.5)})}
     if not isinstance(section, FeaturesSection):
         return _first(section.kind, uniform | {section.kind: Option(section.kind.capitalize())})
     kinds = {kind: getattr(section, kind) for kind in ("chips", "maps", "measured")}

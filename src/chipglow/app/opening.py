@@ -20,7 +20,7 @@ from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.quantities import unchecked
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
-from chipglow.surface import UniformEmissivity
+from chipglow.surface import UniformSurface
 
 QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarser one before."""
@@ -49,7 +49,7 @@ class OpenedScene:
     def of(cls, scene: Scene, study: Study, name: str, from_file: bool = False) -> "OpenedScene":
         """Open a scene in an exposure in its middle; a ValueError if it is shorter."""
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            study = unchecked(study, surface=UniformEmissivity(0.5))
+            study = unchecked(study, surface=UniformSurface(0.5))
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         starts = spread_starts(scene, duration, 3)
         start = rounded(starts[len(starts) // 2])
@@ -145,8 +145,8 @@ def _scene_places(scene: Scene, start: float, duration: float) -> list[_Points]:
     tool = scene.tool
     if tool is None:
         return [cursor, rake, band]
-    index = int(np.searchsorted(scene.times, start + duration / 2)) - 1
-    workpiece = scene.field("material", max(index, 0)) == Material.WORKPIECE
+    index = scene.frame_at(start + duration / 2)
+    workpiece = scene.field("material", index) == Material.WORKPIECE
     contact = contact_length(scene.raster, workpiece, tool, TOUCHING)
     if contact > 0:
         middle, across = tool.rake_point(contact / 2), LINE_REACH * np.asarray(tool.rake_normal)

@@ -10,7 +10,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
-from chipglow.analysis.cut import middle_frame
 from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
@@ -280,7 +279,7 @@ class SceneModel:
         surfaces = (surface, plain) if both else (surface,)
 
         def make() -> _Exposed:
-            grey = all(one.in_band(camera.band, camera.reflected) is one for one in surfaces)
+            grey = surface.is_grey
             spectral = () if grey else (camera.band.lower, camera.band.upper, camera.reflected)
             laid = self._laid.result(
                 (state.key(*_SURFACE), quick, both, spectral),
@@ -339,7 +338,8 @@ class SceneModel:
         return scene.field(name, index)
 
     def _middle_frame(self, state: State) -> int:
-        return middle_frame(self.opened.scene, state.start, state.study.camera.integration_time)
+        """Return the index of the frame in the middle of the exposure."""
+        return self.opened.scene.frame_at(state.start + state.study.camera.integration_time / 2)
 
 
 class MeasurementModel:

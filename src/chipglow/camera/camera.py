@@ -16,7 +16,7 @@ from chipglow.camera.detector.terms import Lag, follows
 from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import Beyond, blur, image_on_pixels
+from chipglow.camera.optics.convolution import Beyond, blur, images_on_pixels
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
@@ -243,7 +243,7 @@ class Camera(Part):
                 f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
                 "UniformSurface(0.6)"
             )
-        return surface.in_band(self.band, self.reflected).on(scene)
+        return surface.on(scene, self.band, self.reflected)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
         """Return the exposure of a scene from `start` on, in s, over one integration time.
@@ -270,42 +270,27 @@ class Camera(Part):
         return expose(scene, views, start, self.integration_time, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
-        """Return the frames that the camera reads from exposures.
+        """Return the frames that the camera reads from exposures, one for each.
 
         Size of source, blur and mean over time are linear and commute: the mean, which an exposure
         holds, is blurred and integrated once. That equals the loop of Figure 6, and any number of
         cameras with the same band, integration time and surroundings may use the same exposures.
 
-        Parameters
-        ----------
-        exposures : Exposure or iterable of Exposure
-            One for each frame.
-
-        Returns
-        -------
-        Measurement
-            As many frames as exposures. Its attribute ``warnings`` states how far the border of the
-            scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
-
-        Raises
-        ------
-        ValueError
-            If there is no exposure, their grids differ, or the pixels do not fit.
-
-        Notes
-        -----
-        Beyond the scene radiance is taken to be as at the scene's edge. The warning compares with a
-        second assumption: that beyond the scene each pixel sees the like of what it sees within.
+        Beyond the scene radiance is taken to be as at the scene's edge. The attribute ``warnings``
+        states where a second assumption, that beyond the scene each pixel sees the like of what it
+        sees within, changes pixels by over `BORDER_TOLERANCE`.
         """
         images: list[Array] = []
         alike, starts, effects, grids = [], [], [], set()
         for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
             scene = exposure.raster
-            images.append(self.form_image(exposure.mean_radiance, scene))
-            alike.append(self._image_of_like(exposure.mean_radiance, scene))
+            pixels = self.pixels(scene)
+            image, within = self._both(exposure.mean_radiance, scene)
+            images.append(self._show(image, pixels))
+            alike.append(self._show(within / self._own_light(scene), pixels))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
-            grids.add(self.pixels(scene))
+            grids.add(pixels)
         if len(grids) != 1:
             raise ValueError("camera: one or more exposures of the same grid are required")
         measured = self.measurement(np.stack(images), np.array(starts), scene)
@@ -337,11 +322,6 @@ class Camera(Part):
         -------
         Measurement
             As many frames as starts, with the scene's tool, and attributes of camera and surface.
-
-        Raises
-        ------
-        ValueError
-            If an integration reaches beyond the scene, or the pixels do not fit it.
         """
         self.pixels(scene.raster)
         fields = (self.lay(surface, scene),)
@@ -361,8 +341,8 @@ class Camera(Part):
         Parameters
         ----------
         radiance : ndarray
-            Radiance of the scene's samples in W/(m² sr), shape `scene.shape`: the mean over the
-            integration time, such as `Exposure.mean_radiance`.
+            Of the scene's samples in W/(m² sr), shape `scene.shape`: the mean over the integration
+            time, such as `Exposure.mean_radiance`.
         scene : Raster
             The samples.
 
@@ -370,27 +350,32 @@ class Camera(Part):
         -------
         ndarray
             Radiance of every pixel in W/(m² sr), shape `pixels(scene).shape`.
-
-        Raises
-        ------
-        ValueError
-            If the map is not of the raster's shape or not finite and 0 or more, or the pixels do
-            not fit the scene.
         """
         image = np.asarray(radiance, np.float64)
         if image.shape != scene.shape:
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
+        if self._forms_on_pixels:
+            return self._both(image, scene)[0]
         return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
+
+    @property
+    def _forms_on_pixels(self) -> bool:
+        """Whether the image is needed nowhere but on the pixels."""
+        return self.psf is not None and self.psf_order == "optics" and not self.optics
+
+    def _both(self, image: Array, scene: Raster) -> tuple[Array, Array]:
+        """Return the radiance that the pixels receive, as at the edges or nothing beyond."""
+        if self.psf is not None and self._forms_on_pixels:
+            pixels, sensitive = self.pixels(scene), self._sensitive(scene)
+            return images_on_pixels(image, self.psf, scene, pixels, sensitive)
+        return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
 
     def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
         """Return the radiance that the pixels receive: point spread function, optics, footprint."""
         pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
-            if not self.optics:
-                sensitive = self._sensitive(scene)
-                return image_on_pixels(image, self.psf, scene, pixels, sensitive, beyond)
             image = blurred(image, self.psf, scene.spacing)
         for term in self.optics:
             image = term.on_samples(image, scene, pixels, blurred)
@@ -406,15 +391,10 @@ class Camera(Part):
             image = term.on_pixels(image, pixels, self.band)
         return image
 
-    def _image_of_like(self, image: Array, scene: Raster) -> Array:
-        """Return the image if each pixel saw beyond the scene the like of what it sees within."""
-        within = self._collect(image, scene, "nothing") / self._own_light(scene)
-        return self._show(within, self.pixels(scene))
-
     @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
     def _own_light(self, scene: Raster) -> Array:
         """Return the fraction of each pixel's light that comes from within the scene."""
-        fraction = self._collect(np.ones(scene.shape), scene, "nothing")
+        _, fraction = self._both(np.ones(scene.shape), scene)
         return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
 
     def _sensitive(self, scene: Raster) -> float:

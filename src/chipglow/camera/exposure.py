@@ -15,7 +15,7 @@ from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Frame, Raster, Scene, is_gap
 from chipglow.scene.splines import SplineFrame
-from chipglow.surface import EmissivityField, EmissivityStack, FeatureFields
+from chipglow.surface import EmissivityField, EmissivityStack
 
 _ROUNDING: Final = 1e-6
 
@@ -88,17 +88,17 @@ def expose(
     fields = list({id(view.emissivity): view.emissivity for view in views}.values())
     bands = list(dict.fromkeys(view.band for view in views))
     places = {id(one): number for number, one in enumerate(fields)}
-    stack = fields[0].beside(fields[1:])
+    stack = EmissivityStack(fields)
     sums = Sums(
         np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
         np.stack([_fine_table(band) for band in bands]),
         np.array([view.environment for view in views], np.float32),
-        stack.most,
+        stack.max_emissivity,
         scene.raster.shape,
         check,
     )
     _sweep(scene, stack, indices, weights, middles, sums)
-    mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
+    mean, hottest = sums.mean, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
             f"exposure: from {start:g} s, temperature must be {TABLE_COLDEST:g} to "
@@ -107,16 +107,8 @@ def expose(
         )
     hottest[hottest == 0.0] = np.nan
     return tuple(
-        Exposure(
-            start=start,
-            duration=duration,
-            raster=scene.raster,
-            mean_radiance=mean[n],
-            peak_radiance=peak[n],
-            peak_temperature=hottest,
-            centre_radiance=centre[n],
-        )
-        for n in range(len(views))
+        Exposure(start, duration, scene.raster, of_view, peak, hottest, centre)
+        for of_view, peak, centre in zip(mean, sums.peak, sums.centre, strict=True)
     )
 
 
@@ -172,17 +164,10 @@ def _row_weights(
     for of_row, (own, values) in zip(weights, covered, strict=True):
         of_row[own.start - indices.start : own.stop - indices.start] = values
     middles = [
-        _frame_at(scene, one + duration / 2, own) - indices.start
+        min(max(scene.frame_at(one + duration / 2), own[0]), own[-1]) - indices.start
         for one, (own, _) in zip(starts, covered, strict=True)
     ]
     return indices, weights[row_of], np.array(middles, np.intp)[row_of]
-
-
-def _frame_at(scene: Scene, time: float, indices: range) -> int:
-    """Return the frame of these that stands for a time."""
-    rounded = time + _ROUNDING * scene.frame_spacing
-    index = int(np.searchsorted(scene.times, rounded, side="right")) - 1
-    return min(max(index, indices[0]), indices[-1])
 
 
 def _sweep(
@@ -194,11 +179,11 @@ def _sweep(
     sums: Sums,
 ) -> None:
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
-    features = stack if isinstance(stack, FeatureFields) else None
+    features = stack.features if stack.is_bare else None
     if features is not None and (splines := _splines(scene, indices)):
         sums.add_splines(splines, features, weights, middles)
         return
-    for begin, frames in _batches(scene, indices, stack.needs):
+    for begin, frames in _batches(scene, indices, stack.needed):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
         if features is None:
             sums.add_given(frames, stack, part, middles - begin)

@@ -51,14 +51,12 @@ class Measurement:
     data : xarray.Dataset
         Variables of `MEASUREMENT_UNITS` with dimensions (time, y, x) and a ``units`` attribute
         each: ``radiance_temperature``, NaN where flagged; ``radiance``; ``flags``, a sum of
-        `Flag`, uint8. Coordinates as a scene's: ``time`` in s, when each integration began;
-        ``x`` ascending and ``y`` descending in m, the middles of the pixels. Attributes tell the
-        camera; ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper``
-        in m limit the band. Of a band that is not shaped like a box, ``response`` over
-        ``wavelength`` in m is the relative spectral response. A tool may be stated as in a scene.
-        ``calibration_errors`` over (``calibration_error``, ``calibration_radiance``), in
-        W/(m² sr), may be there: the effects of a calibration's independent errors on the radiance,
-        as `CalibrationErrors` has them.
+        `Flag`, uint8. Coordinates as a scene's: ``time`` in s, the start of each integration;
+        ``x`` ascending and ``y`` descending in m, the middles of the pixels. Of the attributes
+        ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper`` in m limit
+        the band. ``response`` over ``wavelength`` in m is the relative spectral response, if it is
+        not that of a box. ``calibration_errors`` over (``calibration_error``,
+        ``calibration_radiance``), in W/(m² sr), are effects as of `CalibrationErrors`.
 
     Raises
     ------
@@ -232,7 +230,7 @@ class Measurement:
     def calibration_uncertainty(self) -> Array | None:
         """Standard uncertainty of the radiance from the calibration in W/(m² sr), if known.
 
-        Of shape (time, y, x), and common to all pixels and frames: it does not fall in a mean.
+        Common to all pixels and frames (time, y, x): it does not fall in a mean.
         """
         errors = self.calibration_errors
         return None if errors is None else errors.standard_uncertainty(self.radiance)

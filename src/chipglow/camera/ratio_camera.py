@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, cast
+from typing import Annotated
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import INSTANT, Position
 from chipglow.radiometry import RatioThermometer
 from chipglow.scene import Raster, Scene
-from chipglow.surface import EmissivityField, Surface
+from chipglow.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,19 +96,14 @@ class RatioCamera(Part):
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> tuple[Exposure, Exposure]:
         """Return the exposures of both channels, of one pass if they integrate at the same time."""
-        cameras = self.first, self.second
-        times = [
-            (begin, camera.integration_time)
-            for begin, camera in zip((start, start + self.delay), cameras, strict=True)
-        ]
-        views = views_of(surface, scene, cameras)
-        if times[0] == times[1]:
-            together = expose(scene, views, *times[0])
+        views = views_of(surface, scene, (self.first, self.second))
+        first = start, self.first.integration_time
+        second = start + self.delay, self.second.integration_time
+        if first == second:
+            one, other = expose(scene, views, *first)
         else:
-            together = tuple(
-                expose(scene, [view], *time)[0] for view, time in zip(views, times, strict=True)
-            )
-        return cast(tuple[Exposure, Exposure], together)
+            (one,), (other,) = expose(scene, views[:1], *first), expose(scene, views[1:], *second)
+        return one, other
 
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
@@ -138,10 +133,8 @@ def views_of(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> list[
                 f"camera: line_time is {camera.line_time!r}, expected None where bands are "
                 "compared: a global shutter"
             )
-    laid: dict[int, tuple[Surface, EmissivityField]] = {}
-    views = []
-    for camera in cameras:
-        seen = surface.in_band(camera.band, camera.reflected)
-        _, field = laid.setdefault(id(seen), (seen, seen.on(scene)))
-        views.append(View(field, camera.band, camera.reflected))
-    return views
+    if surface.is_grey:
+        fields = [surface.on(scene)] * len(cameras)
+    else:
+        fields = [camera.lay(surface, scene) for camera in cameras]
+    return [View(f, c.band, c.reflected) for f, c in zip(fields, cameras, strict=True)]

@@ -22,7 +22,7 @@ from chipglow.quantities import Array
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
-from chipglow.surface import EmissivityStack, FeatureFields
+from chipglow.surface import EmissivityStack, Features
 from chipglow.surface.blend import SCRATCH, blend_row
 from chipglow.surface.blocks import in_blocks
 
@@ -86,7 +86,7 @@ class Sums:
         self._add(_add_given, temperature, material, given, weights, middles)
 
     def add_features(
-        self, frames: Sequence[Frame], stack: FeatureFields, weights: Array, middles: Indices
+        self, frames: Sequence[Frame], stack: Features, weights: Array, middles: Indices
     ) -> None:
         """Add frames as `add_given`, whose emissivities are stored nowhere."""
         temperature, material, strain, rate = (
@@ -96,11 +96,11 @@ class Sums:
         positions = [stack.positions(frame) for frame in frames]
         x, y = (_filled([np.ascontiguousarray(p[k]) for p in positions]) for k in (0, 1))
         fields = (temperature, material, strain, rate, x, y)
-        shifts = np.stack([stack.shifts(frame.time) for frame in frames])
+        shifts = np.stack([stack.shift(frame.time) for frame in frames])
         self._add(_add_features, fields, shifts, tuple(stack.textures), weights, middles)
 
     def add_splines(
-        self, frames: Sequence[SplineFrame], stack: FeatureFields, weights: Array, middles: Indices
+        self, frames: Sequence[SplineFrame], stack: Features, weights: Array, middles: Indices
     ) -> None:
         """Add any number of frames of splines on one lattice: their samples are stored nowhere."""
         lattice = frames[0].lattice
@@ -109,7 +109,7 @@ class Sums:
         # Without fixed positions textures are looked up by the material coordinates.
         fixed = stack.fixed_positions or (np.empty((0, 0), np.float32),) * 2
         grid = (*lattice.down, *lattice.across, lattice.in_tool)
-        shifts, textures = np.stack([stack.shifts(frame.time) for frame in frames]), stack.textures
+        shifts, textures = np.stack([stack.shift(frame.time) for frame in frames]), stack.textures
         self._add(
             _add_splines, nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles
         )

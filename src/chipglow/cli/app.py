@@ -191,13 +191,13 @@ def error(
     from chipglow.cli.results import write_results
     from chipglow.quantities import changed
     from chipglow.study import Study, errors, load_study
-    from chipglow.surface import UniformEmissivity
+    from chipglow.surface import UniformSurface
 
     if not scene.is_file():
         raise FileNotFoundError(f"{scene}: no such file")
     loaded = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
     if emissivity is not None:
-        loaded = changed(loaded, {"surface": UniformEmissivity(emissivity)})
+        loaded = changed(loaded, {"surface": UniformSurface(emissivity)})
     write_results(loaded, out, force, compute=errors)
 
 

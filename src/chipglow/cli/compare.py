@@ -81,7 +81,7 @@ def compare(
         ),
         None if reference is None else shown_frame(whole.times, reference, option="--reference: "),
     )
-    screen, fits = current(), result.fit_frame()
+    screen, fits = current(), result.fits.copy()
     fits["bias_expanded_K"] = COVERAGE * fits["bias_standard_uncertainty_K"]
     columns = ["place", "simulation", "bias_K ± bias_expanded_K", "rms_K"]
     columns += ["values_with_E_n_up_to_1", "values"]
@@ -89,8 +89,8 @@ def compare(
     screen.table("fits", fits, columns, title)
     screen.remarks(chosen.notes)
     screen.heading()
-    for place in result.places:
-        screen.say(place.sentence)
+    for sentence in result.sentences:
+        screen.say(sentence)
     screen.heading()
     screen.say(result.statement)
     finish(

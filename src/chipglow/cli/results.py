@@ -39,9 +39,8 @@ def write_results(
         for each in (study, steady_study):
             if each is not None and each.scene is None:
                 confirm_cost(each, resume, agreed)
-        assumed: list[str] = []
         with progress_bars() as progress:
-            analysis = compute(study, progress, resume, assumed.append)
+            analysis = compute(study, progress, resume)
             steady, failed = _steady(steady_study, progress, resume)
             analysis = replace(analysis, failed={**analysis.failed, **failed})
             progress("report", 0.0)
@@ -52,7 +51,7 @@ def write_results(
                 titled.title,
                 study_text(titled),
                 _provenance(study),
-                [*remarks, *(f"Assumed: {one}" for one in assumed), *analysis.warnings],
+                [*remarks, *(f"Assumed: {one}" for one in analysis.assumed), *analysis.warnings],
                 study,
                 steady,
             )
@@ -62,7 +61,7 @@ def write_results(
     for remark in remarks:
         screen.say(remark)
     failures = [f"{title} failed: {reason}" for title, reason in analysis.failed.items()]
-    screen.notes(Notes(assumed, [*analysis.warnings, *failures]))
+    screen.notes(Notes(list(analysis.assumed), [*analysis.warnings, *failures]))
     if analysis.cut is not None and analysis.cut.forces:
         say_of_cut(analysis.cut.forces.inertia)
     screen.notes(Notes(), analysis.missing)

@@ -27,11 +27,11 @@ def wavelengths(
     from chipglow.study import load_study, wavelengths as compare
     from chipglow.text import Notes
 
-    loaded, assumed = load_study(study), list[str]()
+    loaded = load_study(study)
     if loaded.scene is None:
         confirm_cost(loaded, resume, yes)
     with progress_bars() as progress:
-        errors = compare(loaded, progress, resume, assumed.append)
+        errors = compare(loaded, progress, resume)
     frame = wavelengths_frame(errors)
     columns = ["first_um", "second_um", "total_K", "error_K ± standard_deviation_K"]
     columns += ["misregistration_K", "noise_K", "emissivity_uncertainty_K"]
@@ -41,7 +41,7 @@ def wavelengths(
         current().table("bands", rows.sort_values("total_K"), columns, title, columns[:2])
         current().heading()
     finish(
-        Notes(assumed),
+        Notes.from_attrs(errors.attrs),
         (out, partial(write_frame, frame)),
         (plot, figure(draw_wavelengths, errors)),
     )

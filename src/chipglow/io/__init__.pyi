@@ -3,7 +3,6 @@ from .atomic import (
     atomic_path as atomic_path,
 )
 from .import_file import (
-    IMPORT_SOURCES as IMPORT_SOURCES,
     ImportDescription as ImportDescription,
     import_description as import_description,
     import_text as import_text,
@@ -39,7 +38,6 @@ from .spool import (
     UnfinishedScene as UnfinishedScene,
     unfinished_scenes as unfinished_scenes,
 )
-from .table_file import check_table_path as check_table_path
 from .tool_section import (
     ToolSection as ToolSection,
     read_tool_outline as read_tool_outline,

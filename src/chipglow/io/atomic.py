@@ -5,14 +5,14 @@ import errno
 import os
 import secrets
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import Final
-
-from chipglow.io.interrupts import uninterrupted
 
 MANIFEST: Final = ".chipglow-files"
 """File in a folder of results that lists the files that chipglow wrote there, one a line."""
@@ -53,6 +53,32 @@ def atomic_folder(path: str | os.PathLike[str], force: bool = False) -> Iterator
         check_output_folder(path, force)
         with uninterrupted():
             _replace_folder(temporary, path)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold signals back that would raise an exception; they are sent again when the block ends."""
+    if current_thread() is not main_thread():  # where no signal is handled
+        yield
+        return
+    held: list[int] = []
+    handlers = {
+        number: signal.getsignal(number)
+        for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+        if callable(signal.getsignal(number))
+    }
+    for number in handlers:
+        signal.signal(number, lambda number, frame: held.append(number))
+    try:
+        yield
+    except KeyboardInterrupt:
+        held.clear()  # what it would tell is under way
+        raise
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if held:
+            signal.raise_signal(held[0])
 
 
 def check_output(path: Path) -> Path:

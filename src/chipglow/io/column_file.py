@@ -59,7 +59,7 @@ def read_columns(
 def _table(
     path: Path, columns: Sequence[Column]
 ) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
-    """Columns by name, and which line of the file each row is."""
+    """Return the columns by name, and which line of the file each row is."""
     lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     if len(rows) < 2:
@@ -102,7 +102,7 @@ def read_calibration_points(
 
 
 def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
-    """The column that a cell of the first line names, and its unit."""
+    """Return the column that a cell of the first line names, and its unit."""
     for column in sorted(columns, key=lambda one: -len(one.name)):
         if cell == column.name and not column.base:
             return column, SI

@@ -14,8 +14,7 @@ from typing import Any, Final
 import h5py
 
 from chipglow.io import examine
-from chipglow.io.atomic import atomic_path
-from chipglow.io.interrupts import uninterrupted
+from chipglow.io.atomic import atomic_path, uninterrupted
 from chipglow.text import check_own_data
 
 PATIENCE: Final = 30.0
@@ -99,16 +98,10 @@ def is_intact(path: Path) -> bool | None:
 
 
 def check_file(path: Path) -> None:
-    """Check an HDF5 file before it is read in this process.
+    """Refuse an HDF5 file that is damaged or takes data from other files.
 
     A file without a digest, or with one that does not match, is examined in a subprocess, as HDF5
     can loop for ever at a damaged file.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged, which names the dataset where that is known, if HDF5 takes too long
-        or if the file takes data from other files.
     """
     intact = is_intact(path)
     if not intact and h5py.is_hdf5(path):

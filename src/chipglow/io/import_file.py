@@ -98,7 +98,7 @@ class MovieSection(MovieSource):
         Part.__post_init__(self)  # the movies follow
 
     def source(self, whole: "ImportDescription") -> MovieSource:
-        """The source that this section describes."""
+        """Return the source that this section describes."""
         movies = {}
         for name in ("temperature", "plastic_strain", "plastic_strain_rate"):
             section = getattr(self, name)
@@ -237,7 +237,7 @@ class ImportDescription(Part):
         return self.source
 
     def kind_of_source(self) -> str:
-        """What the source is, as said or by the file's name."""
+        """Return the kind of the source, as stated or by the file's name."""
         if self.kind is not None:
             return self.kind
         name = Path(self.file).name.lower()
@@ -249,7 +249,7 @@ class ImportDescription(Part):
         raise ValueError(f"kind: {name!r} says none, expected {', '.join(IMPORT_SOURCES.kinds)}")
 
     def build(self) -> Import:
-        """The import that is described."""
+        """Return the import that is described."""
         section = getattr(self, self.kind_of_source())
         is_movie = isinstance(section, MovieSection)
         source = section.source(self) if is_movie else self._source(section)
@@ -264,7 +264,7 @@ class ImportDescription(Part):
         )
 
     def _source(self, section: Any) -> Any:
-        """A source with what the description says beside its section."""
+        """Return a source with what the description states beside its section."""
         said = {
             "files": ("files" in section.declared() and section.files) or self.file,
             "names": self.fields,
@@ -294,7 +294,7 @@ class ImportDescription(Part):
 
 
 def import_description() -> type[ImportDescription]:
-    """What describes an import, with the sections of the kinds that other packages add."""
+    """Return the class of descriptions, with the sections of the kinds of other packages."""
     parts = IMPORT_SOURCES.parts
     added = {kind: part for kind, part in parts.items() if kind not in ImportDescription.declared()}
     if not added:
@@ -332,7 +332,7 @@ def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescr
 
 
 def import_text(description: ImportDescription) -> str:
-    """A description of an import as YAML, every field with a comment."""
+    """Return a description of an import as YAML, every field with a comment."""
     return commented_yaml(_IMPORT_HEADER, description)
 
 

@@ -11,8 +11,8 @@ import xarray as xr
 
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
-from chipglow.io.chunks import COMPRESSION
 from chipglow.io.digest import check_file, is_intact, write_hdf5
+from chipglow.io.packing import COMPRESSION
 
 Made = TypeVar("Made")
 

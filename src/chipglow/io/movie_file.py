@@ -21,7 +21,7 @@ _SAME: Final = 255
 
 
 def check_movie_path(path: str | os.PathLike[str]) -> None:
-    """Find out whether a movie of this name can be written, before anything is computed."""
+    """Check that a movie of this name can be written, before anything is computed."""
     suffix = Path(path).suffix.lower()
     if suffix not in (".mp4", ".gif"):
         raise ValueError(f"{path}: expected the name of a movie, ending in .mp4 or .gif")
@@ -41,41 +41,27 @@ def movie_writer(
     Yields a function that takes the next picture: red, green and blue, shape (rows, columns, 3),
     both even. `palette` are the colours of a GIF, shape (up to `PALETTE_SIZE`, 3).
     """
-    path = Path(path)
     check_movie_path(path)
-    count = 0
+    kind = _Gif if Path(path).suffix.lower() == ".gif" else _Mp4
     with atomic_path(path) as part:
-        with _naming(path):
-            gif = path.suffix.lower() == ".gif"
-            movie = _Gif(part, shape, palette) if gif else _Mp4(part, shape)
+        movie, count = kind(part, shape, palette), 0
 
         def append(picture: NDArray[np.uint8]) -> None:
             nonlocal count
-            with _naming(path):
-                movie.append(picture)
+            movie.append(picture)
             count += 1
 
         try:
             yield append
             if count == 0:
                 raise ValueError(f"{path}: there was no picture to show, expected 1 or more")
-            with _naming(path):
-                movie.finish()
+            movie.finish()
         finally:
-            with _naming(path):
-                movie.close()
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OSError(f"{path}: could not be written: {error.strerror}") from error
+            movie.close()
 
 
 class _Mp4:
-    def __init__(self, part: Path, shape: tuple[int, int]) -> None:
+    def __init__(self, part: Path, shape: tuple[int, int], palette: NDArray[np.uint8]) -> None:
         import av
 
         self._frame = av.VideoFrame.from_ndarray
@@ -143,6 +129,6 @@ class _Gif:
 
 
 def _extent(changed: NDArray[np.bool_]) -> slice:
-    """From the first to the last change; one sample if there is none."""
+    """Return the samples from the first to the last change; one if there is none."""
     where = np.flatnonzero(changed)
     return slice(int(where[0]), int(where[-1]) + 1) if where.size else slice(0, 1)

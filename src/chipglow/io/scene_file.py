@@ -18,11 +18,17 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io import spline_file
-from chipglow.io.chunks import COMPRESSION, chunk_of, read_chunk
+from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
-from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import HOTTEST_PACKED, Packing, packing_for
+from chipglow.io.packing import (
+    COMPRESSION,
+    HOTTEST_PACKED,
+    Packing,
+    chunk_of,
+    packing_for,
+    read_chunk,
+)
 from chipglow.io.spool import UnfinishedScene, spooled
 from chipglow.scene import (
     ENERGY_UNITS,
@@ -181,7 +187,7 @@ class SceneWriter:
                 f"{self._lattice.shape}, expected those of the lattice"
             )
         kept = spline_file.rounded(frame.splines)
-        return [kept[name] for name in spline_file.CHUNKED]
+        return [np.asarray(kept[name], np.float32) for name in spline_file.CHUNKED]
 
     def _packed(self, name: str, frame: Frame) -> NDArray[Any]:
         values = getattr(frame, name)
@@ -191,7 +197,8 @@ class SceneWriter:
                 f"scene: {name!r} is {found} at {frame.time:.9g} s, expected {self.raster.shape}"
             )
         try:
-            return self._packing[name].pack(values)
+            packing = self._packing[name]
+            return np.asarray(packing.pack(values), packing.dtype)
         except ValueError as error:
             raise SceneError(f"scene: {name!r} at {frame.time:.9g} s: {error}") from None
 

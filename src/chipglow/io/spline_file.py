@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from chipglow.io.chunks import COMPRESSION
+from chipglow.io.packing import COMPRESSION
 from chipglow.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS, SceneError
 from chipglow.scene.scene import raster_of
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame

@@ -53,7 +53,7 @@ class ToolSection(Part):
         self.build()
 
     def build(self) -> Tool:
-        """The tool's outline."""
+        """Return the tool's outline."""
         if self.outline:
             try:
                 return read_tool_outline(self.outline)

@@ -7,7 +7,7 @@ from typing import Protocol
 import pandas as pd
 import xarray as xr
 
-from chipglow.io import atomic_path, check_table_path, write_dataset
+from chipglow.io import atomic_path, write_dataset
 
 
 class Result(Protocol):
@@ -22,12 +22,13 @@ class Result(Protocol):
 
 def write_result(result: Result, path: str | os.PathLike[str]) -> None:
     """Write a result in the format that the file suffix names."""
-    path = Path(path)
-    check_table_path(path)
-    if path.suffix.lower() == ".nc":
+    suffix = Path(path).suffix.lower()
+    if suffix == ".nc":
         write_dataset(result.to_dataset(), path)
-    else:
+    elif suffix == ".csv":
         write_frame(result.to_frame(), path)
+    else:
+        raise ValueError(f"{path}: expected a file that ends in .csv or .nc")
 
 
 def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:

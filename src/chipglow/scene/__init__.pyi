@@ -12,7 +12,6 @@ from .lines import (
     sample as sample,
     straight_line as straight_line,
 )
-from .placed_tool import PlacedTool as PlacedTool
 from .raster import Raster as Raster
 from .regions import (
     Area as Area,
@@ -34,6 +33,7 @@ from .scene import (
 from .tool import (
     Chamfer as Chamfer,
     Hone as Hone,
+    PlacedTool as PlacedTool,
     Tool as Tool,
     ToolGeometry as ToolGeometry,
 )

@@ -185,6 +185,11 @@ class Scene:
         times = self.times
         return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
 
+    def frame_at(self, time: float) -> int:
+        """Return the number of the frame that stands for a time in s: the last up to it."""
+        rounded = time + 1e-6 * self.frame_spacing
+        return max(int(np.searchsorted(self.times, rounded, side="right")) - 1, 0)
+
     @property
     def blocks(self) -> list[range]:
         """Ranges of the numbers of frames that follow one another without a gap."""

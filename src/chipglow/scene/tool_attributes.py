@@ -5,8 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chipglow.scene.placed_tool import PlacedTool
-from chipglow.scene.tool import Chamfer, Hone, Tool, ToolGeometry
+from chipglow.scene.tool import Chamfer, Hone, PlacedTool, Tool, ToolGeometry
 from chipglow.scene.tool_outline import ToolOutline
 
 _WEDGE: Final = ("rake_angle", "clearance_angle", "edge_radius")

@@ -6,12 +6,11 @@ from chipglow.study.cache import (
     cached_scenes as cached_scenes,
     clear_cache as clear_cache,
 )
-from chipglow.study.cost import Cost as Cost, expected_cost as expected_cost
+from chipglow.study.cost import expected_cost as expected_cost
 from chipglow.study.files import load_study as load_study, study_text as study_text
 from chipglow.study.fitting import Fitted as Fitted, fit as fit
 from chipglow.study.preview import preview_raster as preview_raster
 from chipglow.study.running import (
-    CUTTING_STEP as CUTTING_STEP,
     Progress as Progress,
     cut as cut,
     errors as errors,

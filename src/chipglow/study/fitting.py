@@ -13,9 +13,9 @@ from chipglow.surface import (
     FeatureSurface,
     FeatureTrends,
     MapSurface,
+    ModifiedSurface,
     Surface,
     TrendSurface,
-    WrappedSurface,
 )
 from chipglow.text import Notes
 from chipglow.text.template import yaml_line
@@ -73,28 +73,26 @@ def fit(study: Study, scene: Scene) -> Fitted:
 
 
 def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
-    if isinstance(surface, FeatureSurface):
-        return replace(surface, follow=follow) if surface.follow == "material" else surface
-    if not isinstance(surface, WrappedSurface):
-        return surface
-    bare = _following(surface.bare, follow)
-    return surface if bare is surface.bare else replace(surface, bare=bare)
+    """Return a surface whose textures do not follow the material."""
+    if isinstance(surface, ModifiedSurface):
+        return replace(surface, bare=_following(surface.bare, follow))
+    if isinstance(surface, FeatureSurface) and surface.follow == "material":
+        return replace(surface, follow=follow)
+    return surface
 
 
-def _layers(surface: Surface) -> Iterator[Surface]:
-    yield surface
-    if isinstance(surface, WrappedSurface):
-        yield from _layers(surface.bare)
+def _bare(surface: Surface) -> Surface:
+    return surface.bare if isinstance(surface, ModifiedSurface) else surface
 
 
 def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
     for name, surface in surfaces.items():
         trends: list[EmissivityTrend] = []
-        for layer in _layers(surface):
-            if isinstance(layer, TrendSurface):
-                trends.append(layer.trend)
-            elif isinstance(layer, FeatureTrends):
-                trends.extend(layer.trends.values())
+        if isinstance(bare := _bare(surface), TrendSurface):
+            trends.append(bare.trend)
+        for one in surface.modifiers if isinstance(surface, ModifiedSurface) else ():
+            if isinstance(one, FeatureTrends):
+                trends.extend(one.trends.values())
         for low, high in dict.fromkeys(trend.measured for trend in trends):
             text = f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C"
             if low == high:
@@ -124,7 +122,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
     """Yield what emissivity maps leave of the scene, a sentence each."""
     for name, outer in surfaces.items():
-        *_, surface = _layers(outer)
+        surface = _bare(outer)
         if not isinstance(surface, MapSurface):
             continue
         fraction = surface.known_fraction(scene)

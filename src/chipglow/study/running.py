@@ -26,14 +26,15 @@ from chipglow.cutting import (
     SolverError,
 )
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
+from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import is_intact
-from chipglow.io.interrupts import uninterrupted
 from chipglow.quantities import adapter, unchecked
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
 from chipglow.study.fitting import Fitted, fit, left_to_the_paper
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
+from chipglow.text import Notes
 
 CUTTING_STEP: Final = "cutting simulation"
 PREVIEW_STEP: Final = "preview"
@@ -111,7 +112,6 @@ def run(
     study: Study,
     progress: Progress | None = None,
     resume: bool = False,
-    assume: Callable[[str], None] | None = None,
 ) -> Analysis:
     """Run a study from the cut, or from the scene that takes its place, to the analysis.
 
@@ -123,8 +123,6 @@ def run(
         Told which step is under way and how much of it is done.
     resume : bool
         As for `cut`.
-    assume : callable, optional
-        Told a sentence of each thing that the scene does not say and that had to be assumed.
 
     Returns
     -------
@@ -138,27 +136,26 @@ def run(
     ValueError
         If the scene cannot be analysed as the study wants it; the message names the scene's file.
     """
-    with _fitted(study, progress, resume, assume) as fitted:
+    with _fitted(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
-        return analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
+        analysis = analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
+        return replace(analysis, assumed=tuple(fitted.notes.assumed))
 
 
 def errors(
     study: Study,
     progress: Progress | None = None,
     resume: bool = False,
-    assume: Callable[[str], None] | None = None,
 ) -> Analysis:
     """Return the measurement error of any scene, exposure by exposure, at the study's places."""
     any_scene = unchecked(study, analysis=replace(study.analysis, cut=False))
-    return run(any_scene, progress, resume, assume)
+    return run(any_scene, progress, resume)
 
 
 def wavelengths(
     study: Study,
     progress: Progress | None = None,
     resume: bool = False,
-    assume: Callable[[str], None] | None = None,
 ) -> xr.Dataset:
     """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
 
@@ -169,7 +166,7 @@ def wavelengths(
     ----------
     study : Study
         What to do.
-    progress, resume, assume
+    progress, resume
         As for `run`.
 
     Raises
@@ -178,7 +175,7 @@ def wavelengths(
         If the scene shows no band and no contact with a tool, and the study names no points.
     """
     plan = study.plan
-    with _fitted(study, progress, resume, assume) as fitted:
+    with _fitted(study, progress, resume) as fitted:
         scene = fitted.scene
         camera = study.camera.on(scene.raster, study.seed)
         if study.analysis.points:
@@ -187,33 +184,20 @@ def wavelengths(
             if missing := list(lacking(scene)):
                 raise ValueError(f"{missing[0]} Expected points to read (analysis.points).")
             spots = cut_spots(scene, camera, plan, progress)
-        return wavelength_errors(
-            scene,
-            fitted.surfaces,
-            camera,
-            study.wavelengths,
-            spots,
-            plan.phases,
-            plan.textures,
-            progress,
+        draws = plan.phases, plan.textures
+        data = wavelength_errors(
+            scene, fitted.surfaces, camera, study.wavelengths, spots, *draws, progress
         )
+        return data.assign_attrs(fitted.notes.attrs())
 
 
 @contextmanager
-def _fitted(
-    study: Study,
-    progress: Progress | None,
-    resume: bool,
-    assume: Callable[[str], None] | None,
-) -> Iterator[Fitted]:
+def _fitted(study: Study, progress: Progress | None, resume: bool) -> Iterator[Fitted]:
     """Yield the scene and the surfaces of a study; errors name the scene's file."""
     path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
     try:
-        fitted = fit(study, open_scene(path))
-        if assume:
-            for sentence in (*left_to_the_paper(study), *fitted.notes.assumed):
-                assume(sentence)
-        yield fitted
+        fitted, left = fit(study, open_scene(path)), Notes(list(left_to_the_paper(study)))
+        yield replace(fitted, notes=left + fitted.notes)
     except SceneError:
         raise
     except ValueError as error:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 from chipglow.laboratory.emissivity import (
+    SurfaceFile,
     emissivity_trend,
     measured_features,
     read_emissivity_lines,
@@ -17,23 +18,21 @@ from chipglow.surface import (
     CHIP_1,
     CHIP_2,
     DIRECTIONS,
+    MODIFIERS,
     OXIDES,
     REFLECTIONS,
     SPECTRA,
     SURFACES,
     Direction,
-    DirectionalSurface,
-    DispersiveSurface,
+    Dispersion,
     Emissivity,
     FeatureSurface,
     FeatureTrends,
+    Modifier,
     Oxide,
-    OxidisedSurface,
-    ReflectingSurface,
     SideShape,
     SpectralSurface,
     Surface,
-    SurfaceChoice,
 )
 
 CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
@@ -119,6 +118,10 @@ class FeaturesSection(Part):
             "Band in which they are as they stand here, where they are not grey.", WAVELENGTHS
         ),
     ] = (3.8e-6, 5.1e-6)
+    modifiers: Annotated[
+        tuple[Annotated[Modifier, MODIFIERS], ...],
+        Parameter("Laws of other packages that modify all these emissivities, in order, or []."),
+    ] = ()
     oxide: Annotated[
         Annotated[Oxide, OXIDES] | None,
         Parameter(
@@ -163,26 +166,17 @@ class FeaturesSection(Part):
         maps = {name: read_emissivity_map(file) for name, file in self.maps.items()}
         measured = {name: self._measured(file, seed) for name, file in self.measured.items()}
         bare: dict[str, Surface] = {**chips, **maps, **measured}
-        return {name: self._wrapped(surface) for name, surface in bare.items()}
-
-    def _wrapped(self, surface: Surface) -> Surface:
-        """Return a surface with what is over it, the spectrum first."""
-        if self.spectral is not None:
-            surface = DispersiveSurface(surface, self.spectral, Band(*self.measured_in))
-        if self.oxide is not None:
-            surface = OxidisedSurface(surface, self.oxide)
-        if self.directional is not None:
-            surface = DirectionalSurface(surface, self.directional)
-        if self.reflections is not None:
-            surface = ReflectingSurface(surface, self.reflections)
-        return surface
+        spectra = [Dispersion(self.spectral, Band(*self.measured_in))] if self.spectral else []
+        over = (self.oxide, self.directional, self.reflections)
+        modifiers = [*spectra, *self.modifiers, *(one for one in over if one is not None)]
+        return {name: surface.modified(*modifiers) for name, surface in bare.items()}
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
         shared = FeatureSurface.declared().keys() & self.declared().keys()
         values = {name: getattr(self, name) for name in shared}
         return FeatureSurface(chip=chip, shear_band=shear_band, seed=seed, **values)
 
-    def _measured(self, file: str, seed: int) -> FeatureTrends:
+    def _measured(self, file: str, seed: int) -> Surface:
         try:
             lines = measured_features(read_emissivity_lines(file))
             trends = {name: emissivity_trend(line) for name, line in lines.items()}
@@ -195,19 +189,19 @@ class FeaturesSection(Part):
         bare = self._features(means["body"], means["shear_band"], seed)
         workpiece, tool = means.get("workpiece", bare.workpiece), means.get("tool", bare.tool)
         trends = {"chip" if name == "body" else name: trend for name, trend in trends.items()}
-        return FeatureTrends(replace(bare, workpiece=workpiece, tool=tool), trends)
+        return replace(bare, workpiece=workpiece, tool=tool).modified(FeatureTrends(trends))
 
 
-SurfaceSection = Annotated[FeaturesSection | SurfaceChoice, SURFACES]
+SurfaceSection = Annotated[FeaturesSection | Surface | SurfaceFile, SURFACES]
 
 
-def surface_names(section: FeaturesSection | SurfaceChoice) -> tuple[str, ...]:
+def surface_names(section: FeaturesSection | Surface | SurfaceFile) -> tuple[str, ...]:
     """Return the names of a section's surfaces; a single one is called by its kind."""
     return section.names if isinstance(section, FeaturesSection) else (section.kind,)
 
 
-def surfaces_of(section: FeaturesSection | SurfaceChoice, seed: int) -> dict[str, Surface]:
+def surfaces_of(section: FeaturesSection | Surface | SurfaceFile, seed: int) -> dict[str, Surface]:
     """Return the surfaces of a section by their names."""
     if isinstance(section, FeaturesSection):
         return section.build(seed)
-    return {section.kind: section.surface()}
+    return {section.kind: section.surface() if isinstance(section, SurfaceFile) else section}

@@ -1,104 +1,68 @@
 """Surfaces: emissivity maps that follow the material."""
 
+from chipglow.surface.cross_section import (
+    SideElements as SideElements,
+)
 from chipglow.surface.directional import (
-    DIRECTIONS,
-    Direction,
-    DirectionalField,
-    DirectionalSurface,
-    Fresnel,
+    DIRECTIONS as DIRECTIONS,
+    Direction as Direction,
+    Fresnel as Fresnel,
 )
-from chipglow.surface.dispersive import DispersiveField, DispersiveSurface
-from chipglow.surface.emissivity import Emissivity
-from chipglow.surface.exchange import Exchange
+from chipglow.surface.emissivity import (
+    Emissivity as Emissivity,
+)
+from chipglow.surface.exchange import (
+    Exchange as Exchange,
+)
 from chipglow.surface.feature import (
-    CHIP_1,
-    CHIP_2,
-    FeatureField,
-    FeatureFields,
-    FeatureSurface,
-    chip_fraction,
-    shear_band_fraction,
+    CHIP_1 as CHIP_1,
+    CHIP_2 as CHIP_2,
+    EmissivityStack as EmissivityStack,
+    Features as Features,
+    FeatureSurface as FeatureSurface,
+    FeatureTrends as FeatureTrends,
+    chip_fraction as chip_fraction,
+    feature_fractions as feature_fractions,
+    shear_band_fraction as shear_band_fraction,
 )
-from chipglow.surface.line import (
-    EmissivityTrend,
-    FeatureTrends,
-    FeatureTrendsField,
-    TrendSurface,
+from chipglow.surface.map import (
+    MapSurface as MapSurface,
 )
-from chipglow.surface.map import MapField, MapSurface
 from chipglow.surface.oxide import (
-    OXIDES,
-    Oxide,
-    OxideHistory,
-    OxidisedField,
-    OxidisedSurface,
-    ParabolicOxide,
+    OXIDES as OXIDES,
+    Oxide as Oxide,
+    OxideHistory as OxideHistory,
+    ParabolicOxide as ParabolicOxide,
 )
-from chipglow.surface.reflecting import ReflectingField, ReflectingSurface
-from chipglow.surface.side_flow import REFLECTIONS, SideElements, SideShape, Wedge
-from chipglow.surface.spectral import SPECTRA, HagenRubens, SpectralSurface, SpectralTable
+from chipglow.surface.side_flow import (
+    REFLECTIONS as REFLECTIONS,
+    SideShape as SideShape,
+    Wedge as Wedge,
+)
+from chipglow.surface.spectral import (
+    SPECTRA as SPECTRA,
+    Dispersion as Dispersion,
+    HagenRubens as HagenRubens,
+    SpectralSurface as SpectralSurface,
+    SpectralTable as SpectralTable,
+)
 from chipglow.surface.surface import (
-    SURFACES,
-    EmissivityField,
-    EmissivityStack,
-    Surface,
-    SurfaceChoice,
-    UniformEmissivity,
-    UniformSurface,
-    WrappedSurface,
+    MODIFIERS as MODIFIERS,
+    SURFACES as SURFACES,
+    Change as Change,
+    EmissivityField as EmissivityField,
+    ModifiedSurface as ModifiedSurface,
+    Modifier as Modifier,
+    Surface as Surface,
 )
-from chipglow.surface.temperature import PhaseEmissivity, TemperatureSurface, TemperatureTable
-from chipglow.surface.texture import Texture
-
-__all__ = [
-    "CHIP_1",
-    "CHIP_2",
-    "DIRECTIONS",
-    "OXIDES",
-    "REFLECTIONS",
-    "SPECTRA",
-    "SURFACES",
-    "Direction",
-    "DirectionalField",
-    "DirectionalSurface",
-    "DispersiveField",
-    "DispersiveSurface",
-    "Emissivity",
-    "EmissivityField",
-    "EmissivityStack",
-    "EmissivityTrend",
-    "Exchange",
-    "FeatureField",
-    "FeatureFields",
-    "FeatureSurface",
-    "FeatureTrends",
-    "FeatureTrendsField",
-    "Fresnel",
-    "HagenRubens",
-    "MapField",
-    "MapSurface",
-    "Oxide",
-    "OxideHistory",
-    "OxidisedField",
-    "OxidisedSurface",
-    "ParabolicOxide",
-    "PhaseEmissivity",
-    "ReflectingField",
-    "ReflectingSurface",
-    "SideElements",
-    "SideShape",
-    "SpectralSurface",
-    "SpectralTable",
-    "Surface",
-    "SurfaceChoice",
-    "TemperatureSurface",
-    "TemperatureTable",
-    "Texture",
-    "TrendSurface",
-    "UniformEmissivity",
-    "UniformSurface",
-    "Wedge",
-    "WrappedSurface",
-    "chip_fraction",
-    "shear_band_fraction",
-]
+from chipglow.surface.temperature import (
+    EmissivityTrend as EmissivityTrend,
+    HomogeneousSurface as HomogeneousSurface,
+    PhaseSurface as PhaseSurface,
+    TemperatureSurface as TemperatureSurface,
+    TrendSurface as TrendSurface,
+    UniformSurface as UniformSurface,
+)
+from chipglow.surface.texture import (
+    Texture as Texture,
+)

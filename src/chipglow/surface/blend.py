@@ -7,13 +7,11 @@ textures, whose nodes lie scattered, the four by four about a sample are vectors
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
+from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.scene import Material
-from chipglow.surface.texture import MAP_SIZE, emissivity_at
+from chipglow.surface.texture import WIDTH, WRAP, emissivity_at, patch
 
 STRAIN_OF_WORKPIECE: Final = 0.3
 """Plastic strain up to which the workpiece's map holds alone."""
@@ -27,17 +25,6 @@ RATE_OF_SHEAR_BAND: Final = 30_000.0
 SCRATCH: Final = 5
 """Rows of float32 that `blend_row` works on, before those of the seeds."""
 
-_WIDTH: Final = MAP_SIZE + 4
-_WRAP: Final = MAP_SIZE - 1
-# Cubic convolution (Keys, 1981; a = -1/2): weights of four nodes by powers of the way from the
-# second to the third, the cube first.
-_CUBIC: Final = (
-    (-0.5, 1.5, -1.5, 0.5),
-    (1.0, -2.5, 2.0, -0.5),
-    (-0.5, 0.0, 0.5, 0.0),
-    (0.0, 1.0, 0.0, 0.0),
-)
-_LANES: Final = tuple(ir.Constant(ir.IntType(32), lane) for lane in range(4))
 _WORKPIECE, _TOOL = int(Material.WORKPIECE), int(Material.TOOL)
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
@@ -59,56 +46,11 @@ class Textures(NamedTuple):
     """Emissivity of the tool, shape (surface, y, x)."""
 
 
-def padded(nodes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a periodic map with the nodes about its border, so that no index wraps, flat."""
-    around = np.arange(-1, _WIDTH - 1) & _WRAP
-    return np.ascontiguousarray(nodes[around[:, None], around]).ravel()
-
-
 @njit(forceinline=True, **_FAST)
 def fraction_between(value, none, full):  # type: ignore[no-untyped-def]
     """Return how far a value has come from `none` to `full`, 0 to 1."""
     result = (value - np.float32(none)) * np.float32(1.0 / (full - none))
     return min(max(result, np.float32(0.0)), np.float32(1.0))
-
-
-@intrinsic
-def _patch(typing, nodes, corner, across, down):  # type: ignore[no-untyped-def]
-    """Value of a texture between four by four nodes, `across` and `down` past the inner corner.
-
-    What `chipglow.surface.texture.enlarged` computes, in vectors of four: left to itself the
-    compiler takes the sixteen nodes one by one.
-    """
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        four, fast = ir.VectorType(ir.FloatType(), 4), {"flags": ("contract",)}
-        nothing = ir.Constant(four, ir.Undefined)
-
-        def splat(vector: Any, lane: int) -> Any:
-            mask = ir.Constant(ir.VectorType(ir.IntType(32), 4), [lane] * 4)
-            return builder.shuffle_vector(vector, nothing, mask)
-
-        def weights(past: Any) -> Any:
-            all_past = splat(builder.insert_element(nothing, past, _LANES[0]), 0)
-            result = ir.Constant(four, list(_CUBIC[0]))
-            for coefficients in _CUBIC[1:]:
-                product = builder.fmul(result, all_past, **fast)
-                result = builder.fadd(product, ir.Constant(four, list(coefficients)), **fast)
-            return result
-
-        array, corner, across, down = arguments
-        base = context.make_array(signature.args[0])(context, builder, array).data
-        rows, total = weights(down), None
-        for row in range(4):
-            start = builder.add(corner, ir.Constant(ir.IntType(64), row * _WIDTH))
-            place = builder.bitcast(builder.gep(base, [start]), four.as_pointer())
-            product = builder.fmul(builder.load(place, align=4), splat(rows, row), **fast)
-            total = product if total is None else builder.fadd(total, product, **fast)
-        total = builder.fmul(total, weights(across), **fast)
-        low, high, left, right = (builder.extract_element(total, lane) for lane in _LANES)
-        return builder.fadd(builder.fadd(low, left), builder.fadd(high, right))
-
-    return types.float32(nodes, types.int64, types.float32, types.float32), generate
 
 
 @njit(**_FAST)
@@ -118,7 +60,7 @@ def _place(x, y, shift, scale, corner, across, down):  # type: ignore[no-untyped
         u, v = (x[i] - shift[0]) * scale, (y[i] - shift[1]) * scale
         before, above = np.floor(u), np.floor(v)
         across[i], down[i] = u - before, v - above
-        corner[i] = (np.int32(above) & _WRAP) * np.int32(_WIDTH) + (np.int32(before) & _WRAP)
+        corner[i] = (np.int32(above) & WRAP) * np.int32(WIDTH) + (np.int32(before) & WRAP)
 
 
 @njit(**_FAST)
@@ -126,7 +68,7 @@ def _deviates(nodes, corner, across, down, fractions, deviates):  # type: ignore
     """Deviate of the enlarged map wherever the feature has a fraction."""
     for i in range(corner.size):
         if fractions[i] > np.float32(0.0):
-            deviates[i] = _patch(nodes, np.int64(corner[i]), across[i], down[i])
+            deviates[i] = patch(nodes, np.int64(corner[i]), across[i], down[i])
 
 
 @njit(**_FAST)

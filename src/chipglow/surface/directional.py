@@ -1,7 +1,6 @@
 """Emissivity by the angle at which a surface is looked at: Fresnel's equations."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from abc import abstractmethod
 from dataclasses import dataclass
 from math import cos, radians
 from typing import Annotated, ClassVar, Final
@@ -9,22 +8,26 @@ from typing import Annotated, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Family, Parameter
 from chipglow.quantities.units import ANGLE
+from chipglow.radiometry import Band
 from chipglow.scene import Frame, Scene
-from chipglow.surface.surface import EmissivityField, Surface, WrappedSurface
+from chipglow.surface.surface import Change, Modifier, Surface
 
 DIRECTIONS: Final = Family("directional")
 """Laws of direction by their kind; other packages add theirs in ``chipglow.directional``."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Direction(Part, ABC):
-    """How the emissivity depends on the angle between normal and line of sight.
+class Direction(Modifier):
+    """An emissivity by the angle between normal and line of sight: a class that adds `emissivity`.
 
-    A class of a family that adds `emissivity`.
+    The scene's plane is seen at `tilt`, which does not move or shorten its picture. The chip's side
+    of a `SideShape` over it has the slope of its shape, at right angles to the tilt: the cosine of
+    the angle is the product of both. An emissivity that would be over 1 is 1.
     """
 
+    effect = "directional"
     tilt: Annotated[
         float,
         Parameter(
@@ -38,11 +41,29 @@ class Direction(Part, ABC):
 
     @abstractmethod
     def emissivity(self, cosine: ArrayLike) -> NDArray[np.float64]:
-        """Emissivity of the law's own surface by the cosine of the angle, from 0 to 1."""
+        """Return the emissivity of the law's own surface by the cosine of the angle, 0 to 1."""
 
     def ratio(self, cosine: ArrayLike) -> NDArray[np.float64]:
-        """Emissivity over that at normal incidence, by the cosine of the angle."""
+        """Return the emissivity over that at normal incidence, by the cosine of the angle."""
         return np.asarray(self.emissivity(cosine) / self.emissivity(1.0), np.float64)
+
+    def slope_ratio(self, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the emissivity of slopes, by their cosines, over that of the plane.
+
+        Cosines of elements that the camera does not see are 0 or less.
+        """
+        return self.ratio(np.clip(cosine, 0.0, 1.0) * cos(self.tilt)) / self.ratio(cos(self.tilt))
+
+    def change(
+        self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
+    ) -> Change:
+        ratio = np.float32(self.ratio(cos(self.tilt)))
+
+        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+            seen: NDArray[np.float32] = np.minimum(emissivity * ratio, 1.0)
+            return seen
+
+        return changed
 
 
 @DIRECTIONS.part
@@ -61,76 +82,9 @@ class Fresnel(Direction):
     k: Annotated[float, Parameter("Its extinction coefficient.", least=0.0)]
 
     def emissivity(self, cosine: ArrayLike) -> NDArray[np.float64]:
-        """See `Direction.emissivity`."""
         cosines = np.asarray(cosine, np.complex128)
         index = complex(self.n, self.k)
         inside = np.sqrt(index**2 - 1.0 + cosines**2)
         across = (cosines - inside) / (cosines + inside)
         along = (index**2 * cosines - inside) / (index**2 * cosines + inside)
         return np.asarray(1.0 - (np.abs(across) ** 2 + np.abs(along) ** 2) / 2, np.float64)
-
-
-@dataclass(frozen=True)
-class DirectionalSurface(WrappedSurface):
-    """Another surface whose emissivity depends on the angle at which it is seen.
-
-    Parameters
-    ----------
-    bare : Surface
-        The emissivity at right angles.
-    direction : Direction
-        How it changes with the angle; an emissivity that would be over 1 is 1.
-
-    Notes
-    -----
-    The scene's plane is seen at `Direction.tilt`, which does not move or shorten its picture. Where
-    `ReflectingSurface` lies over it the chip's side has the slope of its shape, at right angles to
-    the tilt: the cosine of the angle is the product of both.
-    """
-
-    direction: Direction
-
-    @property
-    def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
-        return {**self.bare.effects, "directional": repr(self.direction)}
-
-    def on(self, scene: Scene) -> "DirectionalField":
-        """Lay the surface on a scene."""
-        return DirectionalField(self.bare.on(scene), self.direction)
-
-
-@dataclass(frozen=True, eq=False)
-class DirectionalField(EmissivityField):
-    """A `DirectionalSurface` on one scene; made by `DirectionalSurface.on`."""
-
-    bare: EmissivityField
-    direction: Direction
-
-    @property
-    def needs(self) -> Collection[str] | None:
-        """See `EmissivityField.needs`."""
-        return self.bare.needs
-
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
-        ratio = np.float32(self.direction.ratio(cos(self.direction.tilt)))
-        seen = np.minimum(self.bare.emissivity(frame) * ratio, 1.0)
-        return np.asarray(seen, np.float32)
-
-
-def slope_ratio(surface: Surface, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Emissivity of elements on a slope over that of the flat surface as the camera sees it.
-
-    Parameters
-    ----------
-    surface : Surface
-        The surface; one that is not directional has the same everywhere.
-    cosine : ndarray
-        Cosines of the slopes; elements that the camera does not see have 0 or less.
-    """
-    if not isinstance(surface, DirectionalSurface):
-        return np.ones(cosine.shape)
-    direction = surface.direction
-    seen = np.clip(cosine, 0.0, 1.0) * cos(direction.tilt)
-    return direction.ratio(seen) / direction.ratio(cos(direction.tilt))

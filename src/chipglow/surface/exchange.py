@@ -84,44 +84,21 @@ class Exchange:
         np.add.at(factors, (element, paths[:, 0]), weights)  # −1, the open, is the last column
         return factors
 
-    def irradiation(
+    def incident(
         self,
         radiance: ArrayLike,
         emissivity: ArrayLike,
         surroundings: float = 0.0,
         mirror: ArrayLike = 0.0,
+        eye: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         """Return the irradiation over π of each element, shape (..., element).
 
         Of blackbodies' radiance (..., element), emissivities, the surroundings' radiance, and
-        the fraction of reflected light that is reflected as by a mirror.
+        the fraction of reflected light that is reflected as by a mirror. For an eye far off in a
+        direction (2,), which sees ε L + (1 − ε) times the result, the mirrors' fraction is the
+        radiance in the mirrored direction.
         """
-        return self._incident(radiance, emissivity, surroundings, mirror, None)
-
-    def seen(
-        self,
-        direction: ArrayLike,
-        radiance: ArrayLike,
-        emissivity: ArrayLike,
-        surroundings: float = 0.0,
-        mirror: ArrayLike = 0.0,
-    ) -> NDArray[np.float64]:
-        """Return the incident radiance whose reflection an eye far off in a direction (2,) sees.
-
-        The eye sees ε L + (1 − ε) times it: the irradiation for the diffuse fraction of the
-        reflected light, the radiance in the mirrored direction for the rest.
-        """
-        toward = np.asarray(direction, np.float64)
-        return self._incident(radiance, emissivity, surroundings, mirror, toward)
-
-    def _incident(
-        self,
-        radiance: ArrayLike,
-        emissivity: ArrayLike,
-        surroundings: float,
-        mirror: ArrayLike,
-        eye: NDArray[np.float64] | None,
-    ) -> NDArray[np.float64]:
         black = np.asarray(radiance, np.float64)
         emissivities, mirrors = (
             np.broadcast_to(np.asarray(values, np.float64), black.shape)
@@ -133,7 +110,7 @@ class Exchange:
         mirror_part = np.ascontiguousarray(mirrors.reshape(-1, count))
         if not mirrors.any():
             return self._diffuse(own, reflectance, surroundings).reshape(shape)
-        looked = np.zeros((0, 0), np.int16) if eye is None else self._mirrored(eye)
+        looked = np.zeros((0, 0), np.int16) if eye is None else self._mirrored(np.asarray(eye))
         result, paths = np.empty_like(own), self._all_hits
         scale = max(float(np.max(black, initial=0.0)), surroundings) * TOLERANCE
         _solve(own, reflectance, mirror_part, *paths, looked, surroundings, scale, result)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
+from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.surface.blend import (
     RATE_OF_CHIP,
@@ -21,12 +22,12 @@ from chipglow.surface.blend import (
     Textures,
     blend_row,
     fraction_between,
-    padded,
 )
 from chipglow.surface.blocks import in_blocks
 from chipglow.surface.emissivity import Emissivity
-from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
-from chipglow.surface.texture import Texture
+from chipglow.surface.surface import Change, EmissivityField, Modifier, Surface
+from chipglow.surface.temperature import EmissivityTrend, draw_text, drawn_trends
+from chipglow.surface.texture import Texture, padded
 
 UNDEFORMED_STRAIN: Final = 0.01
 """Plastic strain under which material is not affected by the cut."""
@@ -92,7 +93,6 @@ class FeatureSurface(Surface, Part):
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
         numbers = {name: getattr(self, name) for name in FEATURES}
         restored = "" if self.restore_standard_deviation else ", standard deviation not restored"
         return {
@@ -103,20 +103,10 @@ class FeatureSurface(Surface, Part):
             "texture": f"grain {self.grain:g} m, follow {self.follow}, seed {self.seed}{restored}",
         }
 
-    def on(self, scene: Scene) -> "FeatureField":
-        """Lay the textures on a scene.
-
-        Parameters
-        ----------
-        scene : Scene
-            With `follow` "mean", all its frames are read once.
-
-        Raises
-        ------
-        ValueError
-            If the scene has no plastic strain, by which features are told, or no material
-            coordinates or velocity that the textures shall follow.
-        """
+    def on(
+        self, scene: Scene, band: Band | None = None, reflected: float | None = None
+    ) -> EmissivityField:
+        """See `Surface.on`; with `follow` "mean", all frames of the scene are read once."""
         if "plastic_strain" not in scene.fields:
             raise ValueError(
                 "surface: the scene has no plastic strain, by which chip and workpiece are told "
@@ -135,14 +125,18 @@ class FeatureSurface(Surface, Part):
         times, shifts = scene.times, np.zeros((len(scene.times), 3, 2))
         if self.follow == "mean":
             shifts = _mean_shifts(scene)
-        return FeatureField(self, scene.raster, times, shifts)
+        moves = ("material_x", "material_y") if self.follow == "material" else ()
+        return EmissivityField(
+            Features((self,), scene.raster, times, shifts),
+            frozenset(("plastic_strain", "plastic_strain_rate", *moves)),
+        )
 
     def redrawn(self, number: int) -> Self:
-        """The surface with the seed `number` further on."""
+        """See `Surface.redrawn`: the seed is `number` further on."""
         return replace(self, seed=self.seed + number) if number else self
 
     def without_texture(self) -> Self:
-        """The surface with each feature's mean emissivity everywhere on it."""
+        """See `Surface.without_texture`."""
         return replace(
             self,
             chip=Emissivity(self.chip.mean),
@@ -167,68 +161,68 @@ CHIP_2: Final = FeatureSurface(chip=Emissivity(0.77, 0.03), shear_band=Emissivit
 
 
 @dataclass(frozen=True, eq=False)
-class FeatureField(EmissivityField):
-    """A `FeatureSurface` on one scene; made by `FeatureSurface.on`.
+class Features:
+    """Feature surfaces on one scene that differ by their numbers and seeds only.
 
-    Parameters
-    ----------
-    surface : FeatureSurface
-        What is laid on the scene.
-    raster : Raster
-        The scene's samples.
-    times : ndarray
-        Times of the scene's frames in s, shape (time,).
-    shifts : ndarray
-        Shift right and up in m of the maps of workpiece, chip and shear band, shape (time, 3, 2).
+    Chips of the same seed share their deviates, and all share the place where they are looked up.
     """
 
-    surface: FeatureSurface
+    surfaces: tuple[FeatureSurface, ...]
     raster: Raster
     times: NDArray[np.float64]
+    """Times of the scene's frames in s, shape (time,)."""
     shifts: NDArray[np.float64]
+    """Shift right and up in m of the maps of workpiece, chip and shear band, (time, 3, 2)."""
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See `EmissivityField.needs`."""
-        moves = ("material_x", "material_y") if self.surface.follow == "material" else ()
-        return ("plastic_strain", "plastic_strain_rate", *moves)
-
-    def shift(self, time: float) -> NDArray[np.float64]:
-        """Shift of the maps of workpiece, chip and shear band at a time in s, shape (3, 2) in m."""
-        flat = self.shifts.reshape(len(self.times), 6)
-        return np.array([np.interp(time, self.times, column) for column in flat.T]).reshape(3, 2)
-
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x).
-
-        Raises
-        ------
-        ValueError
-            If the frame is not of the scene's shape, or lacks the material coordinates.
-        """
-        result: NDArray[np.float32] = self._alone.emissivities(frame)[0]
+    def __call__(self, frame: Frame) -> NDArray[np.float32]:
+        """Return the emissivity of every sample of a frame for the first surface."""
+        result: NDArray[np.float32] = self.emissivities(frame)[0]
         return result
 
-    def beside(self, others: Sequence[EmissivityField]) -> EmissivityStack:
-        """Stack of this and other fields: textures that move alike are looked up together."""
-        fields = (self, *others)
-        if all(isinstance(other, FeatureField) and self._moves_like(other) for other in others):
-            return FeatureFields(tuple(f for f in fields if isinstance(f, FeatureField)))
-        return super().beside(others)
+    def beside(self, others: Sequence[object]) -> "Features | None":
+        """Return the features with others after them; None if those move in another way."""
+        surfaces = list(self.surfaces)
+        for other in others:
+            if not (isinstance(other, Features) and self._moves_like(other)):
+                return None
+            surfaces += other.surfaces
+        return replace(self, surfaces=tuple(surfaces))
 
-    def _moves_like(self, other: "FeatureField") -> bool:
+    def _moves_like(self, other: "Features") -> bool:
         names = ("grain", "follow", "restore_standard_deviation")
-        alike = all(getattr(self.surface, n) == getattr(other.surface, n) for n in names)
+        one, two = self.surfaces[0], other.surfaces[0]
+        alike = all(getattr(one, name) == getattr(two, name) for name in names)
         return alike and self.raster == other.raster and np.array_equal(self.shifts, other.shifts)
 
-    def positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Where each sample is looked up in the maps before they are shifted, in m.
+    def shift(self, time: float) -> NDArray[np.float32]:
+        """Return the shift of workpiece, chip and shear band at a time in s, shape (3, 2) in m."""
+        flat = self.shifts.reshape(len(self.times), 6)
+        shifts = [np.interp(time, self.times, column) for column in flat.T]
+        return np.array(shifts, np.float32).reshape(3, 2)
 
-        Raises
-        ------
-        ValueError
-            If the textures follow the material, and the frame lacks the material coordinates.
-        """
+    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
+        """Return the emissivity of every sample for every surface, shape (surface, y, x)."""
+        if frame.material.shape != self.raster.shape:
+            raise ValueError(
+                f"frame: has shape {frame.material.shape}, expected {self.raster.shape}"
+            )
+        rate = frame.plastic_strain_rate
+        result = np.empty((len(self.surfaces), *self.raster.shape), dtype=np.float32)
+        fields = (
+            frame.material,
+            frame.needed("plastic_strain"),
+            np.zeros(self.raster.shape, np.float32) if rate is None else rate,
+            *self.positions(frame),
+        )
+        shift, textures = self.shift(frame.time), self.textures
+        in_blocks(
+            self.raster.rows,
+            lambda begin, end: _blend(*fields, shift, textures, begin, end, result),
+        )
+        return result
+
+    def positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return where each sample is looked up in the maps before they are shifted, in m."""
         if self.fixed_positions is not None:
             return self.fixed_positions
         if frame.material_x is None or frame.material_y is None:
@@ -236,111 +230,134 @@ class FeatureField(EmissivityField):
         return frame.material_x, frame.material_y
 
     @cached_property
-    def tool_map(self) -> NDArray[np.float32]:
-        """The tool's emissivity at every sample, shape (y, x)."""
-        return self.surface.textures["tool"].at(self.raster.x[None, :], self.raster.y[:, None])
-
-    @cached_property
-    def _alone(self) -> "FeatureFields":
-        return FeatureFields((self,))
-
-    @cached_property
     def fixed_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
         """Positions that are the same in every frame; None if textures follow the material."""
-        if self.surface.follow == "material":
+        if self.surfaces[0].follow == "material":
             return None
         x, y = np.meshgrid(self.raster.x, self.raster.y)
         return x.astype(np.float32), y.astype(np.float32)
 
-
-@dataclass(frozen=True, eq=False)
-class FeatureFields(EmissivityStack):
-    """Feature surfaces on one scene that differ by their numbers and seeds only.
-
-    Chips of the same seed share their deviates, and all share the place where they are looked up.
-
-    Parameters
-    ----------
-    fields : tuple of FeatureField
-        One or more, of one raster, grain and motion.
-    """
-
-    fields: tuple[FeatureField, ...]
-
-    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame for every surface, shape (surface, y, x).
-
-        Raises
-        ------
-        ValueError
-            If the frame is not of the scene's shape, or lacks the material coordinates.
-        """
-        first = self.fields[0]
-        if frame.material.shape != first.raster.shape:
-            raise ValueError(
-                f"frame: has shape {frame.material.shape}, expected {first.raster.shape}"
-            )
-        rate = frame.plastic_strain_rate
-        result = np.empty((len(self.fields), *first.raster.shape), dtype=np.float32)
-        fields = (
-            frame.material,
-            frame.needed("plastic_strain"),
-            np.zeros(first.raster.shape, np.float32) if rate is None else rate,
-            *first.positions(frame),
-        )
-        shifts, textures = self.shifts(frame.time), self.textures
-        in_blocks(
-            first.raster.rows,
-            lambda begin, end: _blend(*fields, shifts, textures, begin, end, result),
-        )
-        return result
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See `EmissivityStack.needs`."""
-        return self.fields[0].needs
-
-    def positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """See `FeatureField.positions`."""
-        return self.fields[0].positions(frame)
-
-    @property
-    def fixed_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """Positions that are the same in every frame; None if textures follow the material."""
-        return self.fields[0].fixed_positions
-
-    def shifts(self, time: float) -> NDArray[np.float32]:
-        """Shift of the maps of workpiece, chip and shear band at a time in s, shape (3, 2) in m."""
-        return self.fields[0].shift(time).astype(np.float32)
-
     @cached_property
     def textures(self) -> Textures:
-        """What a kernel needs of them; surfaces of one seed share its maps."""
-        seeds = sorted({field.surface.seed for field in self.fields})
-        of_seed = {field.surface.seed: field.surface.textures for field in self.fields}
+        """The textures for kernels; surfaces of one seed share their maps."""
+        seeds = sorted({surface.seed for surface in self.surfaces})
+        of_seed = {surface.seed: surface.textures for surface in self.surfaces}
         moving = FEATURES[:3]
-        chosen = [[getattr(f.surface, name) for name in moving] for f in self.fields]
+        chosen = [[getattr(surface, name) for name in moving] for surface in self.surfaces]
+        x, y = self.raster.x[None, :], self.raster.y[:, None]
         return Textures(
-            np.float32(1.0 / self.fields[0].surface.grain),
+            np.float32(1.0 / self.surfaces[0].grain),
             np.array([[padded(of_seed[seed][name].nodes) for seed in seeds] for name in moving]),
-            np.array([seeds.index(field.surface.seed) for field in self.fields]),
+            np.array([seeds.index(surface.seed) for surface in self.surfaces]),
             np.array([[one.line for one in row] for row in chosen], np.float32),
             np.array([[one.table for one in row] for row in chosen]),
-            np.array([field.tool_map for field in self.fields]),
+            np.array([surface.textures["tool"].at(x, y) for surface in self.surfaces]),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class EmissivityStack:
+    """Fields of one scene together: features that move alike are looked up at once."""
+
+    fields: Sequence[EmissivityField]
+
+    @cached_property
+    def features(self) -> Features | None:
+        """The features under all fields, if they move alike."""
+        first, *others = (field.bare for field in self.fields)
+        return first.beside(others) if isinstance(first, Features) else None
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether no field has a modifier."""
+        return not any(field.changes for field in self.fields)
+
+    @property
+    def needed(self) -> frozenset[str] | None:
+        """Fields of a frame that are read beside temperature and material; None: all."""
+        sets = [field.fields for field in self.fields]
+        known = [one for one in sets if one is not None]
+        return frozenset().union(*known) if len(known) == len(sets) else None
+
+    @property
+    def max_emissivity(self) -> float:
+        """Largest emissivity that is possible."""
+        return max(field.max_emissivity for field in self.fields)
+
+    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
+        """Return the emissivity of every sample for every field, shape (field, y, x)."""
+        if self.features is None:
+            return np.stack([field.emissivity(frame) for field in self.fields])
+        bare = self.features.emissivities(frame)
+        return np.stack([f.changed(one, frame) for f, one in zip(self.fields, bare, strict=True)])
+
+
+@dataclass(frozen=True)
+class FeatureTrends(Modifier):
+    """Features of a chip by measured lines over the temperature.
+
+    To the emissivity of a sample comes, of each feature by its fraction, how far its line at the
+    sample's temperature is from `EmissivityTrend.emissivity`, which the features must have as the
+    mean; a sum outside 0 to 1 becomes the nearer of these. The errors that a thermocouple or a
+    calibration makes are the same for all features in a draw.
+    """
+
+    effect = "emissivity_by_temperature"
+    fields = ("plastic_strain", "plastic_strain_rate")
+    trends: Mapping[str, EmissivityTrend]
+    """Lines by names of `FEATURES`; a feature without one is the same at all temperatures."""
+    draw: int = 0
+    """Number of the draw of the lines' errors; 0 is without."""
+
+    @property
+    def description(self) -> str:
+        lines = ", ".join(f"{name} {line}" for name, line in self.trends.items())
+        return f"{lines}{draw_text(self.draw)}"
+
+    def redrawn(self, number: int) -> Self:
+        return replace(self, draw=self.draw + number) if number else self
+
+    def change(
+        self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
+    ) -> Change:
+        drawn = drawn_trends(tuple(self.trends.values()), self.draw)
+        lines = dict(zip(self.trends, drawn, strict=True))
+
+        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+            result, fractions = emissivity.astype(np.float64), feature_fractions(frame)
+            for name in FEATURES:
+                if name in lines:
+                    away = lines[name].at(frame.temperature) - self.trends[name].emissivity
+                    result += fractions[name] * away
+            return np.clip(result, 0.0, 1.0)
+
+        return changed
+
+
+def feature_fractions(frame: Frame) -> dict[str, NDArray[np.float64]]:
+    """Return the fractions of the features at every sample, by the names of `FEATURES`."""
+    there = (frame.material == Material.WORKPIECE).astype(np.float64)
+    rate = frame.plastic_strain_rate
+    band = np.zeros(there.shape) if rate is None else shear_band_fraction(rate) * there
+    formed = chip_fraction(frame.needed("plastic_strain"))
+    rest = there - band
+    tool = (frame.material == Material.TOOL).astype(np.float64)
+    return dict(zip(FEATURES, (rest * (1.0 - formed), rest * formed, band, tool), strict=True))
 
 
 def chip_fraction(plastic_strain: ArrayLike) -> NDArray[np.float64]:
-    """Fraction of the chip's map over the workpiece's, 0 to 1, by plastic strain."""
-    strain = np.asarray(plastic_strain, dtype=np.float64)
-    fraction = (strain - STRAIN_OF_WORKPIECE) / (STRAIN_OF_CHIP - STRAIN_OF_WORKPIECE)
-    return np.asarray(np.clip(fraction, 0.0, 1.0))
+    """Return the fraction of the chip's map over the workpiece's, 0 to 1, by plastic strain."""
+    return _fraction_between(plastic_strain, STRAIN_OF_WORKPIECE, STRAIN_OF_CHIP)
 
 
 def shear_band_fraction(plastic_strain_rate: ArrayLike) -> NDArray[np.float64]:
-    """Fraction of the shear band's map over the others, 0 to 1, by plastic strain rate in 1/s."""
-    rate = np.asarray(plastic_strain_rate, dtype=np.float64)
-    return np.asarray(np.clip((rate - RATE_OF_CHIP) / (RATE_OF_SHEAR_BAND - RATE_OF_CHIP), 0, 1))
+    """Return the fraction of the shear band's map over the others, by strain rate in 1/s."""
+    return _fraction_between(plastic_strain_rate, RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
+
+
+def _fraction_between(values: ArrayLike, none: float, full: float) -> NDArray[np.float64]:
+    fraction = (np.asarray(values, np.float64) - none) / (full - none)
+    return np.asarray(np.clip(fraction, 0.0, 1.0))
 
 
 def _mean_shifts(scene: Scene) -> NDArray[np.float64]:

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.regrid import Taps, taps
 from chipglow.surface.surface import EmissivityField, Surface
@@ -61,7 +62,6 @@ class MapSurface(Surface):
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
         across = f"{self.raster.columns} x {self.raster.rows} pixels of {self.raster.spacing:g} m"
         stated = [f"image of {across}, mean {np.nanmean(self.values):.4g}"]
         stated += [f"elsewhere {self.elsewhere:g}"]
@@ -73,10 +73,12 @@ class MapSurface(Surface):
         return {"emissivity": ", ".join(stated)}
 
     def __post_init__(self) -> None:
-        if self.values.shape != self.raster.shape:
-            raise ValueError(
-                f"emissivity map: has shape {self.values.shape}, expected {self.raster.shape}"
-            )
+        for name in ("values", "slopes", "uncertainty"):
+            image = getattr(self, name)
+            if image is not None and image.shape != self.raster.shape:
+                raise ValueError(
+                    f"emissivity map: {name} have shape {image.shape}, expected {self.raster.shape}"
+                )
         if min(self.raster.shape) < 2:
             raise ValueError(
                 f"emissivity map: has shape {self.raster.shape}, expected 2 pixels or more each way"
@@ -88,35 +90,39 @@ class MapSurface(Surface):
             raise ValueError(
                 f"emissivity map: goes from {known.min():.4g} to {known.max():.4g}, expected 0 to 1"
             )
-        for name in ("slopes", "uncertainty"):
-            image = getattr(self, name)
-            if image is not None and image.shape != self.raster.shape:
-                raise ValueError(
-                    f"emissivity map: {name} have shape {image.shape}, expected {self.raster.shape}"
-                )
         if not 0 <= self.elsewhere <= 1:
             raise ValueError(f"emissivity map: elsewhere is {self.elsewhere!r}, expected 0 to 1")
 
-    def on(self, scene: Scene) -> "MapField":
-        """Resample the image to a scene's samples."""
-        slopes = None
+    def on(
+        self, scene: Scene, band: Band | None = None, reflected: float | None = None
+    ) -> EmissivityField:
+        image, shape = self.at(scene.raster), scene.raster.shape
+        slopes = np.zeros(shape, np.float32)
         if self.slopes is not None:
-            known = np.isfinite(self.values)
-            slopes = self._resampled(np.where(known, self.slopes, np.nan), scene.raster, 0.0)
-        return MapField(self.at(scene.raster), slopes, self.middle)
+            known = np.where(np.isfinite(self.values), self.slopes, np.nan)
+            slopes = self._resampled(known, scene.raster, 0.0)
+
+        def emissivity(frame: Frame) -> NDArray[np.float32]:
+            if frame.material.shape != shape:
+                raise ValueError(f"frame: has shape {frame.material.shape}, expected {shape}")
+            values = image + slopes * (frame.temperature - np.float32(self.middle))
+            values = np.clip(values, np.float32(0.0), np.float32(1.0))
+            return np.where(frame.material == Material.VOID, np.float32(0.0), values)
+
+        return EmissivityField(emissivity, frozenset())
 
     def redrawn(self, number: int) -> Self:
-        """Another draw of the error that all pixels have in common."""
+        """See `Surface.redrawn`: another draw of the error that all pixels have in common."""
         if self.uncertainty is None or not number:
             return self
         return replace(self, draw=self.draw + number)
 
     def known_fraction(self, raster: Raster) -> float:
-        """Fraction of other samples, 0 to 1, at which the image gives the emissivity."""
+        """Return the fraction of other samples, 0 to 1, at which the emissivity is known."""
         return float(np.mean(self._on(self.values, raster)[1] > _KNOWN))
 
     def at(self, raster: Raster) -> NDArray[np.float32]:
-        """Emissivity on other samples, float32 of shape `raster.shape`."""
+        """Return the emissivity on other samples, float32 of shape `raster.shape`."""
         values = self.values
         if self.uncertainty is not None and self.draw:
             error = np.random.default_rng(self.draw).standard_normal()
@@ -125,7 +131,7 @@ class MapSurface(Surface):
         return np.clip(result, np.float32(0.0), np.float32(1.0))
 
     def _resampled(
-        self, image: NDArray[np.floating], raster: Raster, elsewhere: float
+        self, image: NDArray[Any], raster: Raster, elsewhere: float
     ) -> NDArray[np.float32]:
         total, weight = self._on(image, raster)
         result = np.full(raster.shape, elsewhere)
@@ -133,66 +139,21 @@ class MapSurface(Surface):
         return np.asarray(result, np.float32)
 
     def _on(
-        self, image: NDArray[np.floating], raster: Raster
+        self, image: NDArray[Any], raster: Raster
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Weighted sum of the known pixels about each sample, and their weight."""
+        """Return the weighted sum of the known pixels about each sample, and their weight."""
         across = taps(self.raster.x, raster.spacing, raster.x)
         down = taps(-self.raster.y, raster.spacing, -raster.y)
         known = np.isfinite(image)
-        total = _resampled(np.where(known, image, 0.0), across, down)
-        return total, _resampled(known.astype(np.float64), across, down)
+        total = _weighted(np.where(known, image, 0.0), across, down)
+        return total, _weighted(known.astype(np.float64), across, down)
 
 
-@dataclass(frozen=True, eq=False)
-class MapField(EmissivityField):
-    """A `MapSurface` on one scene; made by `MapSurface.on`.
-
-    Parameters
-    ----------
-    image : ndarray
-        Emissivity of the scene's samples, float32 of shape (y, x).
-    slopes : ndarray, optional
-        Its change with the true temperature in 1/K.
-    middle : float
-        True temperature in K at which `image` holds, if there are slopes.
-    """
-
-    image: NDArray[np.float32]
-    slopes: NDArray[np.float32] | None = None
-    middle: float = 0.0
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See `EmissivityField.needs`."""
-        return ()
-
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x); 0 in the void.
-
-        Raises
-        ------
-        ValueError
-            If the frame is not of the scene's shape.
-        """
-        if frame.material.shape != self.image.shape:
-            raise ValueError(
-                f"frame: has shape {frame.material.shape}, expected {self.image.shape}"
-            )
-        values = self.image
-        if self.slopes is not None:
-            away = frame.temperature - np.float32(self.middle)
-            values = np.clip(values + self.slopes * away, np.float32(0.0), np.float32(1.0))
-        return np.where(frame.material == Material.VOID, np.float32(0.0), values)
-
-
-def _resampled(image: NDArray[np.float64], across: Taps, down: Taps) -> NDArray[np.float64]:
-    return _along_columns(_along_columns(image, across).T, down).T
-
-
-def _along_columns(image: NDArray[np.float64], wanted: Taps) -> NDArray[np.float64]:
-    """Weighted sums over neighbouring columns, shape (rows, wanted)."""
-    first, weights = wanted
-    result = np.zeros((len(image), first.size))
-    for tap, weight in enumerate(weights.T):
-        result += image[:, np.minimum(first + tap, image.shape[1] - 1)] * weight
-    return result
+def _weighted(image: NDArray[np.float64], across: Taps, down: Taps) -> NDArray[np.float64]:
+    """Return weighted sums over neighbouring columns, then over rows."""
+    for first, weights in (across, down):
+        result = np.zeros((len(image), first.size))
+        for tap, weight in enumerate(weights.T):
+            result += image[:, np.minimum(first + tap, image.shape[1] - 1)] * weight
+        image = result.T
+    return image

@@ -1,8 +1,7 @@
 """Oxide that grows on hot material by the parabolic law, and what it does to the emissivity."""
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from abc import abstractmethod
+from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil
 from typing import Annotated, ClassVar, Final
@@ -11,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import R
 
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Family, Parameter
 from chipglow.quantities.units import ACTIVATION_ENERGY, LENGTH, OXIDATION_RATE, POSITION
+from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
-from chipglow.surface.surface import EmissivityField, WrappedSurface
+from chipglow.surface.surface import Change, Modifier, Surface
 
 OXIDES: Final = Family("oxide")
 """Laws of oxide by their kind; other packages add theirs in the group ``chipglow.oxide``."""
@@ -25,11 +25,11 @@ _GROWN_FIELDS: Final = ("material_x", "material_y")
 
 
 @dataclass(frozen=True)
-class Oxide(Part, ABC):
-    """A law of growth of oxide, and the emissivity of material under it.
+class Oxide(Modifier):
+    """Oxide that grows while the material is in view: a class that adds `growth`."""
 
-    A class of a family that adds `growth`.
-    """
+    effect = "oxide"
+    fields = _GROWN_FIELDS
 
     initial: Annotated[
         float,
@@ -51,10 +51,24 @@ class Oxide(Part, ABC):
 
     @abstractmethod
     def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Rate d(x²)/dt of the squared thickness in m²/s at temperatures in K."""
+        """Return the rate d(x²)/dt of the squared thickness in m²/s at temperatures in K."""
+
+    def history(self, scene: Scene) -> "OxideHistory":
+        """Follow the oxide on a scene's material; all frames are read once."""
+        return _history(scene, self)
+
+    def change(
+        self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
+    ) -> Change:
+        history = self.history(scene)
+
+        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+            return self.of_thickness(emissivity, history.thickness(frame))
+
+        return changed
 
     def of_thickness(self, bare: ArrayLike, thickness: ArrayLike) -> NDArray[np.float64]:
-        """Emissivity of material of a bare emissivity under oxide of a thickness in m."""
+        """Return the emissivity of material of a bare one under oxide of a thickness in m."""
         covered = -np.expm1(-np.asarray(thickness, np.float64) / self.opaque)
         clear = np.asarray(bare, np.float64)
         return np.asarray(clear + (self.emissivity - clear) * covered, np.float64)
@@ -80,105 +94,67 @@ class ParabolicOxide(Oxide):
     ] = 169_452.0
 
     def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """See `Oxide.growth`."""
         kelvins = np.asarray(temperature, np.float64)
         return np.asarray(self.rate * np.exp(-self.activation_energy / (R * kelvins)), np.float64)
 
 
-@dataclass(frozen=True)
-class OxidisedSurface(WrappedSurface):
-    """Another surface under oxide that grows while the material is in view.
+@dataclass(frozen=True, eq=False)
+class OxideHistory:
+    """Thickness of the oxide of every material point over time.
 
-    Parameters
-    ----------
-    bare : Surface
-        The emissivity without oxide.
-    oxide : Oxide
-        The law of its growth.
+    x² = x₀² + ∫ d(x²)/dt (T(t)) dt along the material point, by the trapezoidal rule from frame to
+    frame. A cell's rate is the mean over the samples in it. Where it is not seen nothing grows.
     """
 
-    oxide: Oxide = field(default_factory=ParabolicOxide)
+    initial: float
+    times: NDArray[np.float64]
+    grown: NDArray[np.float32]
+    """Growth of the squared thickness in m² since the scene's first frame, in cells of material
+    coordinates, shape (time, row, column)."""
+    left: float
+    bottom: float
+    cell: float
+    """Size of the cells in m."""
 
-    @property
-    def effects(self) -> Mapping[str, str]:
-        """See `Surface.effects`."""
-        return {**self.bare.effects, "oxide": repr(self.oxide)}
-
-    def on(self, scene: Scene) -> "OxidisedField":
-        """Lay the surface on a scene; all its frames are read once.
-
-        Raises
-        ------
-        ValueError
-            If the scene has no material coordinates, by which a point's temperature is followed.
-        """
+    @classmethod
+    def of(cls, scene: Scene, oxide: Oxide) -> "OxideHistory":
+        """Follow the material of a scene."""
         if not scene.has_material_coordinates:
             raise ValueError(
                 "oxide: the scene has no material coordinates, expected them, as a point's oxide "
                 "follows from the temperatures that it had"
             )
-        return OxidisedField(self.bare.on(scene), self.oxide, _history(scene, self.oxide))
-
-
-@dataclass(frozen=True, eq=False)
-class OxideHistory:
-    """Squared thickness of the oxide of every material point over time.
-
-    Parameters
-    ----------
-    times : ndarray
-        Times of the scene's frames in s, shape (time,).
-    grown : ndarray
-        What came to the squared thickness in m² since the scene's first frame, in cells of material
-        coordinates, float32 of shape (time, row, column).
-    left, bottom, cell : float
-        Corner of the cells in material coordinates, and their size, in m.
-
-    Notes
-    -----
-    x² = x₀² + ∫ d(x²)/dt (T(t)) dt along the material point, by the trapezoidal rule from frame to
-    frame. A cell's rate is the mean over the samples in it. Where it is not seen nothing grows.
-    """
-
-    times: NDArray[np.float64]
-    grown: NDArray[np.float32]
-    left: float
-    bottom: float
-    cell: float
-
-    @classmethod
-    def of(cls, scene: Scene, oxide: Oxide) -> "OxideHistory":
-        """Follow the material of a scene."""
         (left, right), (bottom, top) = _reach(scene)
         cell = max(
             _SAMPLES * scene.raster.spacing, max(right - left, top - bottom) / _MOST_CELLS, 1e-12
         )
         shape = ceil((top - bottom) / cell) + 1, ceil((right - left) / cell) + 1
-        made = cls(
-            scene.times, np.zeros((len(scene.times), *shape), np.float32), left, bottom, cell
-        )
+        grown = np.zeros((len(scene.times), *shape), np.float32)
+        made = cls(oxide.initial, scene.times, grown, left, bottom, cell)
         total, before = np.zeros(shape), np.full(shape, np.nan)
         steps = np.diff(scene.times, prepend=scene.times[0])
         for number, frame in enumerate(scene.frames(names=_GROWN_FIELDS)):
             rate = made._rates(frame, oxide)
             between = np.where(np.isnan(before), 0.0, (rate + before) / 2)
             total += np.nan_to_num(between) * steps[number]
-            made.grown[number] = total
+            grown[number] = total
             before = rate
         return made
 
-    def squared(self, frame: Frame) -> NDArray[np.float64]:
-        """What came to the squared thickness of every sample of a frame in m², shape (y, x)."""
+    def thickness(self, frame: Frame) -> NDArray[np.float64]:
+        """Return the thickness of every sample of a frame in m; 0 but on the workpiece."""
         place = float(np.interp(frame.time, self.times, np.arange(self.times.size)))
         first = min(int(place), max(self.times.size - 2, 0))
         weight = place - first
         last = min(first + 1, self.times.size - 1)
         cells = self._cells(frame)
-        found = (1 - weight) * self.grown[first].ravel()[cells]
-        return np.asarray(found + weight * self.grown[last].ravel()[cells], np.float64)
+        grown = (1 - weight) * self.grown[first].ravel()[cells]
+        grown = np.asarray(grown + weight * self.grown[last].ravel()[cells], np.float64)
+        thickness = np.sqrt(self.initial**2 + grown)
+        return np.where(frame.material == Material.WORKPIECE, thickness, 0.0)
 
     def _cells(self, frame: Frame) -> NDArray[np.intp]:
-        """Number of the cell of every sample."""
+        """Return the number of the cell of every sample."""
         rows, columns = self.grown.shape[1:]
         column = np.floor((frame.needed("material_x") - self.left) / self.cell).astype(np.intp)
         row = np.floor((frame.needed("material_y") - self.bottom) / self.cell).astype(np.intp)
@@ -187,7 +163,7 @@ class OxideHistory:
         )
 
     def _rates(self, frame: Frame, oxide: Oxide) -> NDArray[np.float64]:
-        """Mean rate in every cell; NaN where it is not seen."""
+        """Return the mean rate in every cell; NaN where it is not seen."""
         seen = frame.material == Material.WORKPIECE
         cells, count = self._cells(frame)[seen], self.grown[0].size
         rate = oxide.growth(frame.temperature[seen])
@@ -197,44 +173,14 @@ class OxideHistory:
         return mean.reshape(self.grown.shape[1:])
 
 
-@dataclass(frozen=True, eq=False)
-class OxidisedField(EmissivityField):
-    """An `OxidisedSurface` on one scene; made by `OxidisedSurface.on`."""
-
-    bare: EmissivityField
-    oxide: Oxide
-    history: OxideHistory
-
-    @property
-    def needs(self) -> tuple[str, ...] | None:
-        """See `EmissivityField.needs`."""
-        of_bare = self.bare.needs
-        return None if of_bare is None else tuple({*of_bare, *_GROWN_FIELDS})
-
-    @property
-    def most(self) -> float:
-        """See `EmissivityField.most`."""
-        return self.bare.most
-
-    def thickness(self, frame: Frame) -> NDArray[np.float64]:
-        """Thickness of the oxide of every sample in m, shape (y, x); 0 but on the workpiece."""
-        found = np.sqrt(self.oxide.initial**2 + self.history.squared(frame))
-        return np.where(frame.material == Material.WORKPIECE, found, 0.0)
-
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
-        bare = self.bare.emissivity(frame)
-        return self.oxide.of_thickness(bare, self.thickness(frame)).astype(np.float32)
-
-
 @lru_cache(maxsize=1)
 def _history(scene: Scene, oxide: Oxide) -> OxideHistory:
-    """History of the oxide on the scene that was looked at last: many surfaces share it."""
+    """Return the oxide's history on the scene that was looked at last: many surfaces share it."""
     return OxideHistory.of(scene, oxide)
 
 
 def _reach(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Range of the material coordinates of the workpiece over all frames."""
+    """Return the range of the material coordinates of the workpiece over all frames."""
     ends = []
     for frame in scene.frames(names=_GROWN_FIELDS):
         seen = frame.material == Material.WORKPIECE

@@ -1,22 +1,27 @@
 """The side of a chip that flowed sideways at the rake face: a wedge in which light is reflected."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, radians, sin
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Family, Parameter
 from chipglow.quantities.units import ANGLE, LENGTH, POSITION
+from chipglow.radiometry import Band
+from chipglow.scene import Scene
+from chipglow.surface.cross_section import TOWARD_CAMERA, Reflections, Sections, SideElements
+from chipglow.surface.directional import Direction
 from chipglow.surface.exchange import Exchange
+from chipglow.surface.spectral import known_band
+from chipglow.surface.surface import ModifiedSurface, Modifier, Surface
 
 REFLECTIONS: Final = Family("reflections")
 """Shapes of the side by their kind; other packages add theirs in ``chipglow.reflections``."""
 
-TOWARD_CAMERA: Final = (0.0, 1.0)
 
 _RAKE_ELEMENTS: Final = 16
 _SIDE_ELEMENTS: Final = 24
@@ -25,49 +30,16 @@ _FLAT_REACH: Final = 8.0
 """Length of a flat side that is looked at, in heights of what stands out beside it."""
 
 
-@dataclass(frozen=True, eq=False)
-class SideElements:
-    """Cross-section of the sides of tool and chip at the rake face, in elements.
-
-    Places are (depth, height) in m: depth from the rake face into the chip, height from the side of
-    the tool to the camera.
-    """
-
-    exchange: Exchange
-    """The elements: those of the tool's side, of the rake face, then of the chip's side."""
-    tool_side: int
-    rake_face: int
-    """Number of elements of the first two."""
-
-    @property
-    def depths(self) -> NDArray[np.float64]:
-        """Middles of the elements from the rake face into the chip in m; 0 on the face."""
-        return self.exchange.middles[:, 0]
-
-    @cached_property
-    def cosines(self) -> NDArray[np.float64]:
-        """Cosines of the angles between the elements' normals and the direction to the camera."""
-        along = self.exchange.ends - self.exchange.starts
-        return np.asarray(along[:, 0] / self.exchange.lengths, np.float64)
-
-    @property
-    def chip(self) -> slice:
-        """The elements of the chip."""
-        return slice(self.tool_side + self.rake_face, None)
-
-    @property
-    def face(self) -> slice:
-        """The elements of the rake face."""
-        return slice(self.tool_side, self.tool_side + self.rake_face)
-
-
 @dataclass(frozen=True)
-class SideShape(Part, ABC):
-    """A shape of the chip's side beside the rake face, and how the light there is reflected.
+class SideShape(Modifier):
+    """Reflections between the rake face and the chip's side: a class that adds `outline`.
 
-    A class of a family that adds `outline`.
+    See `Reflections`.
     """
 
+    effect = "reflections"
+    is_grey = False
+    max_emissivity = np.inf
     overhang: Annotated[
         float,
         Parameter(
@@ -128,15 +100,26 @@ class SideShape(Part, ABC):
         exchange = Exchange(starts[there], ends[there])
         return SideElements(exchange, len(tool) - 1, _RAKE_ELEMENTS)
 
-    def incident(
-        self,
-        radiance: ArrayLike,
-        emissivity: ArrayLike,
-        surroundings: float = 0.0,
-    ) -> NDArray[np.float64]:
-        """Return the incident radiance whose reflection the camera sees, as `Exchange.seen`."""
-        seen = self.elements.exchange.seen
-        return seen(TOWARD_CAMERA, radiance, emissivity, surroundings, self.mirror)
+    def change(
+        self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
+    ) -> Reflections:
+        if scene.tool is None:
+            raise ValueError(
+                "reflections: the scene does not state its tool, expected one, between whose rake "
+                "face and the chip light is reflected"
+            )
+        band, cosines = known_band(self.effect, band), self.elements.cosines
+        modifiers = surface.modifiers if isinstance(surface, ModifiedSurface) else ()
+        directions = [one for one in modifiers if isinstance(one, Direction)]
+        return Reflections(
+            self.elements,
+            Sections.of(scene.raster, scene.tool, self.elements),
+            band,
+            0.0 if reflected is None else float(band.radiance(reflected)),
+            self.mirror,
+            self.rake_emissivity,
+            directions[-1].slope_ratio(cosines) if directions else np.ones(cosines.shape),
+        )
 
     def effective_emissivity(
         self, chip: float, tool: float, tool_radiance: float = 1.0, surroundings: float = 0.0
@@ -151,7 +134,10 @@ class SideShape(Part, ABC):
         black[elements.chip], emissivities[elements.chip] = 1.0, chip
         emissivities[elements.face] = tool if self.rake_emissivity is None else self.rake_emissivity
         seen = emissivities * black
-        seen += (1.0 - emissivities) * self.incident(black, emissivities, surroundings)
+        incident = elements.exchange.incident
+        seen += (1.0 - emissivities) * incident(
+            black, emissivities, surroundings, self.mirror, TOWARD_CAMERA
+        )
         return elements.depths[elements.chip], seen[elements.chip]
 
 
@@ -183,7 +169,6 @@ class Wedge(SideShape):
 
     @property
     def outline(self) -> NDArray[np.float64]:
-        """See `SideShape.outline`."""
         slope = (pi / 2 - self.angle) * (1.0 - _graded(_SIDE_ELEMENTS))
         depth = self.bulge_radius * (cos(self.angle) - np.sin(slope))
         height = self.bulge_radius * (np.cos(slope) - 1.0) - self.overhang

@@ -1,7 +1,7 @@
-"""Surfaces whose emissivity depends on the wavelength: tables, and metals by their resistivity."""
+"""Emissivities by wavelength: tables, metals by their resistivity, and what they do to others."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
@@ -17,8 +17,8 @@ from chipglow.quantities.units import (
 )
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
-from chipglow.scene import Scene
-from chipglow.surface.surface import SURFACES, EmissivityField, Surface
+from chipglow.scene import Frame, Scene
+from chipglow.surface.surface import SURFACES, Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import TemperatureSurface
 
 SPECTRA: Final = Family("spectral")
@@ -29,31 +29,31 @@ REFERENCE: Final = 293.15
 
 _STEP: Final = 5.0
 _NEAR: Final = 0.5
+_LEAST: Final = 1e-6
+"""An emissivity of a law of odds is at least this far from 0 and 1."""
 
-_Row = tuple[Wavelength, Temperature, float]
 
-
-@dataclass(frozen=True)
 class SpectralSurface(Surface):
-    """An emissivity by wavelength and true temperature, which a band makes one by temperature.
+    """An emissivity by wavelength and true temperature: a class that adds `spectral_emissivity`.
 
-    A class of a family that adds `spectral_emissivity`.
-
-    Notes
-    -----
     In a band, what is seen is ∫ R [ε L_λ(T) + (1 − ε) L_λ(T_reflected)] dλ. The emissivity in the
     band is the mean of ε weighted with R [L_λ(T) − L_λ(T_reflected)], which gives just that. It is
     tabulated every 5 K.
     """
 
+    @property
+    def is_grey(self) -> bool:
+        """See `Surface.is_grey`."""
+        return False
+
     @abstractmethod
     def spectral_emissivity(
         self, wavelength: NDArray[np.float64], temperature: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Emissivity at wavelengths in m and temperatures in K, broadcast against each other."""
+        """Return the emissivity at wavelengths in m and temperatures in K, broadcast together."""
 
     def in_band(self, band: Band, reflected: float | None) -> TemperatureSurface:
-        """The emissivity by temperature that a camera of a band sees."""
+        """Return the emissivity by temperature that a camera of a band sees."""
         temperature = np.arange(TABLE_COLDEST, TABLE_HOTTEST + _STEP / 2, _STEP)
         seen = temperature
         if reflected is not None:
@@ -64,17 +64,12 @@ class SpectralSurface(Surface):
             weights = weights - band.weights(reflected)[1]
         emissivity = self.spectral_emissivity(wavelength, temperature[:, None])
         values = np.clip((weights * emissivity).sum(axis=1) / weights.sum(axis=1), 0.0, 1.0)
-        return TemperatureSurface(tuple(temperature.tolist()), tuple(values.tolist()))
+        return TemperatureSurface(tuple(zip(temperature.tolist(), values.tolist(), strict=True)))
 
-    def on(self, scene: Scene) -> EmissivityField:
-        """Refuse: without a band there is no emissivity.
-
-        Raises
-        ------
-        ValueError
-            Always.
-        """
-        raise ValueError(f"{self.kind}: no band is set, expected that of a camera (in_band)")
+    def on(
+        self, scene: Scene, band: Band | None = None, reflected: float | None = None
+    ) -> EmissivityField:
+        return self.in_band(known_band(self.kind, band), reflected).on(scene)
 
 
 @SPECTRA.part
@@ -86,7 +81,7 @@ class SpectralTable(SpectralSurface):
     kind: ClassVar[str] = "spectral"
     example: ClassVar[str] = "{kind: spectral, table: [[3 um, 20 degC, 0.3], [5 um, 20 degC, 0.2]]}"
     table: Annotated[
-        tuple[_Row, ...],
+        tuple[tuple[Wavelength, Temperature, float], ...],
         Parameter("Wavelength, temperature, emissivity a row: every pair of the first two once."),
     ]
 
@@ -166,10 +161,55 @@ class HagenRubens(SpectralSurface):
         return np.asarray(4 * index / ((index + 1) ** 2 + index**2), np.float64)
 
 
+@dataclass(frozen=True)
+class Dispersion(Modifier):
+    """An emissivity that was measured in one band and changes to others by a law.
+
+    The odds of emission, ε / (1 − ε), change from band to band as those of the law do, at every
+    true temperature: ε' / (1 − ε') = q ε / (1 − ε). So an emissivity stays within 0 to 1; a small
+    one changes in proportion to the law's, and one that is the law's stays the law's. It is an
+    assumption. It holds for a metal that is rough: of a cavity with diffuse walls, whose opening
+    is a part r of their area, ε / (ε + r (1 − ε)) comes out, and r cancels in q.
+    """
+
+    effect = "spectral"
+    is_grey = False
+    law: SpectralSurface
+    measured_in: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
+    """The band in which the emissivity holds; the paper's by default."""
+
+    @property
+    def description(self) -> str:
+        band = f"{1e6 * self.measured_in.lower:g} um to {1e6 * self.measured_in.upper:g} um"
+        return f"measured in {band}, elsewhere by {self.law!r}"
+
+    def change(
+        self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
+    ) -> Change:
+        known = self.law.in_band(self.measured_in, None)
+        seen = self.law.in_band(known_band(self.effect, band), reflected)
+        here, there = (np.clip(one.columns[1], _LEAST, 1 - _LEAST) for one in (known, seen))
+        temperatures, odds = seen.columns[0], there / (1 - there) * (1 - here) / here
+
+        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+            values = np.asarray(emissivity, np.float64)
+            factor = np.interp(frame.temperature, temperatures, odds)
+            return np.asarray(values * factor / (1 - values + values * factor), np.float64)
+
+        return changed
+
+
+def known_band(name: str, band: Band | None) -> Band:
+    """Return the camera's band, without which what is not grey has no emissivity."""
+    if band is None:
+        raise ValueError(f"{name}: no band is given, expected that of a camera")
+    return band
+
+
 def _between(
     axis: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Entry before each value, and the way to the next, 0 to 1."""
+    """Return the entry before each value, and the way to the next, 0 to 1."""
     place = np.interp(values, axis, np.arange(axis.size))
     first = np.minimum(place.astype(np.intp), max(axis.size - 2, 0))
     return first, place - first

@@ -1,220 +1,192 @@
-"""What a surface owes the camera: an emissivity for every sample of every frame."""
+"""A surface, what modifies it, and its emissivity on a scene: what the camera needs of it."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities import Family, Part
 from chipglow.radiometry import Band
-from chipglow.scene import Frame, Material, Scene
-
-
-class EmissivityStack(ABC):
-    """Emissivities of one scene's samples for several surfaces, frame by frame."""
-
-    @property
-    def needs(self) -> Collection[str] | None:
-        """Fields of a frame that it reads beside temperature and material; None: all there are."""
-        return None
-
-    @property
-    def most(self) -> float:
-        """Largest emissivity that is possible: 1, unless reflected light counts as emitted."""
-        return 1.0
-
-    @abstractmethod
-    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample for every surface, shape (surface, y, x), from 0 on."""
-
-
-class EmissivityField(ABC):
-    """Emissivity of one scene's samples, frame by frame."""
-
-    @property
-    def needs(self) -> Collection[str] | None:
-        """Fields of a frame that it reads beside temperature and material; None: all there are."""
-        return None
-
-    @property
-    def most(self) -> float:
-        """Largest emissivity that is possible: 1, unless reflected light counts as emitted."""
-        return 1.0
-
-    @abstractmethod
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x), from 0 to 1; 0 in the void."""
-
-    def beside(self, others: Sequence["EmissivityField"]) -> EmissivityStack:
-        """Stack of this and other fields of the same scene, this one first.
-
-        Parameters
-        ----------
-        others : sequence of EmissivityField
-            The others, which may be none.
-        """
-        return _OneByOne((self, *others))
-
-
-@dataclass(frozen=True)
-class _OneByOne(EmissivityStack):
-    """Fields that have nothing in common."""
-
-    fields: tuple[EmissivityField, ...]
-
-    @property
-    def needs(self) -> Collection[str] | None:
-        """See `EmissivityStack.needs`."""
-        found: set[str] = set()
-        for field in self.fields:
-            if field.needs is None:
-                return None
-            found.update(field.needs)
-        return found
-
-    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
-        """See `EmissivityStack.emissivities`."""
-        return np.stack([field.emissivity(frame) for field in self.fields])
-
-    @property
-    def most(self) -> float:
-        """See `EmissivityStack.most`."""
-        return max(field.most for field in self.fields)
-
+from chipglow.scene import Frame, Scene
 
 SURFACES: Final = Family("surface")
 """Emissivity models by their kind; other packages add theirs in the group ``chipglow.surface``."""
 
+MODIFIERS: Final = Family("modifier")
+"""Modifiers by their kind; other packages add theirs in the group ``chipglow.modifier``."""
 
-class SurfaceChoice(Part, ABC):
-    """What a description says of a surface that is the only one."""
+Change: TypeAlias = Callable[[NDArray[np.float32], Frame], NDArray[Any]]
+"""The emissivity of a frame's samples, shape (y, x), of that without the modifier."""
+
+
+@dataclass(frozen=True, eq=False)
+class EmissivityField:
+    """The emissivity of one scene's samples, frame by frame; made by `Surface.on`.
+
+    Parameters
+    ----------
+    bare : callable
+        Emissivity of every sample of a frame, float32 of shape (y, x), from 0 to 1; 0 in the void.
+    fields : frozenset of str, optional
+        Fields of a frame that are read beside temperature and material; by default all.
+    changes : tuple of callable
+        Changes of the bare emissivity by modifiers, in order.
+    max_emissivity : float
+        Largest emissivity that is possible: 1, unless reflected light counts as emitted.
+    """
+
+    bare: Callable[[Frame], NDArray[np.float32]]
+    fields: frozenset[str] | None = None
+    changes: tuple[Change, ...] = ()
+    max_emissivity: float = 1.0
+
+    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
+        """Return the emissivity of every sample of a frame, shape (y, x); 0 in the void."""
+        return self.changed(self.bare(frame), frame)
+
+    def changed(self, bare: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+        """Return a frame's emissivity of the bare one."""
+        for change in self.changes:
+            bare = np.asarray(change(bare, frame), np.float32)
+        return bare
+
+
+class Surface(Part, ABC):
+    """A model of emissivity, before it is laid on a scene."""
+
+    @property
+    def is_grey(self) -> bool:
+        """Whether it looks the same to all cameras, whatever their band and surroundings."""
+        return True
 
     @abstractmethod
-    def surface(self) -> "Surface":
-        """The surface.
+    def on(
+        self, scene: Scene, band: Band | None = None, reflected: float | None = None
+    ) -> EmissivityField:
+        """Lay the surface on a scene; what depends on the whole scene is computed here.
+
+        Parameters
+        ----------
+        scene : Scene
+            The scene.
+        band : Band, optional
+            The camera's spectral band, for a surface that is not grey.
+        reflected : float, optional
+            Temperature of the surroundings that the surface reflects in K; None: they are dark.
 
         Raises
         ------
         ValueError
-            If it is not possible.
-        OSError
-            If its file is not there.
+            If the scene lacks a field, or a surface that is not grey has no band.
         """
-
-
-class Surface(SurfaceChoice):
-    """A model of emissivity, before it is laid on a scene."""
-
-    def surface(self) -> "Surface":
-        """Return itself."""
-        return self
-
-    @abstractmethod
-    def on(self, scene: Scene) -> EmissivityField:
-        """Lay this surface on a scene; what depends on the whole scene is computed here."""
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """What a measurement of it states of it, by the names of its effects, in SI."""
+        """What a measurement states of the surface, by the names of its effects, in SI."""
         return {"emissivity": repr(self)}
 
-    def in_band(self, band: Band, reflected: float | None) -> "Surface":
-        """The surface as a camera sees it; itself where the camera does not matter.
-
-        Parameters
-        ----------
-        band : Band
-            The camera's spectral band.
-        reflected : float, optional
-            Temperature of the surroundings that the surface reflects in K; None: they are dark.
-        """
-        return self
+    def modified(self, *modifiers: "Modifier") -> "Surface":
+        """Return the surface under modifiers, the first next to it."""
+        return ModifiedSurface(self, modifiers) if modifiers else self
 
     def redrawn(self, number: int) -> Self:
-        """The surface with another draw of what is random in it; itself where nothing is.
-
-        Parameters
-        ----------
-        number : int
-            Which draw; 0 is this surface.
-        """
+        """Return the surface with draw `number` of what is random in it; itself for 0 or none."""
         return self
 
     def without_texture(self) -> Self:
-        """The surface with the mean of what is random in it; itself where nothing is."""
+        """Return the surface with the mean of its texture; itself if it has none."""
+        return self
+
+
+class Modifier(Part, ABC):
+    """What modifies the emissivity of a surface: oxide, an angle, a spectrum, reflections.
+
+    A class that adds `change`.
+    """
+
+    effect: ClassVar[str] = "modifier"
+    """Name under which a measurement states it."""
+    fields: ClassVar[tuple[str, ...]] = ()
+    """Fields of a frame that it reads beside temperature and material."""
+    is_grey: ClassVar[bool] = True
+    """Whether it is the same to all cameras, whatever their band and surroundings."""
+    max_emissivity: ClassVar[float] = 1.0
+
+    @property
+    def description(self) -> str:
+        """What a measurement states of it, in SI."""
+        return repr(self)
+
+    @abstractmethod
+    def change(
+        self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
+    ) -> Change:
+        """Return the change of the emissivity of a surface on a scene.
+
+        Parameters
+        ----------
+        surface : Surface
+            The surface that is modified.
+        scene, band, reflected
+            As for `Surface.on`.
+
+        Returns
+        -------
+        callable
+            Takes the surface's emissivity, float32 of shape (y, x), which is 0 in the void and
+            must stay so, and the frame; returns the modified one.
+        """
+
+    def redrawn(self, number: int) -> Self:
+        """Return the modifier with draw `number` of what is random in it."""
         return self
 
 
 @dataclass(frozen=True)
-class WrappedSurface(Surface):
-    """Another surface, of which something more is seen.
-
-    Parameters
-    ----------
-    bare : Surface
-        The other one.
-    """
+class ModifiedSurface(Surface):
+    """A surface under modifiers, the first next to it; made by `Surface.modified`."""
 
     bare: Surface
+    modifiers: tuple[Modifier, ...]
 
-    def in_band(self, band: Band, reflected: float | None) -> Self:
-        """See `Surface.in_band`."""
-        bare = self.bare.in_band(band, reflected)
-        return self if bare is self.bare else replace(self, bare=bare)
+    @property
+    def is_grey(self) -> bool:
+        """See `Surface.is_grey`."""
+        return self.bare.is_grey and all(one.is_grey for one in self.modifiers)
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        return {**self.bare.effects, **{one.effect: one.description for one in self.modifiers}}
+
+    def modified(self, *modifiers: Modifier) -> "ModifiedSurface":
+        return replace(self, modifiers=(*self.modifiers, *modifiers))
+
+    def on(
+        self, scene: Scene, band: Band | None = None, reflected: float | None = None
+    ) -> EmissivityField:
+        field, surface = self.bare.on(scene, band, reflected), self.bare
+        for one in self.modifiers:
+            field = EmissivityField(
+                field.bare,
+                None if field.fields is None else field.fields.union(one.fields),
+                (*field.changes, one.change(surface, scene, band, reflected)),
+                max(field.max_emissivity, one.max_emissivity),
+            )
+            surface = surface.modified(one)
+        return field
 
     def redrawn(self, number: int) -> Self:
-        """See `Surface.redrawn`."""
         bare = self.bare.redrawn(number)
-        return self if bare is self.bare else replace(self, bare=bare)
+        modifiers = tuple(one.redrawn(number) for one in self.modifiers)
+        old, new = (self.bare, *self.modifiers), (bare, *modifiers)
+        if all(one is other for one, other in zip(old, new, strict=True)):
+            return self
+        return replace(self, bare=bare, modifiers=modifiers)
 
     def without_texture(self) -> Self:
         """See `Surface.without_texture`."""
         bare = self.bare.without_texture()
         return self if bare is self.bare else replace(self, bare=bare)
-
-
-@dataclass(frozen=True)
-class UniformSurface(Surface, EmissivityField):
-    """The same emissivity wherever there is material; a blackbody by default.
-
-    Raises
-    ------
-    ValueError
-        If the emissivity is not within 0 to 1.
-    """
-
-    value: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.value <= 1.0:
-            raise ValueError(f"emissivity: expected 0 to 1, got {self.value!r}")
-
-    def on(self, scene: Scene) -> EmissivityField:
-        """Return itself: it is the same on every scene."""
-        return self
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """See `EmissivityField.needs`."""
-        return ()
-
-    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
-        return np.where(frame.material == Material.VOID, 0.0, self.value).astype(np.float32)
-
-
-@SURFACES.part
-@dataclass(frozen=True)
-class UniformEmissivity(SurfaceChoice):
-    """Everywhere the same emissivity."""
-
-    kind: ClassVar[str] = "uniform"
-    example: ClassVar[str] = "{kind: uniform, emissivity: 0.5}  everywhere the same"
-    emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)]
-
-    def surface(self) -> Surface:
-        """The surface."""
-        return UniformSurface(self.emissivity)

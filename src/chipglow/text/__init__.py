@@ -11,7 +11,6 @@ from chipglow.text.own_data import check_own_data as check_own_data
 from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema
 from chipglow.text.yaml_file import (
     DescriptionError as DescriptionError,
-    parse_yaml as parse_yaml,
     read_small_text as read_small_text,
     read_yaml as read_yaml,
 )

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf
-from typing import Any, ClassVar, Final, final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -144,7 +144,6 @@ class FittedCalibration(Calibration):
             return np.asarray(-self.gradient(temperature) * slope)
 
 
-@final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearCalibration(FittedCalibration):
     """Counts that are a straight line over the in-band radiance: S = offset + gain L(T)."""
@@ -183,7 +182,6 @@ class LinearCalibration(FittedCalibration):
         return np.asarray((_floats(counts) - offset) / gain)
 
 
-@final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SakumaHattori(FittedCalibration):
     """Counts by the Planckian form of Sakuma and Hattori: S = offset + C / (exp(c2/(A T + B)) − 1).
@@ -245,7 +243,6 @@ class SakumaHattori(FittedCalibration):
         return np.asarray(self.parameters[3] * growth)
 
 
-@final
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FactoryCalibration(Calibration):
     """The conversion that a camera's maker stored in the file; its uncertainty is not known."""

@@ -19,7 +19,7 @@ _LEAST_FALL: Final = 0.5
 
 
 def residual_warnings(
-    residuals: Array, design: Array, kelvins: Array, stated: bool
+    residuals: Array, design: Array, kelvins: Array, stated: bool, drifts: bool
 ) -> Iterator[str]:
     """Yield what residuals say against a calibration, a sentence each.
 
@@ -42,7 +42,7 @@ def residual_warnings(
             f"{abs(residuals[point]):.3g} standard uncertainties from the others' curve; without "
             "it they agree far better. Check it."
         )
-    if alike(residuals, design):
+    if drifts:
         yield (
             "Residuals of successive points are alike, as by a drift or by the self-heating of the "
             "camera during the calibration, or by a wrong band. The uncertainty is enlarged by "

@@ -277,10 +277,11 @@ def _fit(points: _Points, calibration: Kind) -> CalibrationFit[Kind]:
     design = (calibration.gradient(points.temperatures) / deviations).T
     slope = calibration.slope(points.temperatures) / deviations
     covariance = _covariance(design, [slope * one for one in points.common], fit.enlargement)
-    if alike(scaled, design):
+    drifts = alike(scaled, design)
+    if drifts:
         shift = drift_shift(scaled, design)
         covariance = covariance + np.outer(shift, shift)
-    warnings = tuple(residual_warnings(scaled, design, points.temperatures, points.stated))
+    warnings = tuple(residual_warnings(scaled, design, points.temperatures, points.stated, drifts))
     return replace(fit, calibration=replace(calibration, covariance=covariance, warnings=warnings))
 
 

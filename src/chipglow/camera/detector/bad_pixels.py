@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from chipglow.camera.detector.nonuniformity import mean_frame, response, size_text
+from chipglow.camera.detector.nonuniformity import mean_frame, signal_rise, size_text
 from chipglow.quantities import Array
 
 LEAST_FRAMES: Final = 8
@@ -57,7 +57,7 @@ def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> Ba
     if hot is None:
         return BadPixels(stuck, noisy, _far_off(level))
     stuck_hot, noisy_hot = _by_noise(hot)
-    rise = response(level, mean_frame(hot))
+    rise = signal_rise(level, mean_frame(hot))
     gain = rise / np.median(rise)
     unresponsive = ~((gain >= GAIN_LIMITS[0]) & (gain <= GAIN_LIMITS[1]))
     return BadPixels(stuck | stuck_hot, noisy | noisy_hot, unresponsive)

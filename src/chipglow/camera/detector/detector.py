@@ -134,18 +134,10 @@ class Detector(Part):
         point: OperationPoint | None = None,
         times: Array | None = None,
     ) -> NDArray[np.uint32]:
-        """Return counts of frames.
+        """Return counts of frames of in-band radiance in W/(m² sr), shape (time, y, x).
 
-        Parameters
-        ----------
-        radiance : ndarray
-            In-band radiance in W/(m² sr), shape (time, y, x).
-        generator : numpy.random.Generator or sequence of it
-            Source of the noise, one for all frames or for each.
-        point : OperationPoint, optional
-            How the camera uses the detector; the paper's by default.
-        times : ndarray, optional
-            When the integration of each frame began in s; at the frame rate by default.
+        `generator` makes the noise of all frames, or one each; `times` are starts of integration in
+        s. The paper's operation point, and frames at the frame rate, by default.
         """
         point, count = point or OperationPoint(), len(radiance)
         if isinstance(generator, np.random.Generator):

@@ -39,7 +39,7 @@ class NonUniformity:
         Right at both, and at all other radiances as far as the pixels are linear.
         """
         low, high = mean_frame(cold), mean_frame(hot)
-        rise = response(low, high)
+        rise = signal_rise(low, high)
         with np.errstate(divide="ignore", invalid="ignore"):
             gain = np.where(rise > 0, np.median(rise) / rise, np.nan)
         return cls(gain, float(np.median(low)) - gain * low)
@@ -63,7 +63,7 @@ def mean_frame(frames: NDArray[Any]) -> Array:
     return np.asarray(frames.mean(axis=0, dtype=np.float64))
 
 
-def response(cold: Array, hot: Array) -> Array:
+def signal_rise(cold: Array, hot: Array) -> Array:
     """Return how much more each pixel gives of the brighter of two flat-field sources, (y, x)."""
     if cold.shape != hot.shape:
         raise ValueError(

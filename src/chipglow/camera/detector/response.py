@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import pi
-from typing import Annotated, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from scipy.constants import c, h
@@ -53,7 +53,6 @@ class DetectorResponse(Part, ABC):
         """
 
 
-@final
 @RESPONSES.part
 @dataclass(frozen=True)
 class PhotonResponse(DetectorResponse):
@@ -104,7 +103,6 @@ class PhotonResponse(DetectorResponse):
         return float(self.quantum_efficiency * wavelength / (h * c) / relative * seen)
 
 
-@final
 @RESPONSES.part
 @dataclass(frozen=True)
 class EnergyResponse(DetectorResponse):
@@ -120,7 +118,6 @@ class EnergyResponse(DetectorResponse):
         return self.per_radiance
 
 
-@final
 @RESPONSES.part
 @dataclass(frozen=True)
 class RangeResponse(DetectorResponse):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import ceil, log10, pi
-from typing import Annotated, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final
 from zlib import crc32
 
 import numpy as np
@@ -93,7 +93,6 @@ class DetectorTerm(Part, ABC):
         """
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class GainPattern(DetectorTerm):
@@ -114,7 +113,6 @@ class GainPattern(DetectorTerm):
         return np.asarray(electrons * (1 + self.standard_deviation * deviates))
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class DeadElements(DetectorTerm):
@@ -133,7 +131,6 @@ class DeadElements(DetectorTerm):
         return np.where(self.mask(electrons.shape[1:], readout.seed), 0.0, electrons)
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class Lag(DetectorTerm):
@@ -163,7 +160,6 @@ def follows(times: Array, frame_time: float) -> NDArray[np.bool_]:
     return np.asarray(off <= _SAME_INTERVAL * frame_time)
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class DarkCurrent(DetectorTerm):
@@ -180,7 +176,6 @@ class DarkCurrent(DetectorTerm):
         return electrons + self.current * readout.point.integration_time
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class ShotNoise(DetectorTerm):
@@ -198,7 +193,6 @@ class ShotNoise(DetectorTerm):
         return np.asarray(electrons + np.sqrt(np.maximum(electrons, 0.0)) * noise)
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class NonLinearity(DetectorTerm):
@@ -222,7 +216,6 @@ class NonLinearity(DetectorTerm):
         return np.asarray(electrons * (1 - self.fraction * filled))
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class OffsetPattern(DetectorTerm):
@@ -240,7 +233,6 @@ class OffsetPattern(DetectorTerm):
         return np.asarray(electrons + self.standard_deviation * deviates)
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class ReadNoise(DetectorTerm):
@@ -255,7 +247,6 @@ class ReadNoise(DetectorTerm):
         return electrons + self.standard_deviation * readout.normal(*electrons.shape[1:])
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class ColumnNoise(DetectorTerm):
@@ -270,7 +261,6 @@ class ColumnNoise(DetectorTerm):
         return electrons + self.standard_deviation * readout.normal(1, electrons.shape[2])
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class FlickerNoise(DetectorTerm):
@@ -314,7 +304,6 @@ class FlickerNoise(DetectorTerm):
         return self.since_correction / (2 * pi) * 10 ** (-np.arange(count) / _PER_DECADE)
 
 
-@final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class EquivalentNoise(DetectorTerm):

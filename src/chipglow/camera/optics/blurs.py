@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from math import ceil, cos, pi, sin
-from typing import Annotated, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from scipy import fft
@@ -80,7 +80,6 @@ class _RandomBlur(BlurTerm):
         return np.asarray(np.exp(-2 * (pi * self.standard_deviation) ** 2 * (across**2 + up**2)))
 
 
-@final
 @BLURS.part
 @dataclass(frozen=True)
 class ChargeDiffusion(_RandomBlur):
@@ -90,7 +89,6 @@ class ChargeDiffusion(_RandomBlur):
     example: ClassVar[str] = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
 
 
-@final
 @BLURS.part
 @dataclass(frozen=True)
 class Jitter(_RandomBlur):
@@ -100,7 +98,6 @@ class Jitter(_RandomBlur):
     example: ClassVar[str] = "{kind: jitter, standard_deviation: 1 um}"
 
 
-@final
 @BLURS.part
 @dataclass(frozen=True)
 class LinearMotion(BlurTerm):
@@ -121,7 +118,6 @@ class LinearMotion(BlurTerm):
         return np.asarray(np.sinc(self.distance * _along(self.direction, across, up)))
 
 
-@final
 @BLURS.part
 @dataclass(frozen=True)
 class Vibration(BlurTerm):
@@ -148,7 +144,6 @@ def _along(direction: float, across: Array, up: Array) -> Array:
     return across * cos(direction) + up * sin(direction)
 
 
-@final
 @dataclass(frozen=True)
 class BlurredPSF(PointSpreadFunction):
     """A point spread function with further blurs: the transfer functions are multiplied.
@@ -158,23 +153,11 @@ class BlurredPSF(PointSpreadFunction):
     psf : PointSpreadFunction
         That of the optics, or a measured one.
     blurs : tuple of BlurTerm
-        What spreads the light besides.
+        Further blurs; a ValueError if one is in the point spread function already.
 
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m: the mean of the widths along the row and the column through
-        the peak.
-
-    Raises
-    ------
-    ValueError
-        If a blur is in the point spread function already.
-
-    Notes
-    -----
-    What the blurs change is computed within 32 widths of the middle and their reach, on squares of
-    at most a quarter of the width, and summed on the squares that are asked for: the squares
+    Notes ----- `fwhm` is the mean of the widths along the row and the column through the peak. What
+    the blurs change is computed within 32 widths of the middle and their reach, on squares of at
+    most a quarter of the width, and summed on the squares that are asked for: the squares
     themselves count once. Farther away a blur of standard deviation σ changes the light at a radius
     r by a fraction of some (σ / r)², which is left out. No light is lost.
     """

@@ -41,20 +41,16 @@ def blur(
     return _without_rounding(image)
 
 
-def image_on_pixels(
-    radiance: Array,
-    psf: PointSpreadFunction,
-    scene: Raster,
-    sensors: Raster,
-    fill_factor: float,
-    beyond: Beyond = "edge",
-) -> Array:
-    """Return what pixels integrate of the image by `blur`, formed on the pixels alone."""
+def images_on_pixels(
+    radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
+) -> tuple[Array, Array]:
+    """Return what pixels integrate of the images by `blur`, formed on the pixels alone.
+
+    The first is of a field that goes on beyond its edges, the second of one with nothing there.
+    """
     seen = _seen(psf, scene, sensors, fill_factor)
-    image = seen.within(radiance)
-    if beyond == "edge":
-        image += seen.from_edges(radiance)
-    return _without_rounding(image)
+    within = seen.within(radiance)
+    return _without_rounding(within + seen.from_edges(radiance)), _without_rounding(within)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, ClassVar, Final, final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 import scipy
@@ -57,27 +57,17 @@ class PSFChoice(Part, ABC):
 
     @abstractmethod
     def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
-        """Return the point spread function on the scene; a ValueError if it is not possible.
+        """Return the point spread function on the scene, by the band and the lens's magnification.
 
-        Parameters
-        ----------
-        band : Band
-            The camera's band.
-        magnification : float or None
-            Of its lens, if it is known.
+        A ValueError if that is not possible, such as without a magnification where it is needed.
         """
 
 
 class PointSpreadFunction(PSFChoice):
-    """How the light of a point is spread over the scene's plane.
+    """Distribution of a point's light over the scene's plane, `fwhm` m wide at half maximum.
 
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m.
-    includes : tuple of str
-        What is in it besides the optics: ``footprint`` for the pixel's sensitive square, or kinds
-        of `chipglow.camera.BLURS`. A camera adds none of them again.
+    `includes` are effects in it besides the optics: ``footprint`` for the pixel's sensitive square,
+    or kinds of `chipglow.camera.BLURS`. A camera adds none of them again.
     """
 
     fwhm: float
@@ -93,7 +83,7 @@ class PointSpreadFunction(PSFChoice):
 
     @abstractmethod
     def kernel(self, spacing: float) -> Array:
-        """Fractions of a point's light on a grid of squares.
+        """Return the fractions of a point's light on a grid of squares.
 
         Parameters
         ----------
@@ -103,42 +93,29 @@ class PointSpreadFunction(PSFChoice):
         Returns
         -------
         ndarray
-            The fraction that falls on each square; a square array of odd side, first row on top.
-            What its sum lacks of 1 falls outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
-
-        Raises
-        ------
-        ValueError
-            If the spacing is not positive, or so fine that the kernel would be too large.
+            A square array of odd side, first row on top. What its sum lacks of 1 falls outside:
+            `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
         """
 
     def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
-        """Fractions of a point's light in a view, of which none is left out.
+        """Return the fractions of a point's light in a view, of which none is left out.
 
         Parameters
         ----------
         spacing : float
             Side of a square in m. The point is in the middle of the middle square.
         rows, columns : int
-            Squares of the view, 1 or more.
+            Squares up and down from the middle one, and to either side.
 
         Returns
         -------
         ndarray
-            The fraction that falls on each square, of sum 1: up to `rows` squares up and down from
-            the middle one and `columns` to either side, shape (2 m + 1, 2 n + 1). The outermost
-            ones hold, besides their own, the light that goes farther in their direction. From no
-            square of the view are they in it.
-
-        Raises
-        ------
-        ValueError
-            As `kernel`.
+            Of sum 1, shape (2 m + 1, 2 n + 1) with up to `rows` and `columns`. The outermost
+            squares hold, besides their own, the light that goes farther in their direction.
         """
         return folded(normalised(self.kernel(spacing)), rows, columns)
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class AnnularAperturePSF(PointSpreadFunction):
@@ -229,7 +206,6 @@ class AnnularAperturePSF(PointSpreadFunction):
         return np.asarray((_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner))
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class GaussianPSF(PointSpreadFunction):
@@ -251,7 +227,6 @@ class GaussianPSF(PointSpreadFunction):
         return np.outer(line, line)
 
 
-@final
 @dataclass(frozen=True, eq=False)
 class MeasuredPSF(PointSpreadFunction):
     """A measured kernel, such as one found with a knife edge.
@@ -267,26 +242,15 @@ class MeasuredPSF(PointSpreadFunction):
         What independent errors change in the weights, in their unit; those of ``chipglow psf`` are
         in its files. None by default: then nothing is known of them.
     includes : tuple of str
-        What it holds besides the optics, because it was measured through it: ``footprint`` for the
-        pixel's sensitive square, and kinds of `chipglow.camera.BLURS`.
-
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m: the mean of the widths along the row and the column through
-        the greatest value, wherever in the kernel it is; of equal ones, through the one nearest to
-        the middle of them all.
-
-    Raises
-    ------
-    ValueError
-        If the array is not such a kernel, or the spacing is not a length.
+        Effects in it besides the optics, because it was measured through them: ``footprint`` for
+        the pixel's sensitive square, and kinds of `chipglow.camera.BLURS`.
 
     Notes
     -----
-    At another spacing the light is taken as even within each measured square and shared among
-    the new squares by area: nothing is lost and nothing is made up between the measured values.
-    The weights are scaled to a sum of 1: what the measurement did not reach is not there.
+    Its `fwhm` is the mean of the widths along the row and the column through the greatest value; of
+    equal ones, through the one nearest to the middle of them all. At another spacing the light is
+    taken as even within each measured square and shared among the new squares by area. The weights
+    are scaled to a sum of 1: what the measurement did not reach is not there.
     """
 
     weights: Array = field(repr=False)
@@ -316,24 +280,11 @@ class MeasuredPSF(PointSpreadFunction):
     def from_file(
         cls, path: str | Path, spacing: float | None = None, includes: tuple[str, ...] | None = None
     ) -> "MeasuredPSF":
-        """Read a kernel.
+        """Read a kernel from a NumPy array (``.npy``), a table (``.csv``) or a NetCDF file.
 
-        Parameters
-        ----------
-        path : str or Path
-            A NumPy array (``.npy``), a table of numbers, separated by commas (``.csv``), or a file
-            of ``chipglow psf`` (``.nc``).
-        spacing : float, optional
-            Side of the kernel's squares in m, on the scene; None for a ``.nc``, which states it.
-        includes : tuple of str, optional
-            Effects in it besides the optics; by default those that a ``.nc`` states, or none.
-
-        Raises
-        ------
-        ValueError
-            If the file is of another kind, or does not hold a kernel; the message names it.
-        OSError
-            If it cannot be read.
+        A ``.nc`` is of ``chipglow psf``. `spacing` is the side of its squares in m on the scene,
+        None for a ``.nc``, which states it; `includes` are by default those that a ``.nc`` states.
+        A ValueError names the file if it holds no kernel.
         """
         path = Path(path)
         kind = path.suffix.lower()
@@ -395,7 +346,6 @@ class ApertureChoice(PSFChoice):
         return magnification / (2 * self.f_number * (1 + magnification))
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class AiryAperture(ApertureChoice):
@@ -418,7 +368,6 @@ class AiryAperture(ApertureChoice):
         return AnnularAperturePSF(wavelength, self.aperture(magnification), 0.0)
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class MeasuredPSFFile(PSFChoice):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, factorial, log2, pi, sqrt
 from numbers import Integral, Real
-from typing import Annotated, Any, ClassVar, Final, final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,25 +117,19 @@ SourceTemperature = Annotated[
 ]
 
 
-@final
 @dataclass(frozen=True)
 class PupilPSF(PointSpreadFunction):
     """Diffraction of a pupil with obscuration, defocus and aberrations, over a camera's band.
 
     Wavelengths count as they do in the in-band radiance of a blackbody: by the spectral radiance
     and by the band's response, relative to energy (a photon detector's is proportional to the
-    wavelength, times its quantum efficiency).
+    wavelength, times its quantum efficiency). `fwhm` is the mean of the widths along the row and
+    the column through the peak.
 
     Parameters
     ----------
     band : Band
         The camera's band, with its response.
-
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m: the mean of the widths along the row and the column through
-        the peak.
 
     Raises
     ------
@@ -327,7 +321,6 @@ class PupilPSF(PointSpreadFunction):
         return np.asarray(path)
 
 
-@final
 @PSFS.part
 @dataclass(frozen=True)
 class Pupil(ApertureChoice):

@@ -4,7 +4,7 @@ from abc import ABC
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import log, sqrt
-from typing import Annotated, ClassVar, Final, TypeAlias, final
+from typing import Annotated, ClassVar, Final, TypeAlias
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -30,7 +30,7 @@ class OpticsTerm(Part, ABC):
     """
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
-        """Image on the scene's samples, before the pixels integrate it.
+        """Return the image on the scene's samples, before the pixels integrate it.
 
         Parameters
         ----------
@@ -39,26 +39,15 @@ class OpticsTerm(Part, ABC):
         scene, pixels : Raster
             The samples, and the pixels.
         blurred : Blur
-            How to convolve, and what is taken to be beyond the scene.
+            Convolution, by what is taken to be beyond the scene.
         """
         return radiance
 
     def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
-        """Radiance that the camera shows for what its pixels received.
-
-        Parameters
-        ----------
-        radiance : ndarray
-            Of the pixels.
-        pixels : Raster
-            The pixels.
-        band : Band
-            The camera's band.
-        """
+        """Return the radiance that the camera shows for what its pixels received in its band."""
         return radiance
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class OpticalElement(OpticsTerm):
@@ -95,7 +84,6 @@ class OpticalElement(OpticsTerm):
         return radiance + (own - seen) * lost / self.transmittance
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Narcissus(OpticsTerm):
@@ -136,7 +124,6 @@ class Narcissus(OpticsTerm):
         return np.asarray(radiance - self.reflectance * missing * profile)
 
 
-@final
 @dataclass(frozen=True)
 class VeilPSF(PointSpreadFunction):
     """Density of scattered light: h / (2π √3 (r² + h² / 3)^(3/2)) per area."""
@@ -160,7 +147,6 @@ class VeilPSF(PointSpreadFunction):
         return self.radius / sqrt(3)
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Veil(OpticsTerm):
@@ -185,7 +171,6 @@ class Veil(OpticsTerm):
         return (1 - self.fraction) * radiance + self.fraction * veil
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Distortion(OpticsTerm):
@@ -219,7 +204,6 @@ class Distortion(OpticsTerm):
         return np.asarray(map_coordinates(radiance, places, order=1, mode="nearest"))
 
 
-@final
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class FieldBlur(OpticsTerm):

@@ -104,8 +104,16 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
         unit, times = _unit(one, stated), _times(one, arrays, axes, chosen, stated, notes)
+        missing = []
+        if unit is None:
+            missing.append(
+                f"unit: is missing, the file says {one.unit or 'none'}, expected one of "
+                f"{', '.join(RECORDING_UNITS)}"
+            )
+        if times is None:
+            missing.append("give the interval between frames, the file says no times")
         if unit is None or times is None:
-            raise MissingError(f"{one}: {_missing(one, unit, times)}")
+            raise MissingError(f"{one}: {'; '.join(missing)}")
         signal = _signal(one, axes, chosen)
     if skipped := one.attributes.get("lines_of_text"):
         notes.remarks.append(f"Ignored {skipped} lines of text before the numbers.")
@@ -134,18 +142,6 @@ def _dataset(path: Path, arrays: Mapping[str, FileArray], name: str | None) -> F
 def _may_be_pictures(array: FileArray) -> bool:
     # MATLAB keeps lists as matrices of one row or column.
     return len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
-
-
-def _missing(one: FileArray, unit: str | None, times: NDArray[np.float64] | None) -> str:
-    parts = []
-    if unit is None:
-        parts.append(
-            f"unit: is missing, the file says {one.unit or 'none'}, expected one of "
-            f"{', '.join(RECORDING_UNITS)}"
-        )
-    if times is None:
-        parts.append("give the interval between frames, the file says no times")
-    return "; ".join(parts)
 
 
 def _unit(one: FileArray, stated: Stated) -> str | None:

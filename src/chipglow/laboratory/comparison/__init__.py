@@ -2,8 +2,6 @@
 
 from chipglow.laboratory.comparison.comparison import (
     Comparison as Comparison,
-    Fit as Fit,
-    PlaceResult as PlaceResult,
     Readings as Readings,
     StatedUncertainties as StatedUncertainties,
     compare as compare,

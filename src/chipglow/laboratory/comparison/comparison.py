@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from math import degrees, radians, sqrt
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -38,6 +39,9 @@ TIP_REACH: Final = 100e-6
 SURE: Final = 0.95
 """Fraction of the draws in which the best set must be best to be called so."""
 
+AGREEING: Final = "values_with_E_n_up_to_1"
+"""Column of the number of values that agree."""
+
 _DRAWS: Final = 4000
 _SEED: Final = 2010
 _FEW: Final = 3
@@ -52,66 +56,6 @@ def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
     away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.abs(away.values) / (COVERAGE * away.standard_uncertainty)
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Fit of one simulation to the measurement at one place."""
-
-    label: str
-    bias: float
-    """Mean of simulated minus measured in K."""
-    bias_uncertainty: float
-    """Standard uncertainty of the bias in K."""
-    rms: float
-    """Root mean square of the differences in K."""
-    agreeing: int
-    """Number of values with E_n up to 1."""
-    count: int
-    """Number of values that both have."""
-
-
-@dataclass(frozen=True)
-class PlaceResult:
-    """Fits of all simulations at one place."""
-
-    place: str
-    fits: tuple[Fit, ...]
-    best: int
-    """Index of the fit with the least root mean square."""
-    confidence: float
-    """Fraction of the draws of all uncertainties in which it is the least."""
-
-    @property
-    def is_sure(self) -> bool:
-        """Whether the best one is best in `SURE` of the draws."""
-        return self.confidence >= SURE
-
-    @property
-    def sentence(self) -> str:
-        """Which simulation fits best here, in one sentence."""
-        best, place = self.fits[self.best], f"{self.place[0].upper()}{self.place[1:]},"
-        others = [fit for fit in self.fits if fit is not best]
-        result = f"{_fit_text(best)} values agree (E_n up to 1)"
-        if not others:
-            return f"{place} {best.label} is {result}."
-        result = "; ".join([result, *(f"{fit.label} is {_fit_text(fit)}" for fit in others)])
-        how = f"{100 * self.confidence:.3g} % of the draws of the uncertainties"
-        if self.is_sure:
-            return f"{place} {best.label} fits best (in {how}): it is {result}."
-        return (
-            f"{place} the sets cannot be distinguished ({best.label} is nearest, in {how}): "
-            f"{best.label} is {result}."
-        )
-
-
-def _fit_text(fit: Fit) -> str:
-    word = "too hot" if fit.bias > 0 else "too cold"
-    expanded = COVERAGE * fit.bias_uncertainty
-    return (
-        f"{abs(fit.bias):.0f} K {word} (± {expanded:.0f} K), RMS {fit.rms:.0f} K, "
-        f"{fit.agreeing} of {fit.count}"
-    )
 
 
 @dataclass(frozen=True)
@@ -159,7 +103,11 @@ class Comparison:
     grid: Readings | None
     band: Readings | None
     """Readings at the rake face and along the shear band, where both sides have some."""
-    places: tuple[PlaceResult, ...]
+    fits: pd.DataFrame
+    """Fit of each simulation at each place, one row each. The bias is the mean of simulated minus
+    measured; the confidence is the fraction of the draws of all uncertainties in which the
+    simulation has the least root mean square of the place.
+    """
     notes: Notes
 
     def to_frame(self) -> pd.DataFrame:
@@ -167,38 +115,57 @@ class Comparison:
         readings = [one for one in (self.grid, self.band) if one is not None]
         return pd.concat([one.to_frame(self.labels) for one in readings], ignore_index=True)
 
-    def fit_frame(self) -> pd.DataFrame:
-        """Return the fit of each simulation at each place; one row each."""
-        return pd.DataFrame(
-            {
-                "place": result.place,
-                "simulation": fit.label,
-                "bias_K": fit.bias,
-                "bias_standard_uncertainty_K": fit.bias_uncertainty,
-                "rms_K": fit.rms,
-                "values": fit.count,
-                "values_with_E_n_up_to_1": fit.agreeing,
-            }
-            for result in self.places
-            for fit in result.fits
-        )
+    @property
+    def best(self) -> pd.DataFrame:
+        """Fits with the least root mean square of each place."""
+        return self.fits.loc[self.fits.groupby("place", sort=False)["rms_K"].idxmin()]
+
+    @property
+    def sentences(self) -> list[str]:
+        """Which simulation fits best, a sentence for each place."""
+        places = zip(self.best.iloc, self.fits.groupby("place", sort=False), strict=True)
+        return [_sentence(best, fits.drop(index=best.name)) for best, (_, fits) in places]
 
     @property
     def statement(self) -> str:
         """Which simulation fits best where, in the form of the paper's conclusion."""
         if len(self.labels) == 1:
-            agreeing = sum(result.fits[0].agreeing for result in self.places)
-            count = sum(result.fits[0].count for result in self.places)
+            agreeing, count = self.fits[[AGREEING, "values"]].sum()
             return f"{self.labels[0]}: {agreeing} of {count} values agree (E_n up to 1)."
-        parts = []
-        for i, label in enumerate(self.labels):
-            where = [r.place for r in self.places if r.is_sure and r.best == i]
-            if where:
+        best, parts = self.best, []
+        sure = best["confidence"] >= SURE
+        for label in self.labels:
+            where = best["place"][sure & (best["simulation"] == label)]
+            if where.size:
                 parts.append(f"{label} fits best {'; '.join(where)}.")
-        unsure = [r.place for r in self.places if not r.is_sure]
-        if unsure:
-            parts.append(f"The sets cannot be distinguished {'; '.join(unsure)}.")
+        if not sure.all():
+            parts.append(f"The sets cannot be distinguished {'; '.join(best['place'][~sure])}.")
         return " ".join(parts)
+
+
+def _sentence(best: pd.Series, others: pd.DataFrame) -> str:
+    """Return which simulation fits best at a place."""
+    place, name = f"{best['place'][0].upper()}{best['place'][1:]},", best["simulation"]
+    result = f"{_fit_text(best)} values agree (E_n up to 1)"
+    if others.empty:
+        return f"{place} {name} is {result}."
+    result = "; ".join(
+        [result, *(f"{fit['simulation']} is {_fit_text(fit)}" for fit in others.iloc)]
+    )
+    how = f"{100 * best['confidence']:.3g} % of the draws of the uncertainties"
+    if best["confidence"] >= SURE:
+        return f"{place} {name} fits best (in {how}): it is {result}."
+    nearest = f"({name} is nearest, in {how}): {name} is {result}."
+    return f"{place} the sets cannot be distinguished {nearest}"
+
+
+def _fit_text(fit: pd.Series) -> str:
+    word = "too hot" if fit["bias_K"] > 0 else "too cold"
+    expanded = COVERAGE * fit["bias_standard_uncertainty_K"]
+    return (
+        f"{abs(fit['bias_K']):.0f} K {word} (± {expanded:.0f} K), RMS {fit['rms_K']:.0f} K, "
+        f"{fit[AGREEING]} of {fit['values']}"
+    )
 
 
 @dataclass(frozen=True)
@@ -287,11 +254,11 @@ def compare(
         files.append(_File(label, item, _tool_of(label, item, files[0], notes)))
     grid = _compare_grid(files, stated, notes)
     band = _compare_band(files, curve, stated, notes)
-    places = _places(tuple(simulated), grid, band)
-    if not places:
+    fits = _fits(tuple(simulated), grid, band)
+    if fits.empty:
         reasons = " ".join(notes.warnings)
         raise ValueError(f"comparison: there is nothing that can be compared: {reasons}")
-    return Comparison(tuple(simulated), grid, band, places, notes)
+    return Comparison(tuple(simulated), grid, band, fits, notes)
 
 
 class _File(NamedTuple):
@@ -498,9 +465,7 @@ def _scatter(frames: Array) -> Component:
     return scatter
 
 
-def _places(
-    labels: Sequence[str], grid: Readings | None, band: Readings | None
-) -> tuple[PlaceResult, ...]:
+def _fits(labels: Sequence[str], grid: Readings | None, band: Readings | None) -> pd.DataFrame:
     """Return the fits at each place where measurement and simulations have values."""
     asked: list[tuple[str, Readings, NDArray[np.bool_]]] = []
     if grid is not None and grid.depth is not None:
@@ -513,44 +478,36 @@ def _places(
         near, reach = band.distance < TIP_REACH, 1e6 * TIP_REACH
         asked.append((f"in the shear band, under {reach:.3g} µm from the edge", band, near))
         asked.append((f"in the shear band, {reach:.3g} µm and farther", band, ~near))
-    results = (_judged(place, labels, pair, where) for place, pair, where in asked)
-    return tuple(result for result in results if result is not None)
+    rows: list[dict[str, Any]] = []
+    for place, readings, where in asked:
+        common = where & np.isfinite(readings.measured.values)
+        for item in readings.simulated:
+            common &= np.isfinite(item.values)
+        if common.any():
+            measured = readings.measured[common]
+            simulated = [item[common] for item in readings.simulated]
+            fits = map(_fit, repeat(measured), simulated)
+            columns = zip(labels, fits, _confidences(measured, simulated), strict=True)
+            rows.extend(
+                {"place": place, "simulation": label, **fit, "confidence": confidence}
+                for label, fit, confidence in columns
+            )
+    return pd.DataFrame(rows)
 
 
-def _judged(
-    place: str,
-    labels: Sequence[str],
-    pair: Readings,
-    where: NDArray[np.bool_],
-) -> PlaceResult | None:
-    """Return the fits at one place; None where not all files have a value together."""
-    common = where & np.isfinite(pair.measured.values)
-    for item in pair.simulated:
-        common &= np.isfinite(item.values)
-    if not common.any():
-        return None
-    measured = pair.measured[common]
-    simulated = [item[common] for item in pair.simulated]
-    fits = tuple(_fit(label, measured, item) for label, item in zip(labels, simulated, strict=True))
-    best = int(np.argmin([fit.rms for fit in fits]))
-    return PlaceResult(place, fits, best, _confidence(measured, simulated, best))
-
-
-def _fit(label: str, measured: Estimate, simulated: Estimate) -> Fit:
+def _fit(measured: Estimate, simulated: Estimate) -> dict[str, float]:
     away = simulated - measured
-    bias = away.mean()
-    return Fit(
-        label=label,
-        bias=float(away.values.mean()),
-        bias_uncertainty=float(bias.standard_uncertainty),
-        rms=float(np.sqrt((away.values**2).mean())),
-        agreeing=int((normalised_error(measured, simulated) <= 1).sum()),
-        count=away.values.size,
-    )
+    return {
+        "bias_K": float(away.values.mean()),
+        "bias_standard_uncertainty_K": float(away.mean().standard_uncertainty),
+        "rms_K": float(np.sqrt((away.values**2).mean())),
+        "values": away.values.size,
+        AGREEING: int((normalised_error(measured, simulated) <= 1).sum()),
+    }
 
 
-def _confidence(measured: Estimate, simulated: Sequence[Estimate], best: int) -> float:
-    """Return the fraction of the draws of all uncertainties in which the best set stays so."""
+def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[float]:
+    """Return the fraction of the draws of all uncertainties in which each set is the best."""
     base, *others = draw([measured, *simulated], _DRAWS, np.random.default_rng(_SEED))
-    rms = [((other - base) ** 2).mean(axis=1) for other in others]
-    return float((np.argmin(rms, axis=0) == best).mean())
+    best = np.argmin([((other - base) ** 2).mean(axis=1) for other in others], axis=0)
+    return [float((best == number).mean()) for number in range(len(others))]

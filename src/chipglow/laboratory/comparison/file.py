@@ -27,19 +27,19 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
 def write_comparison(comparison: Comparison, folder: Path) -> None:
     """Write a comparison into an existing folder."""
     write_frame(comparison.to_frame(), folder / "comparison.csv")
-    fits = comparison.fit_frame().set_index("place")
+    fits = comparison.fits.set_index("place")
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
         "places": [
             {
-                "place": one.place,
-                "sentence": one.sentence,
-                "best": one.fits[one.best].label,
-                "confidence": one.confidence,
-                "fits": fits.loc[[one.place]].to_dict("records"),
+                "place": best["place"],
+                "sentence": sentence,
+                "best": best["simulation"],
+                "confidence": best["confidence"],
+                "fits": fits.loc[[best["place"]]].to_dict("records"),
             }
-            for one in comparison.places
+            for best, sentence in zip(comparison.best.iloc, comparison.sentences, strict=True)
         ],
         "assumed": comparison.notes.assumed,
         "warnings": comparison.notes.warnings,

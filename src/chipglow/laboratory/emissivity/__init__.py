@@ -12,6 +12,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 from chipglow.laboratory.emissivity.file import (
     EmissivityMapFile as EmissivityMapFile,
     MeasuredEmissivity as MeasuredEmissivity,
+    SurfaceFile as SurfaceFile,
     emissivity_trend as emissivity_trend,
     measured_features as measured_features,
     measured_text as measured_text,

@@ -1,6 +1,7 @@
 """Determined emissivities in NetCDF-4 files, and as surfaces and sections of a study."""
 
 import os
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -25,16 +26,10 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.observations import RANDOM, with_drift
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
-from chipglow.quantities import FileBeside, Parameter
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
-from chipglow.surface import (
-    SURFACES,
-    EmissivityTrend,
-    MapSurface,
-    SurfaceChoice,
-    TrendSurface,
-)
+from chipglow.surface import SURFACES, EmissivityTrend, MapSurface, Surface, TrendSurface
 from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
@@ -237,9 +232,17 @@ def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:
     return read_dataset(path, checked, "an emissivity map", "a file of chipglow emissivity")
 
 
+class SurfaceFile(Part, ABC):
+    """A file with the only surface of a study."""
+
+    @abstractmethod
+    def surface(self) -> Surface:
+        """Read the surface; a ValueError or OSError if that is not possible."""
+
+
 @SURFACES.part
 @dataclass(frozen=True)
-class EmissivityMapFile(SurfaceChoice):
+class EmissivityMapFile(SurfaceFile):
     """An image that stays where it is."""
 
     kind: ClassVar[str] = "map"
@@ -247,13 +250,13 @@ class EmissivityMapFile(SurfaceChoice):
     file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
 
     def surface(self) -> MapSurface:
-        """Return the surface."""
+        """See `SurfaceFile.surface`."""
         return read_emissivity_map(self.file)
 
 
 @SURFACES.part
 @dataclass(frozen=True)
-class MeasuredEmissivity(SurfaceChoice):
+class MeasuredEmissivity(SurfaceFile):
     """A measured region's emissivity, everywhere: its line over the temperature."""
 
     kind: ClassVar[str] = "measured"
@@ -262,7 +265,7 @@ class MeasuredEmissivity(SurfaceChoice):
     region: Annotated[str, Parameter("Name of a region in it.")]
 
     def surface(self) -> TrendSurface:
-        """Return the surface."""
+        """See `SurfaceFile.surface`."""
         areas = read_emissivity_lines(self.file)
         if self.region not in areas:
             raise ValueError(

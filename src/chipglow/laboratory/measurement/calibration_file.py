@@ -9,11 +9,7 @@ import numpy as np
 from chipglow.camera import MODELS, CalibrationFit, FittedCalibration
 from chipglow.io import atomic_path
 from chipglow.quantities import ZERO_CELSIUS, Parameter, Part
-from chipglow.quantities.units import (
-    TEMPERATURE,
-    TIME,
-    WAVELENGTHS,
-)
+from chipglow.quantities.units import TEMPERATURE, TIME, WAVELENGTHS
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, load_described
 

@@ -23,9 +23,7 @@ from chipglow.io.cameras.formats import find_format
 from chipglow.io.cameras.stacks import MissingError
 from chipglow.laboratory.measurement.calibration_file import load_calibration
 from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
-from chipglow.laboratory.measurement.radiometric_calibration import (
-    calibrate_recording,
-)
+from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
 from chipglow.text import DescriptionError
 
 _MOST_SATURATED: Final = 0.05

@@ -14,12 +14,7 @@ from chipglow.camera import Recording
 from chipglow.io.column_file import read_bad_pixels, read_response
 from chipglow.laboratory.measurement.radiometric_calibration import ImagePosition, Mirror, Pixels
 from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
-from chipglow.quantities.units import (
-    LENGTH,
-    TEMPERATURE,
-    TIME,
-    WAVELENGTHS,
-)
+from chipglow.quantities.units import LENGTH, TEMPERATURE, TIME, WAVELENGTHS
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import commented_yaml, described_by
 
@@ -54,19 +49,10 @@ def band_of(text: str) -> Band:
 class ObjectSection(Part):
     """The camera's object parameters, if they are missing or wrong in the file."""
 
-    emissivity: Annotated[
-        float | None, Parameter("Emissivity of the object.", over=0.0, most=1.0)
-    ] = None
-    reflected: Annotated[
-        float | None,
-        Parameter("Temperature of the surroundings that the object reflects.", TEMPERATURE),
-    ] = None
-    transmittance: Annotated[
-        float | None, Parameter("Transmission of atmosphere and window.", over=0.0, most=1.0)
-    ] = None
-    atmosphere: Annotated[
-        float | None, Parameter("Temperature of atmosphere and window.", TEMPERATURE)
-    ] = None
+    emissivity: Annotated[float | None, ObjectParameters.parameter("emissivity")] = None
+    reflected: Annotated[float | None, ObjectParameters.parameter("reflected")] = None
+    transmittance: Annotated[float | None, ObjectParameters.parameter("transmittance")] = None
+    atmosphere: Annotated[float | None, ObjectParameters.parameter("atmosphere")] = None
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
         """Override recorded object parameters by this section."""
@@ -230,9 +216,8 @@ class MeasurementDescription(Part):
             "saturation": self.saturation,
             "object_parameters": self.object_parameters.applied_to(recording.object_parameters),
         }
-        return replace(
-            recording, **{name: value for name, value in said.items() if value is not None}
-        )
+        said = {name: value for name, value in said.items() if value is not None}
+        return replace(recording, **said)
 
     def listed_bad_pixels(self, shape: tuple[int, int]) -> NDArray[np.bool_] | None:
         """Return the bad pixels of the table, if there is one, for an image of this shape."""
