@@ -21,6 +21,7 @@ from chipglow.camera import (
     Detector,
     Exposure,
     Flag,
+    FlickerNoise,
     GainPattern,
     Lag,
     NonLinearity,
@@ -117,6 +118,13 @@ def test_non_linearity_remains_between_the_points():
     read, _ = made.read(np.full((1, 4, 4), 0.5 * full), times(1))
     expected = 0.5 + 0.05 * (0.5 - 0.1) * (0.8 - 0.5) / (1 - 0.9 * 0.05)
     np.testing.assert_allclose(read / full, expected, rtol=1e-5)
+
+
+def test_flicker_noise_is_in_the_sources_frames_too():
+    """Drift of an hour, of frames a hundredth of a second long: all of it stays in the pixels."""
+    made = camera(FlickerNoise(3000.0, since_correction=3600.0), bits=20)
+    read, _ = made.read(images(650.0), times(1))
+    assert read.std() / read.mean() > 1e-3
 
 
 def test_dark_electrons_leave_no_error_but_take_room():
