@@ -226,6 +226,10 @@ def test_full_well_and_digitiser_end_the_counts():
     counts = digitiser.counts(np.array([[[-5.0, 0.0, 204.7, 409.5, 500.0]]]), generator())
     assert counts[0, 0].tolist() == [0, 0, 2047, 4095, 4095]
     assert (digitiser.capacity, digitiser.saturation) == (409.5, 4094)
+    # Without a gain the full well is the last count.
+    filled = detector(gain=None, full_well=1e6, bits=14)
+    assert frames(filled, 1e6, 1).max() == 16383
+    assert filled.conversion_gain == pytest.approx((16383 - 400) / 1e6)
 
 
 def test_the_photon_transfer_curve_gives_gain_and_read_noise_back():
