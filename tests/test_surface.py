@@ -311,7 +311,7 @@ def test_a_uniform_surface_is_black_but_for_the_void():
     material = np.full(RASTER.shape, WORKPIECE)
     material[0], material[1] = VOID, TOOL
     scene = a_scene(material=material)
-    found = UniformSurface().on(scene).emissivity(scene.frame(0))
+    found = UniformSurface(1.0).on(scene).emissivity(scene.frame(0))
     assert (found[0] == 0).all()
     assert (found[1:] == 1).all()
 

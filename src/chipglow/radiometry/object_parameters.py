@@ -18,16 +18,16 @@ class ObjectParameters(Part):
     The measured radiance is L = τ (ε L(T) + (1 − ε) L(T_reflected)) + (1 − τ) L(T_atmosphere).
     """
 
-    emissivity: Annotated[float, Parameter("ε of the object.", over=0.0, most=1.0)] = 1.0
+    emissivity: Annotated[float, Parameter("Emissivity ε of the object.", over=0.0, most=1.0)] = 1.0
     reflected: Annotated[
-        float, Parameter("Surroundings that the object reflects.", TEMPERATURE, over=0.0)
+        float, Parameter("Temperature of what the object reflects.", TEMPERATURE, over=0.0)
     ] = 293.15
     transmittance: Annotated[
-        float, Parameter("τ of atmosphere and window.", over=0.0, most=1.0)
+        float, Parameter("Transmittance τ of atmosphere and window.", over=0.0, most=1.0)
     ] = 1.0
-    atmosphere: Annotated[float, Parameter("Atmosphere and window.", TEMPERATURE, over=0.0)] = (
-        293.15
-    )
+    atmosphere: Annotated[
+        float, Parameter("Temperature of atmosphere and window.", TEMPERATURE, over=0.0)
+    ] = 293.15
 
     def apparent_radiance(self, temperature: ArrayLike, band: Band) -> Array:
         """Return the radiance that was received of an object which is shown at this temperature."""

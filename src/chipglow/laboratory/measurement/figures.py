@@ -40,13 +40,9 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
     with drawing.style():
         figure = drawing.new_figure(height + _HISTOGRAM + 0.9)
         upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM))
-        title = f"{measurement.times[index] * 1e6:.6g} µs"
-        panel = ImagePanel(
-            title, "radiance temperature / °C", celsius, scales.ends(celsius), scales.HEAT
-        )
+        title, limits = f"{measurement.times[index] * 1e6:.6g} µs", scales.ends(celsius)
+        panel = ImagePanel(title, "radiance temperature / °C", celsius, limits, scales.HEAT)
         panel.draw(figure, upper, raster, measurement.tool)
-        upper.set_xlabel("x / µm")
-        upper.tick_params(labelbottom=True)
         _draw_flags(upper, flags, measurement)
         _draw_histogram(lower, celsius)
     return figure
