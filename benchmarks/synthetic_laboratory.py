@@ -71,7 +71,7 @@ from chipglow.radiometry import Band
 from chipglow.scene import Raster, areas
 from chipglow.uncertainty import Estimate
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from synthetic_edge import (
     FWHM_PER_SIGMA,
     PITCH,

@@ -322,7 +322,7 @@ def test_noise_is_that_of_both_channels():
     pair = two(camera=camera)
     first, second = replace(pair.first, seed=1), replace(pair.second, seed=2)
     errors = ratio_errors(
-        replace(pair, first=first, second=second), scene(1000.0), UniformSurface(), 0.0
+        replace(pair, first=first, second=second), scene(1000.0), UniformSurface(1.0), 0.0
     )
 
     def relative(band):
@@ -338,7 +338,7 @@ def test_noise_is_that_of_both_channels():
     plan = WavelengthPlan((SHORT, LONG))
     spot = Spot("middle", "plate", 0.0, np.array([0.5e-6, 0.5e-6]))
     study = wavelength_errors(
-        scene(1000.0), {"plate": UniformSurface()}, camera, plan, [spot], 1, 1
+        scene(1000.0), {"plate": UniformSurface(1.0)}, camera, plan, [spot], 1, 1
     )
     # A second way: frames of a flat field, of 64 x 64 elements.
     assert float(study.noise[0, -1]) == pytest.approx(found, rel=0.03)
@@ -463,7 +463,7 @@ def test_what_a_study_of_bands_refuses():
     ):
         Study(wavelengths={"misregistration": "-1 um"})
     spot = Spot("far", "plate", 0.0, np.array([1.0, 0.0]))
-    arguments = {"plate": UniformSurface()}, CAMERA, WavelengthPlan((SHORT, LONG), delay=1e-3)
+    arguments = {"plate": UniformSurface(1.0)}, CAMERA, WavelengthPlan((SHORT, LONG), delay=1e-3)
     with pytest.raises(ValueError, match="delay: 1000 us, expected so little"):
         wavelength_errors(scene(900.0), *arguments, [spot], 1, 1)
     plan = WavelengthPlan((SHORT, LONG))

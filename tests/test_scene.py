@@ -135,7 +135,7 @@ def test_a_camera_looks_at_whatever_a_scene_may_have():
     for temperature in (COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE - 1):
         made = scene(temperature=np.full((3, *RASTER.shape), temperature))
         measured = Camera(pitch=2e-6, integration_time=0.2e-6, lower_limit=None).measure(
-            made, UniformSurface(), 0.0
+            made, UniformSurface(1.0), 0.0
         )
         # Both are nodes of the exposure's table and of the inverse's first and last step: rounding
         # of the table, which is float32.

@@ -158,6 +158,8 @@ def test_presets_are_table_1():
         assert (surface.shear_band.mean, surface.shear_band.standard_deviation) == band
         assert surface.workpiece == Emissivity(0.40, 0.03)
         assert surface.tool == Emissivity(0.58, 0.06)
+        features = (surface.chip, surface.shear_band, surface.workpiece, surface.tool)
+        assert all(feature.is_normal for feature in features)
 
 
 def test_shares_of_the_blends():
@@ -311,7 +313,7 @@ def test_a_uniform_surface_is_black_but_for_the_void():
     material = np.full(RASTER.shape, WORKPIECE)
     material[0], material[1] = VOID, TOOL
     scene = a_scene(material=material)
-    found = UniformSurface().on(scene).emissivity(scene.frame(0))
+    found = UniformSurface(1.0).on(scene).emissivity(scene.frame(0))
     assert (found[0] == 0).all()
     assert (found[1:] == 1).all()
 

@@ -175,14 +175,20 @@ class ImagePanel:
     colours: str = PLAIN
     log: bool = False
 
-    def draw(self, figure: FigureBase, axes: Axes, raster: Raster, tool: Tool | None) -> None:
-        """Draw the image, with axis labels only at the edges of the figure."""
+    def draw(
+        self,
+        figure: FigureBase,
+        axes: Axes,
+        raster: Raster,
+        tool: Tool | None = None,
+        bar: Literal["right", "bottom"] = "right",
+    ) -> None:
+        """Draw the image with the tool's outline and a colour bar on a side."""
         picture = show_image(
             axes, self.image, raster, tool, self.colours, self.limits, log=self.log
         )
-        colour_bar(figure, picture, axes, self.label)
+        colour_bar(figure, picture, axes, self.label, bar)
         axes.set_title(self.title)
-        axes.label_outer()
 
 
 def image_panels(panels: Sequence[ImagePanel], raster: Raster, tool: Tool | None) -> Figure:
@@ -192,6 +198,7 @@ def image_panels(panels: Sequence[ImagePanel], raster: Raster, tool: Tool | None
     grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
     for axes, panel in zip(grid.flat, panels, strict=False):
         panel.draw(figure, axes, raster, tool)
+        axes.label_outer()
     for axes in grid.flat[len(panels) :]:
         leave_out(axes, grid[-2, 1] if rows > 1 else None, raster)
     return figure

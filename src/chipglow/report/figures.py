@@ -139,6 +139,7 @@ def error_images(facts: Facts) -> Figure:
                 (-limit, limit),
                 scales.SIGNED,
             ).draw(figure, axes, raster, analysis.tool)
+            axes.label_outer()
             drawing.veil(axes, flagged.sel(surface=name).values, raster)
             _draw_marks(axes, facts)
     return figure

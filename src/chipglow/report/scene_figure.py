@@ -47,6 +47,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         for panel in panels:
             axes = next(places)
             panel.draw(top, axes, raster, tool)
+            axes.label_outer()
             if panel.label == _SPEED:
                 _draw_arrows(axes, frame, raster)
         if has_kinds:
@@ -148,6 +149,7 @@ def _draw_quality(
     ends = (0.0, scales.ends(distance, 0.0, 99.0)[1])
     title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
     ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
+    axes.label_outer()
     drawing.veil(axes, filled, raster, VERMILLION, 1.0)
 
 

@@ -35,11 +35,11 @@ class HomogeneousSurface(Surface):
 @SURFACES.part
 @dataclass(frozen=True)
 class UniformSurface(HomogeneousSurface):
-    """The same emissivity everywhere; a blackbody by default."""
+    """The same emissivity everywhere."""
 
     kind: ClassVar[str] = "uniform"
     example: ClassVar[str] = "{kind: uniform, emissivity: 0.5}  everywhere the same"
-    emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)] = 1.0
+    emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)]
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
         return self.emissivity

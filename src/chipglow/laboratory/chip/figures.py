@@ -6,10 +6,10 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import ImagePanel
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage
 from chipglow.laboratory.chip.rake_grid import RakeGrid
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -48,14 +48,12 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
 
 def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeGrid) -> None:
     image = _mean_image(measurement, grid) - ZERO_CELSIUS
-    picture = _show(axes, image, measurement, grid.tool)
+    _panel("a) analysis grid", image).draw(figure, axes, measurement.raster, grid.tool)
     corners = 1e6 * grid.corners()
     for line in (*corners, *corners.transpose(1, 0, 2)):
         axes.plot(*line.T, color="black", linewidth=1.1, alpha=0.6)
         axes.plot(*line.T, color="white", linewidth=0.6)
     drawing.crop(axes, grid.corners(), measurement.raster, _AROUND)
-    axes.set_title("a) analysis grid")
-    drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
 
 
 def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
@@ -148,15 +146,12 @@ def _draw_curves(
     frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
     number = int(np.flatnonzero(measurement.times == profile.times[frame])[0])
     image = measurement.data["radiance_temperature"][number].values - ZERO_CELSIUS
-    picture = _show(axes, image, measurement, tool)
+    title = f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference"
+    _panel(title, image).draw(figure, axes, measurement.raster, tool, "bottom")
     for points, colour in zip(profile.points, colours, strict=True):
         axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
     drawing.draw_line(axes, profile.reference.points, scales.BLUE)
     drawing.crop(axes, profile.points, measurement.raster, _AROUND)
-    axes.set_title(f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference")
-    figure.colorbar(
-        picture, ax=axes, label="radiance temperature / °C", location="bottom", aspect=25
-    )
 
 
 def _draw_profile(axes: Axes, profile: BandProfile, frame: int, colour: Array) -> None:
@@ -170,7 +165,6 @@ def _draw_profile(axes: Axes, profile: BandProfile, frame: int, colour: Array) -
     drawing.shade(axes, along, values, uncertainty, colour)
 
 
-def _show(axes: Axes, celsius: Array, measurement: Measurement, tool: Tool) -> AxesImage:
-    known = celsius[np.isfinite(celsius)]
-    limits = (float(known.min()), float(np.percentile(known, 99.9)) + 1.0)
-    return drawing.show_image(axes, celsius, measurement.raster, tool, scales.HEAT, limits)
+def _panel(title: str, celsius: Array) -> ImagePanel:
+    low, high = scales.ends(celsius, 0.0, 99.9)
+    return ImagePanel(title, "radiance temperature / °C", celsius, (low, high + 1.0), scales.HEAT)

@@ -11,12 +11,10 @@ from matplotlib.patheffects import withStroke
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Region
 
-_COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 _PANEL_WIDTH: Final = 2.7
 _AROUND: Final = 0.75
 _LINES: Final = 2.6
@@ -29,20 +27,11 @@ def draw_emissivity(
     """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
     temperature = found.radiance_temperature - ZERO_CELSIUS
+    heat, values = (scales.ends(one, 0.5, 99.5) for one in (temperature, found.emissivity))
+    title = f"emissivity, object at {found.heating.reference - ZERO_CELSIUS:.4g} °C"
     panels = (
-        ImagePanel(
-            "radiance temperature",
-            "°C",
-            temperature,
-            scales.ends(temperature, 0.5, 99.5),
-            scales.HEAT,
-        ),
-        ImagePanel(
-            f"emissivity, object at {found.heating.reference - ZERO_CELSIUS:.4g} °C",
-            "emissivity",
-            found.emissivity,
-            scales.ends(found.emissivity, 0.5, 99.5),
-        ),
+        ImagePanel("radiance temperature", "°C", temperature, heat, scales.HEAT),
+        ImagePanel(title, "emissivity", found.emissivity, values),
     )
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
     with drawing.style():
@@ -50,7 +39,8 @@ def draw_emissivity(
         figure = drawing.new_figure(total)
         parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
         for axes, panel in zip(parts[0].subplots(1, 2, sharey=True), panels, strict=True):
-            panel.draw(parts[0], axes, raster, None)
+            panel.draw(parts[0], axes, raster)
+            axes.label_outer()
             _draw_regions(axes, regions, raster, named=panel is panels[0])
         if lines:
             _draw_lines(parts[1].subplots(), lines, _colours(regions))
@@ -87,7 +77,7 @@ def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
 def _colours(regions: Sequence[Region]) -> dict[str, str]:
     """Return a colour for each feature."""
     features = dict.fromkeys(region.feature for region in regions)
-    return dict(zip(features, cycle(_COLOURS), strict=False))
+    return dict(zip(features, cycle(scales.COLOURS), strict=False))
 
 
 def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[str, str]) -> None:

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import WIDTH
 from chipglow.drawing.scales import HEAT, VERMILLION
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import ZERO_CELSIUS, Array
@@ -33,20 +32,13 @@ def draw_registration(
     celsius = np.asarray(temperature) - ZERO_CELSIUS
     limits = scales.ends(celsius, 0.5, 99.8, 1.0)
     with drawing.style():
-        figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = drawing.new_figure(3.0)
         left, right = figure.subplots(1, 2)
         picture = drawing.show_image(left, celsius, raster, tool, HEAT, limits)
         left.set_title("infrared")
         _draw_visible(right, visible)
         warped = registration.warp(celsius, raster, (visible.shape[0], visible.shape[1]))
-        right.imshow(
-            np.ma.masked_invalid(warped),
-            cmap=HEAT,
-            vmin=limits[0],
-            vmax=limits[1],
-            alpha=_OPACITY,
-        )
+        _draw_warped(right, warped, limits, _OPACITY)
         right.set_title("visible, infrared over it")
         _draw_tool(right, registration, tool, visible.shape)
         if points is not None:
@@ -90,7 +82,7 @@ def _rendered(
     if celsius is None:
         _draw_visible(axes, visible)
     else:
-        axes.imshow(np.ma.masked_invalid(celsius), cmap=HEAT, vmin=limits[0], vmax=limits[1])
+        _draw_warped(axes, celsius, limits)
         axes.set_facecolor(scales.VOID)
     axes.set_axis_on()
     axes.set_xticks([])
@@ -105,6 +97,13 @@ def _draw_visible(axes: Axes, visible: NDArray[Any]) -> None:
     axes.imshow(visible, cmap="gray", vmin=low, vmax=max(high, low + 1e-9))
     axes.set_xlabel("column")
     axes.set_ylabel("row")
+
+
+def _draw_warped(
+    axes: Axes, celsius: Array, limits: tuple[float, float], opacity: float = 1.0
+) -> None:
+    shown: Any = np.ma.masked_invalid(celsius)
+    axes.imshow(shown, cmap=HEAT, vmin=limits[0], vmax=limits[1], alpha=opacity)
 
 
 def _draw_tool(
