@@ -18,6 +18,7 @@ from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.chip.frames import frame_scatter
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
+from chipglow.laboratory.comparison.comparison import SURE, _confidences
 from chipglow.scene import PlacedTool, ToolGeometry
 from chipglow.uncertainty import Estimate
 
@@ -431,3 +432,19 @@ def test_the_uncertainty_of_a_mean_over_frames_that_are_alike_is_theirs():
     )
     even = generator.standard_normal((30, 200))
     assert np.sqrt(frame_scatter(even).variance).mean() == pytest.approx(1 / sqrt(30), rel=0.05)
+
+
+@pytest.mark.parametrize(("known", "least", "most"), [(True, 0.0, 0.25), (False, 0.6, 1.0)])
+def test_noise_that_is_alike_makes_no_set_of_two_the_best(known, least, most):
+    """Two sets as far from the truth: each may be called best in 5 % of the measurements."""
+    sets, claims = [Estimate(np.full(60, 700.0 + away)) for away in (10.0, -10.0)], 0
+    for seed in range(60):
+        shown = 700.0 + alike(np.random.default_rng(seed))
+        mean = Estimate(shown.mean(axis=0))
+        alone = mean.with_component("position", shown.std(axis=0, ddof=1) / sqrt(len(shown)),
+                                    independent="per element")  # fmt: skip
+        found = replace(mean, components=(frame_scatter(shown),)) if known else alone
+        best = int(np.argmin([((one.values - mean.values) ** 2).mean() for one in sets]))
+        claims += _confidences(found, sets)[best] >= SURE
+    # Without the frames' own patterns 84 % are called so; binomial: 6 of 60 +- 2.3.
+    assert least <= claims / 60 <= most

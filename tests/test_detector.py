@@ -226,6 +226,10 @@ def test_full_well_and_digitiser_end_the_counts():
     counts = digitiser.counts(np.array([[[-5.0, 0.0, 204.7, 409.5, 500.0]]]), generator())
     assert counts[0, 0].tolist() == [0, 0, 2047, 4095, 4095]
     assert (digitiser.capacity, digitiser.saturation) == (409.5, 4094)
+    # Without a gain the full well is the last count.
+    filled = detector(gain=None, full_well=1e6, bits=14)
+    assert frames(filled, 1e6, 1).max() == 16383
+    assert filled.conversion_gain == pytest.approx((16383 - 400) / 1e6)
 
 
 def test_the_photon_transfer_curve_gives_gain_and_read_noise_back():
@@ -252,6 +256,13 @@ def test_the_photon_transfer_curve_gives_gain_and_read_noise_back():
 def test_the_order_of_the_list_does_not_matter():
     terms = (ReadNoise(5.0), ShotNoise(), DarkCurrent(1e6), GainPattern(0.1), NonLinearity(0.1))
     counts = [frames(detector(*order), 2e5, 2) for order in (terms, terms[::-1])]
+    np.testing.assert_array_equal(*counts)
+
+
+def test_another_term_leaves_the_noise_of_the_others_as_it_was():
+    terms = (ShotNoise(), ReadNoise(20.0), FlickerNoise(10.0))
+    more = (ColumnNoise(0.0), *terms)
+    counts = [frames(detector(*some), 2e4, 3) for some in (terms, more)]
     np.testing.assert_array_equal(*counts)
 
 

@@ -56,6 +56,12 @@ def test_view_factor_of_a_groove(angle):
     assert found == pytest.approx(1 - np.sin(np.radians(angle) / 2), abs=5e-4)
 
 
+def test_view_factor_of_opposite_strips():
+    exchange = Exchange(*lines([[1, 0.7], [0, 0.7]], [[0, 0], [1, 0]]))
+    expected = np.hypot(1, 0.7) - 0.7  # within two of 2048 rays
+    np.testing.assert_allclose(exchange.view_factors[[0, 1], [1, 0]], expected, atol=1e-3)
+
+
 @given(st.floats(0.3, 3.0), st.floats(0.1, 0.9), st.integers(2, 9))
 @settings(max_examples=25)
 def test_rows_have_the_sum_one_and_are_reciprocal(angle, radius, count):
@@ -99,6 +105,18 @@ def test_an_isothermal_room_is_a_blackbody(emissivity, mirror, angle):
     ):
         # The iteration ends at steps of 1e-9; what is left is 1 / (1 - 0.99) times as much.
         np.testing.assert_allclose(found, 7.0, rtol=1e-7)
+
+
+@pytest.mark.parametrize("angle", [20.0, 45.0, 90.0, 140.0])
+def test_vertex_of_an_isothermal_diffuse_groove(angle):
+    # A point at the vertex sees the other wall in (1 + cos angle) / 2 of its hemisphere, and that
+    # wall is as bright there: B = e + (1 - e) F B (Sparrow and Cess, Radiation Heat Transfer).
+    turn = np.radians(angle)
+    exchange = Exchange(*groove(turn, 40, grading=3.0))
+    found = CHIP + (1 - CHIP) * exchange.incident(np.ones(80), CHIP)[[39, 40]]
+    expected = CHIP / (1 - (1 - CHIP) * (1 + np.cos(turn)) / 2)
+    # Two of 2048 rays: found are 2e-4 to 4e-4, less with more rays.
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
 
 
 def test_a_diffuse_groove_along_its_walls():

@@ -177,6 +177,14 @@ def test_every_link_leads_somewhere_and_every_picture_is_described(page):
     assert sum(len(alt) > 80 for alt in page.alts) >= len(FIGURES)
 
 
+def test_table_2_says_what_the_study_sets():
+    rows = {name: (paper, here) for name, paper, here in SETTINGS}
+    for name in ("Feed", "Cutting speed", "Rake angle", "Clearance angle", "Edge radius"):
+        assert rows[name][0] == rows[name][1], name
+    other = table_2(Study(cutting={"feed": "0.1 mm", "tool": {"rake_angle": "6 deg"}}))
+    assert {("Feed", "0.3 mm", "0.1 mm"), ("Rake angle", "−7°", "6°")} <= set(other)
+
+
 def test_every_number_has_its_unit(page):
     numbers = [(attrs, text) for attrs, text in page.cells if "data-unit" in attrs]
     assert len(numbers) > 100

@@ -158,6 +158,8 @@ def test_presets_are_table_1():
         assert (surface.shear_band.mean, surface.shear_band.standard_deviation) == band
         assert surface.workpiece == Emissivity(0.40, 0.03)
         assert surface.tool == Emissivity(0.58, 0.06)
+        features = (surface.chip, surface.shear_band, surface.workpiece, surface.tool)
+        assert all(feature.is_normal for feature in features)
 
 
 def test_shares_of_the_blends():

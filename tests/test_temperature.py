@@ -99,6 +99,29 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
     assert found.estimate.contribution("calibration") == pytest.approx(expected, rel=1e-2)
 
 
+def test_cold_surroundings_are_part_of_the_uncertainty():
+    """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
+    known = EmissivityLine.constant(0.05)
+    cold, warmer = (
+        true_of(known, around, emissivity=0.05, kelvins=330.0, reflected=190.0).estimate
+        for around in (reflected_temperature(190.0, 1.0), reflected_temperature(191.0))
+    )
+    assert cold.values == pytest.approx(330.0, abs=1e-3)
+    change = cold.values - warmer.values
+    assert cold.contribution("reflected") == pytest.approx(change, rel=0.1)
+    assert cold.standard_uncertainty == pytest.approx(cold.contribution("reflected"))
+
+
+def test_few_images_widen_the_interval():
+    images = [image(drift=2.0, seed=seed) for seed in range(3)]
+    found = true_temperature(images, WHOLE, KNOWN).estimate
+    # Three repetitions, two degrees of freedom: Student's 4.3.
+    assert found.degrees_of_freedom == pytest.approx(2.0)
+    assert found.coverage_factor() == pytest.approx(4.303, abs=0.01)
+    alone = true_temperature(images[:1], WHOLE, KNOWN).estimate
+    assert np.isnan(alone.contribution("repeatability"))
+
+
 def test_errors_that_emissivity_and_image_share_cancel():
     """At the temperature of the heating itself, only the thermocouple's error is left."""
     calibration = fitted(common=1.0)

@@ -196,3 +196,11 @@ def write_foam(path: Path, kind: str, body: str) -> None:
     """Write a file of a case."""
     head = f"FoamFile {{ version 2.0; format ascii; class {kind}; object {path.name}; }}\n"
     path.write_text(head + body, encoding="utf-8")
+
+
+def all_programs(folder: Path) -> None:
+    """Write the files of each program into a folder of its name."""
+    for write in (abaqus, advantedge, ansys, deform, ls_dyna, openfoam):
+        files = folder / write.__name__.replace("_", "-")
+        files.mkdir()
+        write(files)

@@ -6,13 +6,13 @@ One block from six programs
    :alt: One block from six programs
 
 The files in which AdvantEdge, DEFORM, Abaqus, LS-DYNA, Ansys and OpenFOAM would give the same
-block, in mm and °C, or in SI: each is imported with the description of its page.
+block, in mm and °C, or in SI: each is imported with its description in the documentation.
 
 What you see: the temperature that arrives. A wrong unit, axis or origin would show; below is how
 far the six are from what was written: linear between nodes 10 µm apart, or constant in OpenFOAM's
 cells.
 
-More: :doc:`/do/import`, and a page for each program.
+More: :doc:`/do/import` and :doc:`/do/from-programs`.
 """
 
 import re
@@ -26,22 +26,24 @@ from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.scene import Material
 
 PROGRAMS = {
-    "AdvantEdge": "from-advantedge",
-    "DEFORM": "from-deform",
-    "Abaqus": "from-abaqus",
-    "LS-DYNA": "from-ls-dyna",
-    "Ansys": "from-ansys",
-    "OpenFOAM": "from-openfoam",
+    "AdvantEdge": "advantedge.yaml",
+    "DEFORM": "deform.yaml",
+    "Abaqus": "abaqus.yaml",
+    "LS-DYNA": "dyna.yaml",
+    "Ansys": "ansys.yaml",
+    "OpenFOAM": "foam.yaml",
 }
 
 
-def imported(page):
-    """The scene of a page's files, sampled every 5 µm."""
-    folder = sample_files.folder(page)
-    text = (sample_files.HERE / "do" / f"{page}.md").read_text(encoding="utf-8")
-    name, content = re.search(r"<!-- file: (\S+) -->\n```yaml\n(.*?)```", text, re.DOTALL).groups()
-    (folder / name).write_text(content, encoding="utf-8")
-    wanted = chipglow.load_import(str(folder / name), ["field_of_view.spacing=5 um"])
+FOLDER = sample_files.folder("from-programs")
+PAGE = (sample_files.HERE / "do" / "from-programs.md").read_text(encoding="utf-8")
+
+
+def imported(name):
+    """The scene of a description on the page, sampled every 5 µm."""
+    block = rf"<!-- file: {name} -->\n```yaml\n(.*?)```"
+    (FOLDER / name).write_text(re.search(block, PAGE, re.DOTALL)[1], encoding="utf-8")
+    wanted = chipglow.load_import(str(FOLDER / name), ["field_of_view.spacing=5 um"])
     return chipglow.read_scene(wanted.build())
 
 
@@ -49,8 +51,8 @@ with style():
     figure = new_figure(4.2)
     figure.set_layout_engine("compressed")
     panels = figure.subplots(2, 3, sharex=True, sharey=True)
-    for axes, (program, page) in zip(panels.flat, PROGRAMS.items(), strict=True):
-        scene = imported(page)
+    for axes, (program, name) in zip(panels.flat, PROGRAMS.items(), strict=True):
+        scene = imported(name)
         frame = scene.frame(0)
         there = frame.material == Material.WORKPIECE
         celsius = np.where(there, frame.temperature - KELVIN, np.nan)
