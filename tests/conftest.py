@@ -119,13 +119,17 @@ def undrawn(monkeypatch):
 
 @pytest.fixture
 def read_here(monkeypatch):
-    """Readers run in this process, without the 1.2 s that a subprocess takes to start."""
+    run_readers_here(monkeypatch.setattr)
+
+
+def run_readers_here(setter=setattr):
+    """Run readers in this process, without the second that a subprocess takes to start."""
 
     @contextmanager
     def answers(sandbox, job):
         yield answered(sandbox.name, job)
 
-    monkeypatch.setattr(Sandbox, "answers", answers)
+    setter(Sandbox, "answers", answers)
 
 
 def answered(name, job):

@@ -426,7 +426,8 @@ def test_the_microbolometers_data_sheet_comes_back():
     made = section.build()
     calibration = made.calibration((60, 80))
     assert calibration.netd(303.15) == pytest.approx(0.05, rel=0.015)
-    assert calibration.full_temperature == pytest.approx(413.15, abs=1e-6)
+    # Five standard errors: 50 mK in each of the 4,800 pixels of the correction.
+    assert calibration.full_temperature == pytest.approx(413.15, abs=4e-3)
     assert made.lower_limit == pytest.approx(263.15)
     # Of noise and rounding alone it would be colder than the tables of a band.
     assert lower_range_limit(made.detector, calibration.point) == 200.0

@@ -71,7 +71,9 @@ def test_a_frame_of_a_real_camera(tmp_path):
 
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_a_sequence_of_flir(tmp_path, order):
-    recording = read_recording(make(tmp_path, "a.seq", files.seq(PICTURES, order=order)))
+    content = files.seq(PICTURES, order=order) + b"an index"
+    recording = read_recording(make(tmp_path, "a.seq", content))
+    assert recording.notes.warnings == ["8 bytes after the last frame are not a frame."]
     assert np.array_equal(recording.signal, PICTURES)
     assert recording.times == pytest.approx(files.STAMPS)
     assert vars(recording.conversion) == pytest.approx(files.PLANCK, rel=1e-6)
@@ -188,6 +190,13 @@ def test_frames_missing_in_ptw_are_said(tmp_path):
     assert any("frames may be missing" in warning for warning in recording.notes.warnings)
 
 
+def test_ptw_whose_stamps_no_multiple_of_the_period_explains_has_their_times(tmp_path):
+    stamps = 0.025 * np.arange(5)
+    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, 1 / 100, stamps)))
+    assert recording.times == pytest.approx(stamps, rel=1e-6)
+    assert any("the period in the header is 10000 us" in one for one in recording.notes.assumed)
+
+
 def test_ptw_without_period_has_the_times_of_its_stamps_also_over_midnight(tmp_path):
     stamps = np.array([0.0, 0.5, 1.0, 2.5, 3.0])
     content = bytearray(files.ptw(PICTURES, period=0.0, stamps=stamps))
@@ -211,6 +220,8 @@ def test_cine(tmp_path, kind, bits):
     assert recording.saturation == 2**bits - 2
     assert recording.camera == "Phantom 711, serial number 12345"
     assert any(note.startswith("The trigger was at 3.3") for note in recording.notes.remarks)
+    path = make(tmp_path, "b.cine", files.cine(truth, kind, times=False))
+    assert read_recording(path).times == pytest.approx(np.arange(5) / 30_000)
 
 
 def test_codes_of_ten_bits_become_counts_that_are_proportional_to_light(tmp_path):
@@ -260,12 +271,15 @@ def test_counts_come_back_from_hcc(tmp_path):
     low=st.floats(-1e6, 1e6),
     spread=st.one_of(st.just(0.0), st.floats(1e-30, 1e6)),
     seed=st.integers(0, 99),
+    quantity=st.sampled_from(["radiance", "temperature"]),
 )
-def test_any_radiance_comes_back_from_hcc_within_half_a_step(tmp_path_factory, low, spread, seed):
+def test_any_value_comes_back_from_hcc_within_half_a_step(
+    tmp_path_factory, low, spread, seed, quantity
+):
     values = low + spread * np.random.default_rng(seed).random((1, 2, 64))
     path = tmp_path_factory.mktemp("any") / "a.hcc"
-    write_hcc(path, a_recording(values, "radiance"))
-    assert read_recording(path).quantity == "radiance"
+    write_hcc(path, a_recording(values, quantity))
+    assert read_recording(path).quantity == quantity
     rounding = 2.0**-23 * np.abs(values).max()
     error = np.abs(read_recording(path).signal - values).max()
     assert error <= np.ptp(values) / 65535 + 2 * rounding + 2.0**-100

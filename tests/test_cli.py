@@ -1,3 +1,4 @@
+import os
 import re
 import resource
 import subprocess
@@ -441,6 +442,24 @@ def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
     measurement = read_measurement("m.nc")
     np.testing.assert_allclose(measurement.times, [20e-6])
     assert measurement.data.attrs["surface"] == "chip 2"
+
+
+def test_measure_refuses_a_scene_that_is_damaged_or_none(folder, scene):
+    arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
+    os.truncate(scene, scene.stat().st_size // 2)
+    assert_refused(chipglow(*arguments), "scene.nc")
+    scene.write_text("no scene at all")
+    assert_refused(chipglow(*arguments), "scene.nc")
+    assert sorted(path.name for path in folder.iterdir()) == ["scene.nc", "study.yaml"]
+
+
+@pytest.mark.parametrize("command", ["cut", "run"])
+def test_a_disk_that_fills_up_during_the_cut_leaves_nothing(command, folder, runs, tmp_path):
+    with full_disk(100_000):
+        result = chipglow(command, "study.yaml", "--out", "out")
+    assert_refused(result, f"{tmp_path / 'cache'}/scene-", "File too large")
+    assert [path.name for path in folder.iterdir()] == ["study.yaml"]
+    assert list((tmp_path / "cache").iterdir()) == []
 
 
 def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder, earlier_results):

@@ -259,6 +259,13 @@ def test_the_order_of_the_list_does_not_matter():
     np.testing.assert_array_equal(*counts)
 
 
+def test_another_term_leaves_the_noise_of_the_others_as_it_was():
+    terms = (ShotNoise(), ReadNoise(20.0), FlickerNoise(10.0))
+    more = (ColumnNoise(0.0), *terms)
+    counts = [frames(detector(*some), 2e4, 3) for some in (terms, more)]
+    np.testing.assert_array_equal(*counts)
+
+
 every_term = st.sampled_from(
     [
         GainPattern(0.05),

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from test_io import a_file, a_measurement
 
-from chipglow.io import digest, open_scene, write_measurement
+from chipglow.io import digest, open_scene, read_measurement, write_measurement
 from chipglow.io.digest import is_intact
 from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk
+from chipglow.io.scene_file import is_scene
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import open_arrays
 
@@ -34,11 +35,14 @@ def place_of(path, name):
         return file[name].id.get_chunk_info(0).byte_offset + 12
 
 
-@pytest.mark.parametrize("write", [a_file, None], ids=["scene", "measurement"])
+def a_measurement_file(folder):
+    write_measurement(a_measurement(), folder / "m.nc")
+    return folder / "m.nc"
+
+
+@pytest.mark.parametrize("write", [a_file, a_measurement_file])
 def test_every_flipped_bit_is_found(tmp_path, write):
-    path = write(tmp_path) if write else tmp_path / "m.nc"
-    if write is None:
-        write_measurement(a_measurement(), path)
+    path = write(tmp_path)
     assert is_intact(path)
     whole = path.read_bytes()
     for place in np.random.default_rng(1).integers(0, len(whole), 100):
@@ -49,12 +53,19 @@ def test_every_flipped_bit_is_found(tmp_path, write):
     assert is_intact(path) is None
 
 
-@pytest.mark.parametrize("name", ["plastic_strain", "x", "time", "force_time"])
-def test_the_damaged_dataset_is_named(tmp_path, name):
-    path = a_file(tmp_path)
+@pytest.mark.parametrize(
+    ("write", "read", "name"),
+    [
+        *((a_file, open_scene, name) for name in ("plastic_strain", "x", "time", "force_time")),
+        (a_file, is_scene, "x"),
+        (a_measurement_file, read_measurement, "radiance"),
+    ],
+)
+def test_the_damaged_dataset_is_named(tmp_path, write, read, name):
+    path = write(tmp_path)
     flip(path, place_of(path, name))
-    with pytest.raises(ValueError, match=rf"scene\.nc: .*'{name}' is damaged"):
-        open_scene(path)
+    with pytest.raises(ValueError, match=rf"{path.name}: .*'{name}' is damaged"):
+        read(path)
 
 
 def test_damage_that_hdf5_does_not_see_is_found(tmp_path):
@@ -78,6 +89,13 @@ def test_a_bit_that_makes_hdf5_loop_costs_no_more_than_the_time_limit(tmp_path, 
     flip(path, path.read_bytes().index(b"GCOL") + 25, 2)
     monkeypatch.setattr(digest, "PATIENCE", 2.0)
     with pytest.raises(ValueError, match=r"scene\.nc: .*(HDF5 had not read .* 2 s|is damaged)"):
+        open_scene(path)
+
+
+def test_a_file_at_which_hdf5_takes_too_long_is_given_up(tmp_path, monkeypatch):
+    path = without_digest(a_file(tmp_path))
+    monkeypatch.setattr(digest, "PATIENCE", 0.0)
+    with pytest.raises(ValueError, match=r"scene\.nc: .*HDF5 had not read the file after 0 s"):
         open_scene(path)
 
 

@@ -377,7 +377,16 @@ def test_points_without_a_number_are_left_out(tmp_path):
 refused = partial(refused_on, RASTER, 60e6)
 
 
-@pytest.mark.parametrize("content", [b"", PNG, b"\0" * 3000, b"x,y,temperature\n", b"1,2,3\n4,5,6"])
+CLAIMS_TERABYTES = b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 1%s float\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"", PNG, b"\0" * 3000, b"x,y,temperature\n", b"1,2,3\n4,5,6",
+        CLAIMS_TERABYTES % (b"0" * 12) + bytes(100),
+    ],
+)  # fmt: skip
 @pytest.mark.parametrize("suffix", ["csv", "npy", "npz", "h5", "vtp", "vtk", "vtu", "mat"])
 def test_mislabelled_and_empty_files(tmp_path, suffix, content):
     if suffix.startswith("vt"):
@@ -515,6 +524,8 @@ def test_a_dump_without_times_or_units_says_what_is_assumed(tmp_path):
     [
         (lambda text: text[:-40], "cut short"),
         (lambda text: text[:-3], "cut short"),
+        (lambda text: text[:-10] + "\n", "600 atoms, it is cut short"),
+        (lambda text: text.replace(" 3 1 0 ", " 3 1\n", 1), "0 of 600 atoms, it is cut short"),
         (lambda text: text.replace("ITEM: NUMBER OF ATOMS\n600", "ITEM: NUMBER OF ATOMS\nmany"),
          "head is damaged"),
         (str, "oblique box"),

@@ -10,6 +10,7 @@ from fuzz.cgns_file import write_cgns
 from fuzz.foam_case import write_foam
 from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
 
+from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.quantities.units import CELSIUS, Unit
@@ -601,6 +602,7 @@ def test_a_damaged_abaqus_input_says_where(tmp_path, old, new, said):
         ("node,NT11\n101,hot\n", "'hot'"),
         ("node,NT11\n102,300\n", "label 102 is not in"),
         ("node,NT11\n101,300\n103,300,1\n", "Expected 2 fields in line 3, saw 3"),
+        ("node,NT11,U1\n101,300,0\n103,300\n", "chip_nodes.csv: .*''"),
         ("node,NT11\n", "no row of numbers"),
     ],
 )
@@ -691,6 +693,14 @@ def test_mislabelled_files_end_in_one_clear_error(tmp_path, suffix, content, cap
         MeshSource(path).survey()
     assert "\n" not in str(caught.value)
     assert "ERR|" not in capfd.readouterr().err  # what VTK logs
+
+
+def test_a_header_that_claims_more_than_memory_holds_is_one_error(tmp_path):
+    """VTK ends its process there."""
+    path = written(tmp_path, "chip.vtu")
+    path.write_bytes(path.read_bytes().replace(b'Points="70"', b'Points="70000000000"'))
+    with pytest.raises(SourceError, match=r"chip: .*damaged"):
+        Isolated(MeshSource(path), "chip").survey()
 
 
 def test_elements_of_nodes_that_do_not_exist(tmp_path):

@@ -297,12 +297,19 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
             assert np.array_equal(getattr(a, name), getattr(b, name))
 
 
-def test_a_reader_that_ends_before_it_is_asked_is_one_error(monkeypatch):
-    ended = "import os; os.close(0); os._exit(3)"
-    monkeypatch.setattr("chipglow.io.sandbox._CHILD", ("-c", ended))
+@pytest.mark.parametrize(
+    ("program", "code"),
+    [
+        ("import os; os.close(0); os._exit(3)", 3),
+        ("import os; os.write(1, bytes(8)); os.close(0)", 0),
+    ],
+    ids=["no answer", "no pickle"],
+)
+def test_a_reader_that_does_not_answer_as_it_should_is_one_error(monkeypatch, program, code):
+    monkeypatch.setattr("chipglow.io.sandbox._CHILD", ("-c", program))
     # More than a pipe holds.
     source = MovingBlock(tuple("x" * 1_000_000 for _ in range(2)))
-    with pytest.raises(SourceError, match="block: its reader ended with code 3"):
+    with pytest.raises(SourceError, match=f"block: its reader ended with code {code}"):
         Isolated(source, "block").survey()
 
 

@@ -434,6 +434,8 @@ def test_a_hot_scene_comes_back_and_survives_a_copy(tmp_path):
     frame = a_frame(temperature=hot)
     with SceneWriter(tmp_path / "one.nc", RASTER, hottest=6000.0) as writer:
         writer.append(frame)
+    with h5py.File(tmp_path / "one.nc") as file:  # every reader of NetCDF-4 has them
+        assert {file[name].compression for name in file} <= {"gzip", None}
     one = open_scene(tmp_path / "one.nc")
     assert_as_kept(one.frame(0), frame)
     # As read by xarray, which does not know the fast way.

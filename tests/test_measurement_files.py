@@ -168,7 +168,7 @@ FALLING = {
         ({"parameters": {"offset": 1.0, "gain": -2.0}}, "gain is -2"),
         ({"covariance": [[1.0, 0.0], [0.0]]}, "covariance: rows are of different lengths"),
         ({"lowest": "2000 degC"}, "lowest is 2273.15 K and highest"),
-        ({"response": [[3.8, 1.0, 2.0]]}, "response: expected pairs"),
+        ({"response": [[3.8, 1.0, 2.0]]}, "response.0: .*, expected .* at most 2"),
         ({"band": "5.1-3.8 um"}, "reversed"),
         ({"colour": 1}, "unknown key 'colour'"),
         (FALLING, "counts fall with the temperature"),

@@ -374,6 +374,10 @@ def test_a_tool_survives_in_a_scenes_file(tool, tmp_path):
     fields["temperature"] += 300.0
     scene = Scene.from_fields(raster, [0.0], fields, tool=tool)
     assert scene.tool == tool
+    if tool == ToolGeometry():  # as other programs and earlier files have it
+        values = (tool.rake_angle, tool.clearance_angle, tool.edge_radius)
+        names = ("tool_rake_angle", "tool_clearance_angle", "tool_edge_radius")
+        assert [scene.data.attrs[name] for name in names] == list(values)
     with SceneWriter(tmp_path / "scene.nc", raster, tool, fields=tuple(FIELD_UNITS)) as writer:
         writer.append(scene.frame(0))
     stored = open_scene(tmp_path / "scene.nc")

@@ -10,6 +10,8 @@ VERMILLION: Final = "#D55E00"
 GREEN: Final = "#009E73"
 GREY: Final = "#6b7280"
 VOID: Final = "#e5e7eb"
+COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+"""Colours of curves beside each other."""
 
 HEAT: Final = "inferno"
 PLAIN: Final = "cividis"

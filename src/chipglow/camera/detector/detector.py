@@ -1,14 +1,20 @@
 """The detector: from in-band radiance to electrons and counts, with noise and a limited range."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.detector.response import RESPONSES, DetectorResponse, OperationPoint
-from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout, Stage
+from chipglow.camera.detector.terms import (
+    DETECTOR_TERMS,
+    DetectorTerm,
+    Readout,
+    Stage,
+    generator_of,
+)
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Array, Parameter, Part
@@ -144,16 +150,17 @@ class Detector(Part):
             generator = [generator] * count
         if times is None:
             times = np.arange(count, dtype=np.float64) * point.frame_time
-        readout = Readout(
-            times, point, self.per_radiance(point), self.capacity, generator, self.seed
-        )
+        keys = [int(one.integers(2**63)) for one in generator]
+        readout = Readout(times, point, self.per_radiance(point), self.capacity, (), self.seed)
         electrons = readout.per_radiance * np.asarray(radiance, np.float64)
         for stage in Stage:
             if stage == Stage.TRANSFER and self.full_well is not None:
                 electrons = np.minimum(electrons, self.full_well)
             for term in self.terms:
                 if term.stage == stage:
-                    electrons = term.apply(electrons, readout)
+                    # Noise of one kind does not depend on what other terms there are.
+                    own = [generator_of(key, term.kind) for key in keys]
+                    electrons = term.apply(electrons, replace(readout, generators=own))
         signal = self.offset + self.conversion_gain * electrons
         return np.clip(np.rint(signal), 0, self._top).astype(np.uint32)
 

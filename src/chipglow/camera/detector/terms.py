@@ -55,7 +55,7 @@ class Readout:
     capacity: float
     """Electrons that fill the detector or its digitiser."""
     generators: Sequence[np.random.Generator]
-    """Source of each frame's noise."""
+    """Source of each frame's noise of the term's kind."""
     seed: int
     """Of what is fixed in the detector."""
 
@@ -64,8 +64,8 @@ class Readout:
         return np.stack([one.standard_normal((rows, columns)) for one in self.generators])
 
 
-def fixed_generator(seed: int, kind: str) -> np.random.Generator:
-    """Return the generator of a pattern: the same for one detector and kind of term."""
+def generator_of(seed: int, kind: str) -> np.random.Generator:
+    """Return the generator of a kind of term, by the seed of a detector's patterns or a frame."""
     return np.random.default_rng([seed, crc32(kind.encode())])
 
 
@@ -88,8 +88,7 @@ class DetectorTerm(Part, ABC):
         Returns
         -------
         ndarray
-            Of the same shape. Of the generators it takes deviates whose number does not depend on
-            the electrons.
+            Of the same shape.
         """
 
 
@@ -109,7 +108,7 @@ class GainPattern(DetectorTerm):
     ]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
-        deviates = fixed_generator(readout.seed, self.kind).standard_normal(electrons.shape[1:])
+        deviates = generator_of(readout.seed, self.kind).standard_normal(electrons.shape[1:])
         return np.asarray(electrons * (1 + self.standard_deviation * deviates))
 
 
@@ -125,7 +124,7 @@ class DeadElements(DetectorTerm):
 
     def mask(self, shape: tuple[int, ...], seed: int) -> NDArray[np.bool_]:
         """Return the dead elements of a detector with this seed and shape (y, x)."""
-        return np.asarray(fixed_generator(seed, self.kind).random(shape) < self.fraction)
+        return np.asarray(generator_of(seed, self.kind).random(shape) < self.fraction)
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
         return np.where(self.mask(electrons.shape[1:], readout.seed), 0.0, electrons)
@@ -229,7 +228,7 @@ class OffsetPattern(DetectorTerm):
     ]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
-        deviates = fixed_generator(readout.seed, self.kind).standard_normal(electrons.shape[1:])
+        deviates = generator_of(readout.seed, self.kind).standard_normal(electrons.shape[1:])
         return np.asarray(electrons + self.standard_deviation * deviates)
 
 

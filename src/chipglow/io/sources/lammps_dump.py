@@ -97,7 +97,7 @@ def snapshots(path: Path) -> list[Snapshot]:
             if "UNITS" in items:
                 units = _units(items["UNITS"][1].strip())
             found.append(_snapshot(path, items, line, stream.tell(), units))
-            _skip(path, stream, found[-1].count)
+            _skip(found[-1], stream)
             items = {}
     return found
 
@@ -132,14 +132,16 @@ def _snapshot(
     return Snapshot(path, start, count, labels, box, " xy " in bounds[0], time, units)
 
 
-def _skip(path: Path, stream: IO[bytes], count: int) -> None:
+def _skip(frame: Snapshot, stream: IO[bytes]) -> None:
     last = b"\n"
-    for number in range(count):
+    for number in range(frame.count):
         last = stream.readline(_LONGEST_LINE)
-        if not last or last.startswith(_ITEM.encode()):
-            raise SourceError(f"{path}: a frame has {number} of {count} atoms, it is cut short")
+        if last.startswith(_ITEM.encode()) or len(last.split()) < len(frame.labels):
+            raise SourceError(
+                f"{frame.path}: a frame has {number} of {frame.count} atoms, it is cut short"
+            )
     if not last.endswith(b"\n"):
-        raise SourceError(f"{path}: its last line has no end, it is cut short")
+        raise SourceError(f"{frame.path}: its last line has no end, it is cut short")
 
 
 def _line(stream: IO[bytes]) -> str:

@@ -191,9 +191,11 @@ def _read_table(file: Path) -> "pd.DataFrame":
     import pandas as pd
 
     with reading(file, "a table of numbers"):
+        # An empty cell, or a row that is cut short, is no number.
         table = pd.read_csv(
-            file, index_col=0, skipinitialspace=True, encoding_errors="replace", dtype=np.float64
-        )
+            file, index_col=0, skipinitialspace=True, encoding_errors="replace", dtype=np.float64,
+            keep_default_na=False, na_values=["nan", "NaN"],
+        )  # fmt: skip
     label = str(table.index.name).strip().lower()
     if label not in ("node", "element"):
         raise SourceError(f"{file}: expected a table whose first column is node or element")

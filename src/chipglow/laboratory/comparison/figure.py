@@ -8,14 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing
-from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from chipglow.drawing.scales import COLOURS, GREY
 from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, Readings
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Estimate
 
 _HEIGHT: Final = 5.2
 _ASIDE: Final = 0.2
-_COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def draw_comparison(comparison: Comparison) -> Figure:
@@ -52,7 +51,7 @@ def draw_comparison(comparison: Comparison) -> Figure:
 
 
 def _colour(number: int) -> str:
-    return _COLOURS[number % len(_COLOURS)]
+    return COLOURS[number % len(COLOURS)]
 
 
 def _draw_values(

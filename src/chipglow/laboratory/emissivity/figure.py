@@ -11,12 +11,10 @@ from matplotlib.patheffects import withStroke
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Region
 
-_COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 _PANEL_WIDTH: Final = 2.7
 _AROUND: Final = 0.75
 _LINES: Final = 2.6
@@ -79,7 +77,7 @@ def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
 def _colours(regions: Sequence[Region]) -> dict[str, str]:
     """Return a colour for each feature."""
     features = dict.fromkeys(region.feature for region in regions)
-    return dict(zip(features, cycle(_COLOURS), strict=False))
+    return dict(zip(features, cycle(scales.COLOURS), strict=False))
 
 
 def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[str, str]) -> None:

@@ -24,11 +24,8 @@ class BlackbodyCalibration:
     fits: Mapping[str, CalibrationFit[FittedCalibration]]
     notes: Notes
     """Assumptions, and warnings of the preferred fit."""
-
-    @property
-    def preferred(self) -> str:
-        """Name of the model with the least information criterion."""
-        return _preferred(self.fits)
+    preferred: str
+    """Name of the model with the least information criterion."""
 
     def to_frame(self) -> pd.DataFrame:
         """Return every point of each fit; one row each."""
@@ -101,18 +98,15 @@ def calibrate_blackbodies(
         }
     except ValueError as error:
         raise ValueError(f"{points}: {error}") from None
-    best = _preferred(fits)
+    best = min(fits, key=lambda name: fits[name].information_criterion)
     return BlackbodyCalibration(
         fits,
         Notes(
             list(_assumptions(emissivity, surroundings, table["temperature"])),
             list(_warnings(best, fits[best], common_uncertainty is not None)),
         ),
+        best,
     )
-
-
-def _preferred(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> str:
-    return min(fits, key=lambda name: fits[name].information_criterion)
 
 
 def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:

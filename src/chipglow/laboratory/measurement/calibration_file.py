@@ -14,6 +14,7 @@ from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, load_described
 
 Rows = tuple[tuple[float, ...], ...]
+ResponseRow = tuple[float, float]
 PointRow = tuple[float, float, float, float]
 
 
@@ -30,7 +31,7 @@ class CalibrationDescription(Part):
     ]
     band: Annotated[tuple[float, float], Parameter("The camera's spectral band.", WAVELENGTHS)]
     response: Annotated[
-        Rows | None,
+        tuple[ResponseRow, ...] | None,
         Parameter("Pairs of wavelength in um and relative response; none: 1 in the band."),
     ] = None
     lowest: Annotated[
@@ -103,7 +104,10 @@ class CalibrationDescription(Part):
 
     def build(self) -> FittedCalibration:
         """Return the calibration."""
-        kind = MODELS[self.model]
+        kind, response = MODELS[self.model], None
+        if self.response is not None:
+            microns, values = zip(*self.response, strict=True)
+            response = TabulatedResponse(tuple(1e-6 * one for one in microns), values)
         if set(self.parameters) != set(kind.NAMES):
             raise ValueError(
                 f"parameters: {', '.join(self.parameters)}, expected {', '.join(kind.NAMES)}"
@@ -111,7 +115,7 @@ class CalibrationDescription(Part):
         if len({len(row) for row in self.covariance}) > 1:
             raise ValueError("covariance: rows are of different lengths, expected a square")
         calibration = kind(
-            band=Band(*self.band, self._response()),
+            band=Band(*self.band, response),
             lowest=self.lowest,
             highest=self.highest,
             integration_time=self.integration_time,
@@ -124,16 +128,8 @@ class CalibrationDescription(Part):
             raise ValueError("parameters: the counts fall with the temperature, expected a rise")
         return calibration
 
-    def _response(self) -> TabulatedResponse | None:
-        if self.response is None:
-            return None
-        if any(len(row) != 2 for row in self.response):
-            raise ValueError("response: expected pairs of wavelength in um and response")
-        wavelengths, values = zip(*self.response, strict=True)
-        return TabulatedResponse(tuple(1e-6 * wavelength for wavelength in wavelengths), values)
 
-
-def _pairs(response: TabulatedResponse) -> tuple[tuple[float, ...], ...]:
+def _pairs(response: TabulatedResponse) -> tuple[ResponseRow, ...]:
     microns = (float(f"{1e6 * wavelength:.12g}") for wavelength in response.wavelengths)
     return tuple(zip(microns, response.values, strict=True))
 

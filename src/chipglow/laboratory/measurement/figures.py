@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chipglow.camera import CalibrationFit, FittedCalibration, Flag, Measurement
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
-from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION, VOID, shown_frame
+from chipglow.drawing.scales import BLUE, COLOURS, GREEN, GREY, VERMILLION, VOID, shown_frame
 from chipglow.quantities import ZERO_CELSIUS, Array
 
 _FLAGS: Final = {
@@ -25,7 +25,6 @@ _IMAGE_HEIGHTS: Final = (2.0, 6.0)
 _HISTOGRAM: Final = 2.2
 _BINS: Final = 80
 
-_COLOURS: Final = (BLUE, VERMILLION, GREEN)
 _MARKS: Final = ("o", "s", "^")
 _SAMPLES: Final = 300
 
@@ -81,7 +80,7 @@ def draw_calibrations(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> 
         upper.plot(
             first.temperatures - ZERO_CELSIUS, first.counts, "o", color=GREY, label="blackbody"
         )
-        for (name, fit), colour, mark in zip(fits.items(), _COLOURS, _MARKS, strict=False):
+        for (name, fit), colour, mark in zip(fits.items(), COLOURS, _MARKS, strict=False):
             _draw_fit(upper, lower, name, fit, colour, mark)
         upper.set_ylabel("counts")
         upper.legend()

@@ -53,20 +53,16 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     raster = Raster(
         float(image.x[0]) - pitch / 2, float(image.y[0]) + pitch / 2, pitch, *image.radiance.shape
     )
-    left, right, bottom, top = (end * 1e6 for end in raster.extent)
     usable = np.where(image.usable, image.radiance, np.nan)
     limits = float(np.nanmin(usable)), float(np.nanmax(usable))
     label = image.unit if image.unit == "counts" else f"radiance / ({image.unit})"
     ImagePanel(image.name, label, usable, limits, scales.HEAT).draw(figure, axes, raster)
     c, s = cos(fitted.line.normal), sin(fitted.line.normal)
-    middle = float(image.x.mean()) * 1e6, float(image.y.mean()) * 1e6
-    along = np.array([-1.0, 1.0]) * hypot(right - left, top - bottom)
-    x = middle[0] + fitted.line.position * 1e6 * c - along * s
-    y = middle[1] + fitted.line.position * 1e6 * s + along * c
-    axes.plot(x, y, color="white", linewidth=2.4)
-    axes.plot(x, y, color=BLUE, linewidth=1.2)
-    axes.set_xlim(left, right)
-    axes.set_ylim(bottom, top)
+    middle = np.array([image.x.mean(), image.y.mean()]) + fitted.line.position * np.array([c, s])
+    along = image.pitch * hypot(*raster.shape) * np.array([-s, c])
+    shown, factor = axes.axis(), drawing.length_unit(raster)[0]
+    drawing.draw_line(axes, np.stack([middle - along, middle + along]), BLUE, factor=factor)
+    axes.axis(shown)
 
 
 def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
