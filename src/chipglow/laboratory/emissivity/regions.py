@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import PlainSerializer, PlainValidator
+from pydantic import PlainValidator
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
@@ -16,48 +16,29 @@ from chipglow.text import load_described
 _SHAPES: Final = ("polygon", "rectangle", "circle")
 
 
-@dataclass(frozen=True)
-class Coordinate:
-    """A coordinate or a length of a region."""
-
-    value: float
-    """In pixels or in m."""
-    unit: Literal["pixel", "m"]
-
-
-def _coordinate(value: object) -> Coordinate:
-    """Read a number of pixels, or a text with a unit of length."""
-    if isinstance(value, Coordinate):
-        return value
+def _coordinate(value: object) -> float | str:
+    """Check a number of pixels, or a text with a unit of length."""
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return Coordinate(float(value), "pixel")
+        return float(value)
     try:
-        return Coordinate(POSITION.parse(value), "m")
+        POSITION.parse(value)
     except ValueError:
         raise ValueError(
             f"{value!r}, expected a number of pixels, or a position such as 120 um"
         ) from None
+    return str(value)
 
 
-def _as_written(coordinate: Coordinate) -> float | str:
-    return coordinate.value if coordinate.unit == "pixel" else POSITION.text(coordinate.value)
-
-
-CoordinateField = Annotated[
-    Coordinate, PlainValidator(_coordinate), PlainSerializer(_as_written, when_used="json")
-]
-PointField = tuple[CoordinateField, CoordinateField]
+Coordinate = Annotated[float | str, PlainValidator(_coordinate)]
+PointField = tuple[Coordinate, Coordinate]
 
 
 @dataclass(frozen=True)
 class CircleSection(Part):
     """A circle."""
 
-    centre: Annotated[PointField, Parameter("Its middle.")] = (
-        Coordinate(0.0, "pixel"),
-        Coordinate(0.0, "pixel"),
-    )
-    radius: Annotated[CoordinateField, Parameter("Its radius.")] = Coordinate(0.0, "pixel")
+    centre: Annotated[PointField, Parameter("Its middle.")] = (0.0, 0.0)
+    radius: Annotated[Coordinate, Parameter("Its radius.")] = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,9 +63,9 @@ class RegionSection(Part):
     def region(self, name: str) -> Region:
         """Return the region that this section describes."""
         if self.circle is not None:
-            places, radius = (self.circle.centre,), self.circle.radius
-            unit = _unit([*places[0], radius])
-            return Region(name, Circle(_point(places[0]), radius.value), self.feature, unit)
+            centre, radius = self.circle.centre, self.circle.radius
+            unit = _unit([*centre, radius])
+            return Region(name, Circle(_point(centre), _number(radius)), self.feature, unit)
         corners = self.polygon if self.rectangle is None else self.rectangle
         assert corners is not None
         points = tuple(_point(corner) for corner in corners)
@@ -112,15 +93,20 @@ class RegionsDescription(Part):
         return tuple(section.region(name) for name, section in self.regions.items())
 
 
-def _point(place: tuple[Coordinate, Coordinate]) -> Point:
-    return place[0].value, place[1].value
+def _number(coordinate: float | str) -> float:
+    """Return a coordinate in pixels or in m."""
+    return POSITION.parse(coordinate) if isinstance(coordinate, str) else coordinate
 
 
-def _unit(coordinates: Iterable[Coordinate]) -> Literal["pixel", "m"]:
-    units = {coordinate.unit for coordinate in coordinates}
-    if len(units) > 1:
+def _point(place: PointField) -> Point:
+    return _number(place[0]), _number(place[1])
+
+
+def _unit(coordinates: Iterable[float | str]) -> Literal["pixel", "m"]:
+    kinds = {isinstance(coordinate, str) for coordinate in coordinates}
+    if len(kinds) > 1:
         raise ValueError("pixels and lengths are mixed, expected all of one kind")
-    return units.pop() if units else "pixel"
+    return "m" if True in kinds else "pixel"
 
 
 def load_regions(path: str | Path) -> tuple[Region, ...]:
