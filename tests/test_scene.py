@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import Camera
+from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.scene import FIELD_UNITS, Raster, Scene, SceneError, ToolGeometry
-from chipglow.scene.scene import COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE
 from chipglow.surface import UniformSurface
 
 RASTER = Raster(left=-6e-6, top=4e-6, spacing=2e-6, rows=4, columns=5)
@@ -132,7 +132,7 @@ def test_a_field_of_another_shape_or_type_is_named(name, values, message):
 
 
 def test_a_camera_looks_at_whatever_a_scene_may_have():
-    for temperature in (COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE - 1):
+    for temperature in (COLDEST, HOTTEST - 1):
         made = scene(temperature=np.full((3, *RASTER.shape), temperature))
         measured = Camera(pitch=2e-6, integration_time=0.2e-6, lower_limit=None).measure(
             made, UniformSurface(1.0), 0.0

@@ -23,9 +23,16 @@ from chipglow.camera.optics.terms import OpticsTerm
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.quantities import Array, Parameter, Part
-from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, Position
+from chipglow.quantities.units import (
+    COLDEST,
+    FREQUENCY,
+    HOTTEST,
+    LENGTH,
+    TEMPERATURE,
+    TIME,
+    Position,
+)
 from chipglow.radiometry import Band
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
 
@@ -114,8 +121,8 @@ class Camera(Part):
         Parameter(
             "Radiance temperatures under this are flagged, not returned; or none.",
             TEMPERATURE,
-            least=TABLE_COLDEST,
-            most=TABLE_HOTTEST,
+            least=COLDEST,
+            most=HOTTEST,
         ),
     ] = 573.15
     reflected: Annotated[
@@ -123,8 +130,8 @@ class Camera(Part):
         Parameter(
             "Temperature of the surroundings that the surface reflects, or none.",
             TEMPERATURE,
-            least=TABLE_COLDEST,
-            most=TABLE_HOTTEST,
+            least=COLDEST,
+            most=HOTTEST,
         ),
     ] = None
     optics: Annotated[

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Check, Sums
 from chipglow.quantities import Array
+from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Frame, Raster, Scene, is_gap
 from chipglow.scene.splines import SplineFrame
 from chipglow.surface import EmissivityField, EmissivityStack
@@ -101,8 +101,8 @@ def expose(
     mean, hottest = sums.mean, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
-            f"exposure: from {start:g} s, temperature must be {TABLE_COLDEST:g} to "
-            f"{TABLE_HOTTEST:g} K and emissivity 0 to 1, but they are not at "
+            f"exposure: from {start:g} s, temperature must be {COLDEST:g} to "
+            f"{HOTTEST:g} K and emissivity 0 to 1, but they are not at "
             f"{np.count_nonzero(~np.isfinite(mean).all(axis=0))} samples"
         )
     hottest[hottest == 0.0] = np.nan
@@ -218,6 +218,6 @@ def _batches(
 @lru_cache(maxsize=8)
 def _fine_table(band: Band) -> NDArray[np.float32]:
     """Return radiance at steps so fine that a straight line between them is exact enough."""
-    count = round((TABLE_HOTTEST - TABLE_COLDEST) * STEPS_PER_KELVIN) + 1
-    values = np.asarray(band.radiance(TABLE_COLDEST + np.arange(count) / STEPS_PER_KELVIN))
+    count = round((HOTTEST - COLDEST) * STEPS_PER_KELVIN) + 1
+    values = np.asarray(band.radiance(COLDEST + np.arange(count) / STEPS_PER_KELVIN))
     return np.stack([values, np.diff(values, append=values[-1])], axis=1).astype(np.float32)

@@ -19,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.quantities import Array
-from chipglow.radiometry.band import TABLE_COLDEST
+from chipglow.quantities.units import COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface import EmissivityStack, Features
@@ -139,7 +139,7 @@ def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
 def _find(temperature, last, number, past):
     """Find the table's entry before a temperature, and how far past it that is, or NaN."""
     for i in range(temperature.size):
-        position = (temperature[i] - np.float32(TABLE_COLDEST)) * np.float32(STEPS_PER_KELVIN)
+        position = (temperature[i] - np.float32(COLDEST)) * np.float32(STEPS_PER_KELVIN)
         inside = min(max(position, np.float32(0.0)), np.float32(last))
         # What is not finite becomes the least integer, or any.
         number[i] = min(max(np.int32(inside), np.int32(0)), np.int32(last - 1))

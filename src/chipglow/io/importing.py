@@ -17,10 +17,9 @@ from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
 from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import LENGTH, POSITION
+from chipglow.quantities.units import COLDEST, HOTTEST, LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
-from chipglow.scene.scene import COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE
 from chipglow.text import Notes
 
 SAMPLES_ACROSS: Final = 900
@@ -33,8 +32,7 @@ _CHECKPOINT_INTERVAL: Final = 30.0
 _KEY: Final = "import"
 _SMALLEST, _LARGEST = 5e-6, 0.05
 _KELVIN: Final = (
-    f"expected kelvin of {COLDEST_PLAUSIBLE:g} or more; if it is in °C, expected "
-    "units.temperature: degC"
+    f"expected kelvin of {COLDEST:g} or more; if it is in °C, expected units.temperature: degC"
 )
 
 
@@ -195,7 +193,7 @@ def import_scene(
         completion.tool,
         _attributes(key, looked),
         fields,
-        hottest=HOTTEST_PLAUSIBLE,
+        hottest=HOTTEST,
         resume=resume,
     ) as writer:
         kept = f"{done} frames are kept" if done else ""
@@ -278,7 +276,7 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
 def _check_kelvin(frame: Frame) -> None:
     """Refuse temperatures that look like °C, in the words of an import."""
     lowest = float(frame.temperature.min())
-    if -100.0 < lowest < COLDEST_PLAUSIBLE:
+    if -100.0 < lowest < COLDEST:
         raise SourceError(f"temperature: {lowest:.6g} at {frame.time:.9g} s, {_KELVIN}")
 
 
@@ -295,8 +293,8 @@ def _check_temperatures(survey: Survey, raster: Raster) -> None:
             f"temperature: {survey.found['temperature']} has no number in the frames that were "
             "looked at, expected some"
         )
-    if highest < COLDEST_PLAUSIBLE or (lowest < COLDEST_PLAUSIBLE and _holds_all(raster, survey)):
-        worst = highest if highest < COLDEST_PLAUSIBLE else lowest
+    if highest < COLDEST or (lowest < COLDEST and _holds_all(raster, survey)):
+        worst = highest if highest < COLDEST else lowest
         raise SourceError(f"temperature: {worst:.6g} in {survey.found['temperature']}, {_KELVIN}")
 
 

@@ -30,6 +30,7 @@ from chipglow.io.packing import (
     read_chunk,
 )
 from chipglow.io.spool import UnfinishedScene, spooled
+from chipglow.quantities.units import HOTTEST
 from chipglow.scene import (
     ENERGY_UNITS,
     FIELD_UNITS,
@@ -41,12 +42,7 @@ from chipglow.scene import (
     SceneError,
     Tool,
 )
-from chipglow.scene.scene import (
-    FORCE_UNITS,
-    HOTTEST_PLAUSIBLE,
-    check_frame,
-    raster_coordinates,
-)
+from chipglow.scene.scene import FORCE_UNITS, check_frame, raster_coordinates
 from chipglow.scene.splines import Lattice, SplineFrame
 from chipglow.scene.tool_attributes import tool_attributes
 
@@ -291,7 +287,7 @@ class StoredScene(Scene):
         """Temperature in K over which the file can have none."""
         packing = self._direct.get("temperature")
         narrow = packing and packing.step and packing.range[1] < HOTTEST_PACKED + packing.step
-        return HOTTEST_PACKED if narrow else HOTTEST_PLAUSIBLE
+        return HOTTEST_PACKED if narrow else HOTTEST
 
     @property
     def compression(self) -> str:
@@ -435,7 +431,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
         scene.raster,
         attributes=scene.data.attrs,
         fields=scene.fields,
-        hottest=stored.hottest if stored is not None else HOTTEST_PLAUSIBLE,
+        hottest=stored.hottest if stored is not None else HOTTEST,
         lattice=stored.lattice if stored is not None and not samples else None,
     ) as writer:
         for frame in scene.frames():

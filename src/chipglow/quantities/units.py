@@ -223,6 +223,10 @@ def is_bare_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
+COLDEST: Final = 200.0
+HOTTEST: Final = 6000.0
+"""Limits in K of the temperatures of scenes, black bodies and radiance tables."""
+
 POSITION: Final = Quantity("a position", "m", "um", "-420 um", positive=False)
 Position = Annotated[float, POSITION]
 LENGTH: Final = Quantity("a length", "m", "um", "6 um")

@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import Array
+from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry.planck import (
     FIRST_RADIATION_CONSTANT,
     SECOND_RADIATION_CONSTANT,
@@ -25,8 +26,6 @@ from chipglow.radiometry.planck import (
 Response: TypeAlias = Callable[[Array], Array]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
 
-TABLE_COLDEST: Final = 200.0
-TABLE_HOTTEST: Final = 6000.0
 _NODES_PER_PANEL: Final = 16
 _TEMPERATURE_STEP: Final = 0.25
 _SHIFT: Final = 46
@@ -91,7 +90,7 @@ class Band:
         values = _as_floats(temperature)
         result = np.empty_like(values)
         if _look_up_radiance(values.ravel(), self.radiance_table, result.ravel()):
-            outside = (values > 0) & ~((values >= TABLE_COLDEST) & (values <= TABLE_HOTTEST))
+            outside = (values > 0) & ~((values >= COLDEST) & (values <= HOTTEST))
             result[outside] = self._integrate(values[outside].astype(np.float64))
         return result
 
@@ -124,7 +123,7 @@ class Band:
         6000 K.
         """
         values = np.asarray(temperature, np.float64)
-        position = (values - TABLE_COLDEST) / _TEMPERATURE_STEP
+        position = (values - COLDEST) / _TEMPERATURE_STEP
         slopes = self.radiance_table[:, 1]
         return np.interp(position, np.arange(slopes.size), slopes, left=np.nan, right=np.nan)
 
@@ -174,14 +173,14 @@ class Band:
     @cached_property
     def radiance_table(self) -> Array:
         """Radiance and its derivative at every 0.25 K from 200 K to 6000 K, shape (n, 2)."""
-        count = round((TABLE_HOTTEST - TABLE_COLDEST) / _TEMPERATURE_STEP) + 1
-        temperature = TABLE_COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
+        count = round((HOTTEST - COLDEST) / _TEMPERATURE_STEP) + 1
+        temperature = COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
         return np.stack(self._with_slope(temperature), axis=1)
 
     @cached_property
     def _quadrature(self) -> tuple[Array, Array]:
         """Wavelengths and weights (response included), in panels over which Planck is smooth."""
-        fall = SECOND_RADIATION_CONSTANT / TABLE_COLDEST * (1 / self.lower - 1 / self.upper)
+        fall = SECOND_RADIATION_CONSTANT / COLDEST * (1 / self.lower - 1 / self.upper)
         panels = max(1, ceil(fall / 10.0))
         if self.response is not None:
             panels = max(panels, 64)
@@ -198,7 +197,7 @@ class Band:
     @cached_property
     def _inverse_table(self) -> tuple[int, Array]:
         """Place of the first node, as the high bits of its radiance, and cubics, shape (n, 4)."""
-        ends = self._integrate(np.array([TABLE_COLDEST, TABLE_HOTTEST]))
+        ends = self._integrate(np.array([COLDEST, HOTTEST]))
         first, last = np.maximum(ends, ends[1] * 0.5**_POWERS).view(np.int64) >> _SHIFT
         radiance = (np.arange(first, last + 2) << _SHIFT).view(np.float64)
         temperature = self._invert(radiance)
@@ -250,7 +249,7 @@ def _as_floats(values: ArrayLike) -> NDArray[np.floating]:
 @njit(inline="always")
 def table_radiance(temperature, table):
     """Look up in-band radiance by cubic Hermite interpolation; NaN outside the table."""
-    position = (temperature - TABLE_COLDEST) / _TEMPERATURE_STEP
+    position = (temperature - COLDEST) / _TEMPERATURE_STEP
     if not (0.0 <= position <= table.shape[0] - 1):
         return np.nan
     i = min(int(position), table.shape[0] - 2)

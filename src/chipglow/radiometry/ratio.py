@@ -9,7 +9,8 @@ import scipy
 from numpy.typing import ArrayLike
 
 from chipglow.quantities import Array, Parameter, Part
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST, Band
+from chipglow.quantities.units import COLDEST, HOTTEST
+from chipglow.radiometry.band import Band
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ class RatioThermometer(Part):
     @property
     def _temperatures(self) -> Array:
         """Nodes of the bands' tables in K."""
-        return np.linspace(TABLE_COLDEST, TABLE_HOTTEST, len(self.first.radiance_table))
+        return np.linspace(COLDEST, HOTTEST, len(self.first.radiance_table))
 
     @cached_property
     def _slopes(self) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.scene.frame import (
     FIELD_UNITS,
     MATERIAL_COORDINATE_UNITS,
@@ -49,11 +49,6 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
     "J/m",
 )
 """Energy account on `force_time`, per width of cut and since the start: optional, all or none."""
-
-COLDEST_PLAUSIBLE: Final = TABLE_COLDEST
-HOTTEST_PLAUSIBLE: Final = TABLE_HOTTEST
-"""Limits of a scene's temperature in K: what a scene may have, a camera can look at."""
-
 
 _LONGEST_STEP: Final = 2.0
 
@@ -390,16 +385,16 @@ def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
     lowest, highest = float(values.min()), float(values.max())
     if not (isfinite(lowest) and isfinite(highest)):
         raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
-    if name == "temperature" and lowest < COLDEST_PLAUSIBLE:
+    if name == "temperature" and lowest < COLDEST:
         hint = "; it looks like °C, add 273.15" if -100.0 < lowest < 200.0 else ""
         raise SceneError(
             f"scene: temperature {lowest:.6g} at {time:.9g} s, expected kelvin of "
-            f"{COLDEST_PLAUSIBLE:g} to {HOTTEST_PLAUSIBLE:g}{hint}"
+            f"{COLDEST:g} to {HOTTEST:g}{hint}"
         )
-    if name == "temperature" and highest > HOTTEST_PLAUSIBLE:
+    if name == "temperature" and highest > HOTTEST:
         raise SceneError(
             f"scene: temperature {highest:.6g} at {time:.9g} s, expected kelvin of "
-            f"{COLDEST_PLAUSIBLE:g} to {HOTTEST_PLAUSIBLE:g}"
+            f"{COLDEST:g} to {HOTTEST:g}"
         )
     if name in ("plastic_strain", "plastic_strain_rate") and lowest < 0:
         raise SceneError(f"scene: {name!r} is {lowest:.6g} at {time:.9g} s, expected 0 or more")

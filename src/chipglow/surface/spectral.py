@@ -10,13 +10,14 @@ from scipy.constants import c, epsilon_0, pi
 
 from chipglow.quantities import Family, Parameter
 from chipglow.quantities.units import (
+    COLDEST,
+    HOTTEST,
     RESISTIVITY,
     TEMPERATURE_COEFFICIENT,
     Temperature,
     Wavelength,
 )
 from chipglow.radiometry import Band
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Frame, Scene
 from chipglow.surface.surface import SURFACES, Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import TemperatureSurface
@@ -54,7 +55,7 @@ class SpectralSurface(Surface):
 
     def in_band(self, band: Band, reflected: float | None) -> TemperatureSurface:
         """Return the emissivity by temperature that a camera of a band sees."""
-        temperature = np.arange(TABLE_COLDEST, TABLE_HOTTEST + _STEP / 2, _STEP)
+        temperature = np.arange(COLDEST, HOTTEST + _STEP / 2, _STEP)
         seen = temperature
         if reflected is not None:
             # The weights are a derivative where the surface is as warm as what it reflects.

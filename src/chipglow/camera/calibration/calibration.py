@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
 from chipglow.camera.recording import PlanckConversion
 from chipglow.quantities import Array
+from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
 from chipglow.uncertainty.estimate import factor
 
@@ -63,11 +63,11 @@ class FittedCalibration(Calibration):
     """Of the fit and of what the blackbodies have in common, shape (n, n)."""
 
     def __post_init__(self) -> None:
-        if not TABLE_COLDEST <= self.lowest < self.highest <= TABLE_HOTTEST:
+        if not COLDEST <= self.lowest < self.highest <= HOTTEST:
             raise ValueError(
                 f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "
-                f"expected temperatures of blackbodies in order, {TABLE_COLDEST:g} to "
-                f"{TABLE_HOTTEST:g} K"
+                f"expected temperatures of blackbodies in order, {COLDEST:g} to "
+                f"{HOTTEST:g} K"
             )
         count = len(self.NAMES)
         if self.parameters.shape != (count,) or self.covariance.shape != (count, count):

@@ -12,8 +12,8 @@ from chipglow.camera.calibration.blackbody import Blackbody
 from chipglow.camera.calibration.calibration import FittedCalibration
 from chipglow.camera.calibration.checks import alike, drift_shift, residual_warnings
 from chipglow.quantities import Array
+from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 
 Kind = TypeVar("Kind", bound=FittedCalibration)
 
@@ -172,12 +172,12 @@ class _Points:
             )
         if not np.isfinite(signal).all():
             raise ValueError("calibration: counts are not finite")
-        impossible = kelvins[~((kelvins >= TABLE_COLDEST) & (kelvins <= TABLE_HOTTEST))]
+        impossible = kelvins[~((kelvins >= COLDEST) & (kelvins <= HOTTEST))]
         if impossible.size:
             raise ValueError(
                 f"calibration: a blackbody is at {impossible[0]:g} K "
-                f"({impossible[0] - 273.15:g} °C), expected {TABLE_COLDEST:g} to "
-                f"{TABLE_HOTTEST:g} K"
+                f"({impossible[0] - 273.15:g} °C), expected {COLDEST:g} to "
+                f"{HOTTEST:g} K"
             )
         _expect_unsaturated(kelvins, signal)
         return cls(

@@ -18,8 +18,7 @@ from chipglow.camera.detector.terms import (
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Array, Parameter, Part
-from chipglow.quantities.units import TEMPERATURE
-from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 
 Correction: TypeAlias = Literal["two-point", "one-point", "none"]
 """How the pixels are made alike: by frames of two flat-field sources, of one, or not at all."""
@@ -66,8 +65,8 @@ class Detector(Part):
         Parameter(
             "The darker source, a blackbody; none: what fills a tenth.",
             TEMPERATURE,
-            least=TABLE_COLDEST,
-            most=TABLE_HOTTEST,
+            least=COLDEST,
+            most=HOTTEST,
         ),
     ] = None
     hot: Annotated[
@@ -75,8 +74,8 @@ class Detector(Part):
         Parameter(
             "The brighter source; none: what fills eight tenths.",
             TEMPERATURE,
-            least=TABLE_COLDEST,
-            most=TABLE_HOTTEST,
+            least=COLDEST,
+            most=HOTTEST,
         ),
     ] = None
     least_signal: Annotated[

@@ -16,7 +16,7 @@ from chipglow.camera.detector.nonuniformity import NonUniformity, mean_frame
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
 from chipglow.quantities import Array
-from chipglow.radiometry.band import TABLE_COLDEST
+from chipglow.quantities.units import COLDEST
 
 HALF: Final = 0.5
 """Part of the capacity that is filled where the NETD is told."""
@@ -218,7 +218,7 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
             f"{detector.least_signal:g} times its noise, expected a smaller least_signal"
         )
     found = ends[0] if excess(ends[0]) > 0 else scipy.optimize.bisect(excess, *ends, xtol=1e-4)
-    return max(float(point.band.temperature(exp(found))), TABLE_COLDEST)
+    return max(float(point.band.temperature(exp(found))), COLDEST)
 
 
 def _seen(detector: Detector, point: OperationPoint, radiance: float) -> tuple[float, float]:

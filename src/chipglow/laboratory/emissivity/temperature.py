@@ -27,8 +27,8 @@ from chipglow.laboratory.emissivity.observations import (
     with_drift,
 )
 from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities.units import HOTTEST
 from chipglow.radiometry import Band
-from chipglow.radiometry.band import TABLE_HOTTEST
 from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, propagate
@@ -381,12 +381,12 @@ def _emissivity_of_area(
 
     if not radiance > room:
         raise _too_dark(name, reflected)
-    temperatures = np.geomspace(reflected, TABLE_HOTTEST, _STEPS).tolist()
+    temperatures = np.geomspace(reflected, HOTTEST, _STEPS).tolist()
     for colder, hotter in pairwise(temperatures):
         if excess(hotter) > 0:
             return line.at(scipy.optimize.brentq(excess, colder, hotter, xtol=1e-6))
     raise ValueError(
-        f"region {name}: no temperature up to {TABLE_HOTTEST - ZERO_CELSIUS:.0f} °C has its "
+        f"region {name}: no temperature up to {HOTTEST - ZERO_CELSIUS:.0f} °C has its "
         "radiance by the line of its emissivity, expected one that falls less with the temperature"
     )
 
