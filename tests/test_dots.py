@@ -142,7 +142,7 @@ def test_the_skirts_of_blurred_neighbours_do_not_pull():
     scale=st.floats(0.6, 1.8),
     lost=st.integers(0, 3),
 )
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_an_arrangement_is_recognised(seed, turn, scale, lost):
     """Dots without order: some are missing in each image, some are in one only."""
     generator = np.random.default_rng(seed)
