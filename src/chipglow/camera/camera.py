@@ -16,7 +16,7 @@ from chipglow.camera.detector.terms import Lag, follows
 from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import Beyond, blur, images_on_pixels
+from chipglow.camera.optics.convolution import Beyond, blur, blurs, images_on_pixels
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
@@ -377,6 +377,12 @@ class Camera(Part):
         if self.psf is not None and self._forms_on_pixels:
             pixels, sensitive = self.pixels(scene), self._sensitive(scene)
             return images_on_pixels(image, self.psf, scene, pixels, sensitive)
+        if self.psf is not None and not self.optics:
+            whole, own = whole_raster(scene, self.pixels(scene))
+            edge, nothing = blurs(
+                integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch
+            )
+            return edge[own], nothing[own]
         return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
 
     def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:

@@ -4,8 +4,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import pandas as pd
-
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
@@ -72,6 +70,8 @@ def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[in
 
 
 def _print_squares(grid: "RakeGrid") -> None:
+    import pandas as pd
+
     several = grid.times.size > 1
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"
     squares, columns = {"along_um": 1e6 * grid.along}, {"along / µm": "along_um"}

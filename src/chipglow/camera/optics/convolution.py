@@ -41,6 +41,13 @@ def blur(
     return _without_rounding(image)
 
 
+def blurs(radiance: Array, psf: PointSpreadFunction, spacing: float) -> tuple[Array, Array]:
+    """Return both images by `blur`: of a field that goes on, and of one with nothing beyond."""
+    within = _transfer(psf, spacing, radiance.shape).within(radiance)
+    light = _edges(psf, spacing, radiance.shape).light(radiance)
+    return _without_rounding(within + light), _without_rounding(within)
+
+
 def images_on_pixels(
     radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[Array, Array]:
