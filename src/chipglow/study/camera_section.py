@@ -129,7 +129,7 @@ class CameraSection(Part):
             return data
         name = data.get("preset")
         if name not in (None, "none"):
-            if name not in CAMERAS:
+            if name not in list(CAMERAS):  # a mapping or list has no hash
                 known = ", ".join(CAMERAS)
                 raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
             preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
