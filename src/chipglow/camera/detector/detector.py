@@ -1,20 +1,15 @@
 """The detector: from in-band radiance to electrons and counts, with noise and a limited range."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.detector.response import RESPONSES, DetectorResponse, OperationPoint
-from chipglow.camera.detector.terms import (
-    DETECTOR_TERMS,
-    DetectorTerm,
-    Readout,
-    Stage,
-    generator_of,
-)
+from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout, Stage
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Array, Parameter, Part
@@ -150,16 +145,15 @@ class Detector(Part):
         if times is None:
             times = np.arange(count, dtype=np.float64) * point.frame_time
         keys = [int(one.integers(2**63)) for one in generator]
-        readout = Readout(times, point, self.per_radiance(point), self.capacity, (), self.seed)
-        electrons = readout.per_radiance * np.asarray(radiance, np.float64)
+        per_radiance = self.per_radiance(point)
+        readout = partial(Readout, times, point, per_radiance, self.capacity, keys, self.seed)
+        electrons = per_radiance * np.asarray(radiance, np.float64)
         for stage in Stage:
             if stage == Stage.TRANSFER and self.full_well is not None:
                 electrons = np.minimum(electrons, self.full_well)
             for term in self.terms:
                 if term.stage == stage:
-                    # Noise of one kind does not depend on what other terms there are.
-                    own = [generator_of(key, term.kind) for key in keys]
-                    electrons = term.apply(electrons, replace(readout, generators=own))
+                    electrons = term.apply(electrons, readout(term.kind))
         signal = self.offset + self.conversion_gain * electrons
         return np.clip(np.rint(signal), 0, self._top).astype(np.uint32)
 

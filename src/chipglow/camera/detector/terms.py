@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from math import ceil, log10, pi
 from typing import Annotated, ClassVar, Final
 from zlib import crc32
@@ -54,10 +55,17 @@ class Readout:
     """Electrons that 1 W/(m² sr) makes in a frame."""
     capacity: float
     """Electrons that fill the detector or its digitiser."""
-    generators: Sequence[np.random.Generator]
-    """Source of each frame's noise of the term's kind."""
+    keys: Sequence[int]
+    """Seed of each frame's noise."""
     seed: int
     """Of what is fixed in the detector."""
+    kind: str
+    """Kind of the term, whose noise does not depend on what other terms there are."""
+
+    @cached_property
+    def generators(self) -> list[np.random.Generator]:
+        """Source of each frame's noise of this kind."""
+        return [generator_of(key, self.kind) for key in self.keys]
 
     def normal(self, rows: int, columns: int) -> Array:
         """Return standard normal deviates of all frames, shape (time, rows, columns)."""
