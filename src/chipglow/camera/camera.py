@@ -374,16 +374,15 @@ class Camera(Part):
 
     def _both(self, image: Array, scene: Raster) -> tuple[Array, Array]:
         """Return the radiance that the pixels receive, as at the edges or nothing beyond."""
-        if self.psf is not None and self._forms_on_pixels:
-            pixels, sensitive = self.pixels(scene), self._sensitive(scene)
-            return images_on_pixels(image, self.psf, scene, pixels, sensitive)
-        if self.psf is not None and not self.optics:
-            whole, own = whole_raster(scene, self.pixels(scene))
-            edge, nothing = blurs(
-                integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch
-            )
-            return edge[own], nothing[own]
-        return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
+        if self.psf is None or self.optics:
+            return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
+        pixels = self.pixels(scene)
+        if self.psf_order == "optics":
+            return images_on_pixels(image, self.psf, scene, pixels, self._sensitive(scene))
+        whole, own = whole_raster(scene, pixels)
+        received = integrate(image, scene, whole, self.fill_factor)
+        edge, nothing = blurs(received, self.psf, self.pitch)
+        return edge[own], nothing[own]
 
     def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
         """Return the radiance that the pixels receive: point spread function, optics, footprint."""
