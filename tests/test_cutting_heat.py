@@ -7,6 +7,7 @@ import pytest
 from cases.heat import CAPACITY, CONDUCTIVITY, DIFFUSIVITY, constant_properties
 from solver import DENSITY, Block
 
+from chipglow.cutting import AISI_1045, CARBIDE
 from chipglow.cutting.heat import (
     SMALLEST_FRACTION,
     ToolHeat,
@@ -16,7 +17,6 @@ from chipglow.cutting.heat import (
     return_heat,
     tool_fraction,
 )
-from chipglow.cutting.library import AISI_1045, CARBIDE
 from chipglow.cutting.points import Grid
 from chipglow.scene import ToolGeometry
 

@@ -8,6 +8,8 @@ from scipy.constants import Stefan_Boltzmann
 from solver import DENSITY, Block
 
 from chipglow.cutting import (
+    AISI_1045,
+    CARBIDE,
     CuttingConditions,
     CuttingSimulation,
     Numerics,
@@ -16,7 +18,6 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.heat import ToolHeat, conduct, return_heat, tool_fraction
 from chipglow.cutting.heat_loss import HeatLoss, free_surface, lose_heat
-from chipglow.cutting.library import AISI_1045, CARBIDE
 from chipglow.scene import Raster, ToolGeometry
 from chipglow.study import Study
 

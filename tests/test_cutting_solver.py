@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from solver import DENSITY, Block
 
 from chipglow.cutting import (
+    AISI_1045,
     CuttingConditions,
     CuttingSimulation,
     Friction,
@@ -19,11 +20,11 @@ from chipglow.cutting import (
     RateTable,
     SolverError,
     stress,
+    workpiece,
 )
 from chipglow.cutting.damage import Damage, damage_growth, weakening
 from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.laws import HyperbolicTangent
-from chipglow.cutting.library import AISI_1045, workpiece
 from chipglow.cutting.material import ROOM_TEMPERATURE
 from chipglow.cutting.simulation import _State
 from chipglow.cutting.stress import heat_fraction

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import erfc
 
-from chipglow.cutting import CuttingSimulation, Numerics
+from chipglow.cutting import CARBIDE, CuttingSimulation, Numerics
 from chipglow.cutting.heat import SMALLEST_FRACTION, ToolHeat, conduct_tool, tool_fraction
-from chipglow.cutting.library import CARBIDE
 from chipglow.cutting.points import Grid
 from chipglow.cutting.simulation import _State
 from chipglow.cutting.tool_border import CELLS, GROWTH, border_nodes, conduct_beyond

@@ -1,8 +1,5 @@
 """The embedded cutting simulation."""
 
-from typing import TYPE_CHECKING, Any
-
-from chipglow.cutting import library
 from chipglow.cutting.checkpoint import Checkpoint as Checkpoint
 from chipglow.cutting.conditions import (
     CuttingConditions as CuttingConditions,
@@ -49,12 +46,14 @@ from chipglow.cutting.simulation import (
 )
 from chipglow.cutting.steady_tool import SteadyTool as SteadyTool, ToolBody as ToolBody
 
-if TYPE_CHECKING:
-    from chipglow.cutting.library import AISI_1045 as AISI_1045, CARBIDE as CARBIDE
+AISI_1045: WorkpieceMaterial
+CARBIDE: ToolMaterial
 
 
-def __getattr__(name: str) -> Any:
-    """Leave the constants to the library, which reads them when they are first used."""
-    if name in ("AISI_1045", "CARBIDE"):
-        return getattr(library, name)
+def __getattr__(name: str) -> WorkpieceMaterial | ToolMaterial:
+    """Read the constants when they are first used: files and units take a third of a second."""
+    if name == "AISI_1045":
+        return workpiece("aisi-1045")
+    if name == "CARBIDE":
+        return tool_material("carbide")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -35,9 +35,6 @@ _TABLES_ONLY: Final = ("conductivity", "heat_capacity")
 _RATE: Final = Parameter("Strain rate.", STRAIN_RATE, over=0.0)
 _TEMPERATURE: Final = Parameter("Temperature.", KELVINS)
 
-AISI_1045: WorkpieceMaterial
-CARBIDE: ToolMaterial
-
 
 class MaterialError(ValueError):
     """A material that cannot be used: the message names file, field, value and expectation."""
@@ -271,12 +268,3 @@ def _text(place: str, text: object) -> str:
     if not isinstance(text, str) or not text.strip():
         raise ValueError(f"{place}: {text!r}, expected text")
     return text.strip()
-
-
-def __getattr__(name: str) -> WorkpieceMaterial | ToolMaterial:
-    """Read the constants when they are first used: files and units take a third of a second."""
-    if name == "AISI_1045":
-        return workpiece("aisi-1045")
-    if name == "CARBIDE":
-        return tool_material("carbide")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
