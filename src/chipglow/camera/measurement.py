@@ -10,10 +10,10 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
-from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
+from chipglow.scene.notebook import frames_text, plot_image
 from chipglow.scene.scene import raster_coordinates
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
 from chipglow.text import Notes

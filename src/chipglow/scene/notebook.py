@@ -11,8 +11,6 @@ from chipglow.scene.tool import Tool
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-ZERO_CELSIUS: Final = 273.15
-
 _FACE: Final = 3e-3
 _NOTHING: Final = "#e5e7eb"
 

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.quantities.units import COLDEST, HOTTEST
+from chipglow.quantities.units import COLDEST, HOTTEST, ZERO_CELSIUS
 from chipglow.scene.frame import (
     FIELD_UNITS,
     MATERIAL_COORDINATE_UNITS,
@@ -20,7 +20,7 @@ from chipglow.scene.frame import (
     Material,
     SceneError,
 )
-from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
+from chipglow.scene.notebook import frames_text, plot_image
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes

@@ -155,11 +155,13 @@ class BlurredPSF(PointSpreadFunction):
     blurs : tuple of BlurTerm
         Further blurs; a ValueError if one is in the point spread function already.
 
-    Notes ----- `fwhm` is the mean of the widths along the row and the column through the peak. What
-    the blurs change is computed within 32 widths of the middle and their reach, on squares of at
-    most a quarter of the width, and summed on the squares that are asked for: the squares
-    themselves count once. Farther away a blur of standard deviation σ changes the light at a radius
-    r by a fraction of some (σ / r)², which is left out. No light is lost.
+    Notes
+    -----
+    `fwhm` is the mean of the widths along the row and the column through the peak. What the blurs
+    change is computed within 32 widths of the middle and their reach, on squares of at most a
+    quarter of the width, and summed on the squares that are asked for: the squares themselves
+    count once. Farther away a blur of standard deviation σ changes the light at a radius r by a
+    fraction of some (σ / r)², which is left out. No light is lost.
     """
 
     psf: PointSpreadFunction
