@@ -1,8 +1,5 @@
 """Surfaces: emissivity maps that follow the material."""
 
-from chipglow.surface.cross_section import (
-    SideElements as SideElements,
-)
 from chipglow.surface.directional import (
     DIRECTIONS as DIRECTIONS,
     Direction as Direction,
@@ -36,6 +33,7 @@ from chipglow.surface.oxide import (
 )
 from chipglow.surface.side_flow import (
     REFLECTIONS as REFLECTIONS,
+    SideElements as SideElements,
     SideShape as SideShape,
     Wedge as Wedge,
 )

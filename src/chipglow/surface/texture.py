@@ -10,8 +10,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import correlate1d
 
-from chipglow.surface.cubic import autocorrelation
 from chipglow.surface.emissivity import REACH, STEPS, Emissivity
 
 MAP_SIZE: Final = 128
@@ -27,6 +27,8 @@ _CUBIC: Final = (
     (-0.5, 0.0, 0.5, 0.0),
     (0.0, 1.0, 0.0, 0.0),
 )
+_AUTOCORRELATION: Final = np.array([1, -20, 71, 456, 71, -20, 1]) / 560
+"""Overlap of that kernel with itself, for lags of −3 to 3 nodes."""
 _LANES: Final = tuple(ir.Constant(ir.IntType(32), lane) for lane in range(4))
 _LAST: Final = round(2 * REACH * STEPS)
 _PER_NODE: Final = 10
@@ -112,10 +114,7 @@ def _enlarged_standard_deviation(nodes: NDArray[np.float64]) -> float:
     about_mean = nodes - nodes.mean()
     smoothed = about_mean
     for axis in (0, 1):
-        smoothed = sum(
-            weight * np.roll(smoothed, lag, axis)
-            for lag, weight in zip(range(-3, 4), autocorrelation(), strict=True)
-        )
+        smoothed = correlate1d(smoothed, _AUTOCORRELATION, axis, mode="wrap")
     return sqrt(float((about_mean * smoothed).mean()))
 
 

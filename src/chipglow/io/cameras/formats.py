@@ -79,7 +79,7 @@ _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _OWN: Final[Mapping[str, CameraFormat]] = {
     "flir": CameraFormat(
         "FLIR radiometric JPEG, FFF, SEQ, CSQ",
-        _FLIR,
+        (".jpg", ".jpeg", ".fff", ".seq", ".csq"),
         _starts(b"FFF\0", b"\xff\xd8\xff"),
         Flir.recording,
         has_packed_counts,
