@@ -3,11 +3,10 @@
 from dataclasses import dataclass, fields
 from typing import Final
 
-import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from chipglow.cutting.stress import BULK, SHEAR, elastic_energy, kelvin_index
+from chipglow.quantities import Array
 
 
 @dataclass(frozen=True)
@@ -17,27 +16,27 @@ class EnergyHistory:
     Each entry has the shape (n,).
     """
 
-    drive_work: NDArray[np.float64]
+    drive_work: Array
     """Work of the driven boundary, and what material brought in less what it took out."""
-    contact_work: NDArray[np.float64]
+    contact_work: Array
     """Work of the tool's normal force: a rigid tool at rest does next to none."""
-    kinetic_energy: NDArray[np.float64]
+    kinetic_energy: Array
     """Change of the energy of motion, of the scaled mass."""
-    elastic_energy: NDArray[np.float64]
-    plastic_work: NDArray[np.float64]
+    elastic_energy: Array
+    plastic_work: Array
     """Of which the Taylor-Quinney fraction is heat."""
-    friction_work: NDArray[np.float64]
-    sharing_loss: NDArray[np.float64]
+    friction_work: Array
+    sharing_loss: Array
     """Elastic energy lost because the points of a cell share one dilation."""
-    expansion_work: NDArray[np.float64]
+    expansion_work: Array
     """Elastic energy that material got from heat when it was warmed under pressure."""
-    moduli_loss: NDArray[np.float64]
+    moduli_loss: Array
     """Elastic energy that was lost as the moduli fell with the temperature."""
-    lost_heat: NDArray[np.float64]
+    lost_heat: Array
     """Heat that free surfaces lost: plastic or friction work before, so no mechanical entry."""
 
     @property
-    def closing_error(self) -> NDArray[np.float64]:
+    def closing_error(self) -> Array:
         """Fraction of the work that the balance does not account for: what the grid dissipates."""
         held = self.kinetic_energy + self.elastic_energy
         used = self.plastic_work + self.friction_work + self.sharing_loss + self.moduli_loss

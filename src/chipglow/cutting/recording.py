@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from math import ceil, floor
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chipglow.cutting.conditions import OutputWindow
+from chipglow.quantities import Array
 from chipglow.scene import Frame, Raster
 
 _SMOOTH: Final = 5e-6
@@ -97,7 +95,7 @@ class Recorder:
             return True
         return any(start <= record < start + self._frames for start in self._starts)
 
-    def replay(self, forces: NDArray[np.float64]) -> None:
+    def replay(self, forces: Array) -> None:
         """Take the forces of intervals that are done, those before a checkpoint."""
         for i, force in enumerate(forces):
             self.wants(i + 1, float(force))

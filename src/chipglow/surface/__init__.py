@@ -5,12 +5,8 @@ from chipglow.surface.directional import (
     Direction as Direction,
     Fresnel as Fresnel,
 )
-from chipglow.surface.emissivity import (
-    Emissivity as Emissivity,
-)
-from chipglow.surface.exchange import (
-    Exchange as Exchange,
-)
+from chipglow.surface.emissivity import Emissivity as Emissivity
+from chipglow.surface.exchange import Exchange as Exchange
 from chipglow.surface.feature import (
     CHIP_1 as CHIP_1,
     CHIP_2 as CHIP_2,
@@ -22,9 +18,7 @@ from chipglow.surface.feature import (
     feature_fractions as feature_fractions,
     shear_band_fraction as shear_band_fraction,
 )
-from chipglow.surface.map import (
-    MapSurface as MapSurface,
-)
+from chipglow.surface.map import MapSurface as MapSurface
 from chipglow.surface.oxide import (
     OXIDES as OXIDES,
     Oxide as Oxide,
@@ -61,6 +55,4 @@ from chipglow.surface.temperature import (
     TrendSurface as TrendSurface,
     UniformSurface as UniformSurface,
 )
-from chipglow.surface.texture import (
-    Texture as Texture,
-)
+from chipglow.surface.texture import Texture as Texture

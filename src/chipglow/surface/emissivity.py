@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainccinv, betaincinv, ndtr
 
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Array, Parameter, Part
 
 REACH: Final = 8.0
 """Normal deviates from −8 to 8 are told apart; those beyond count as these."""
@@ -66,9 +66,7 @@ class Emissivity(Part):
         return self.mean, self.standard_deviation if self.is_normal else float("nan")
 
 
-def _beta_values(
-    deviates: NDArray[np.float64], mean: float, standard_deviation: float
-) -> NDArray[np.float64]:
+def _beta_values(deviates: Array, mean: float, standard_deviation: float) -> Array:
     """Values of a beta distribution where a normal one has these deviates."""
     size = mean * (1 - mean) / standard_deviation**2 - 1
     first, second = mean * size, (1 - mean) * size

@@ -15,6 +15,7 @@ from chipglow.camera import Recording
 from chipglow.camera.recording import Quantity
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import check_samples
+from chipglow.quantities import Array
 from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes
 
@@ -118,7 +119,7 @@ class CameraFile(ABC):
         """Return the samples of a frame."""
 
     @abstractmethod
-    def times(self, chosen: range) -> NDArray[np.float64]:
+    def times(self, chosen: range) -> Array:
         """Return the times of frames in s, from the file's first one on."""
 
     @abstractmethod
@@ -145,9 +146,7 @@ class CameraFile(ABC):
                 **file.facts(chosen),
             )
 
-    def stamped(
-        self, chosen: range, stamps: NDArray[np.float64] | None, rate: float
-    ) -> NDArray[np.float64]:
+    def stamped(self, chosen: range, stamps: Array | None, rate: float) -> Array:
         """Return stamps in s after the first frame, or times by a frame rate in Hz.
 
         The rate is used where the stamps do not ascend; it is 0 if it is not known.
@@ -179,7 +178,7 @@ class CameraFile(ABC):
             when = datetime.fromtimestamp(seconds, UTC).isoformat(" ", "milliseconds")
             self.notes.remarks.append(f"Frame 0 was taken at {when}.")
 
-    def common_exposure(self, exposures: NDArray[np.float64]) -> float | None:
+    def common_exposure(self, exposures: Array) -> float | None:
         """Return the integration time in s of all frames; None if they differ or it is 0."""
         least, greatest = float(exposures.min()), float(exposures.max())
         if least == greatest:
@@ -204,7 +203,7 @@ class CameraFile(ABC):
         return ObjectParameters(**known)
 
 
-def evenly(chosen: range, interval: float) -> NDArray[np.float64]:
+def evenly(chosen: range, interval: float) -> Array:
     """Return times in s of frames that are as far apart, from the file's first one on."""
     return np.asarray(chosen, np.float64) * interval
 

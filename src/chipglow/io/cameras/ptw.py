@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.cameras.binary import Binary, CameraFile, check_picture, evenly, layout, text_of
 from chipglow.io.sources import SourceError
+from chipglow.quantities import Array
 from chipglow.text import Notes
 
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
@@ -105,7 +106,7 @@ class Ptw(CameraFile):
         start = self.start + number * self.stride
         return self.binary.numbers(start, rows * columns, "<u2").reshape(rows, columns)
 
-    def times(self, chosen: range) -> NDArray[np.float64]:
+    def times(self, chosen: range) -> Array:
         header = self.header
         period = header["period"] if 0 < header["period"] < _LONGEST_PERIOD else None
         rate = 1 / period if period else 0.0
@@ -119,9 +120,7 @@ class Ptw(CameraFile):
             return self.stamped(chosen, since, rate)
         return self._clocked_times(chosen, since, mean, period)
 
-    def _clocked_times(
-        self, chosen: range, since: NDArray[np.float64], mean: float, period: float
-    ) -> NDArray[np.float64]:
+    def _clocked_times(self, chosen: range, since: Array, mean: float, period: float) -> Array:
         """Return times by the header's period, or by the stamps where they do not fit it.
 
         The stamps are in s after the file's first frame, in whole milliseconds, with a mean step:
