@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,6 @@ _ARRAYS: Final = (
     "held_at_start",
 )
 _NUMBERS: Final = ("count", "columns", "time", "carried", "lost_heat")
-
-
-class State(Protocol):
-    """What a running simulation has: the arrays and numbers above as attributes, and points."""
-
-    count: int
-    points: NDArray[Any]
-
-    def choose_steps(self) -> None:
-        """Choose the time steps that follow from the state."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +33,14 @@ class Checkpoint:
         return float(self.arrays["time"])
 
 
-def capture(state: State, records: NDArray[np.float64], progress: float) -> Checkpoint:
+def capture(state: Any, records: NDArray[np.float64], progress: float) -> Checkpoint:
     """Return the state as it is, in its own arrays, which change when it goes on."""
     arrays = {name: np.asarray(getattr(state, name)) for name in (*_ARRAYS, *_NUMBERS)}
     arrays |= {"points": state.points[: state.count], "records": records}
     return Checkpoint(arrays, progress)
 
 
-def restore(state: State, checkpoint: Checkpoint, records: NDArray[np.float64]) -> int:
+def restore(state: Any, checkpoint: Checkpoint, records: NDArray[np.float64]) -> int:
     """Set a fresh state, and the records, to a checkpoint; return how many intervals are done."""
     arrays = checkpoint.arrays
     names = {*_ARRAYS, *_NUMBERS, "points", "records"}

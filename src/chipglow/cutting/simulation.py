@@ -22,8 +22,11 @@ from chipglow.cutting.conditions import (
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.heat import (
+    CELLS,
     ToolHeat,
+    border_nodes,
     conduct,
+    conduct_beyond,
     conduct_tool,
     heat_contact,
     return_heat,
@@ -65,7 +68,6 @@ from chipglow.cutting.points import (
 )
 from chipglow.cutting.recording import Preview, Recorder
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
-from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
