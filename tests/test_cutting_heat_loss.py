@@ -16,8 +16,15 @@ from chipglow.cutting import (
     OutputWindow,
     Surroundings,
 )
-from chipglow.cutting.heat import ToolHeat, conduct, return_heat, tool_fraction
-from chipglow.cutting.heat_loss import HeatLoss, free_surface, lose_heat
+from chipglow.cutting.heat import (
+    HeatLoss,
+    ToolHeat,
+    conduct,
+    free_surface,
+    lose_heat,
+    return_heat,
+    tool_fraction,
+)
 from chipglow.scene import Raster, ToolGeometry
 from chipglow.study import Study
 

@@ -10,7 +10,6 @@ import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 
-from chipglow.cutting.checkpoint import Checkpoint, capture, restore
 from chipglow.cutting.conditions import (
     CuttingConditions,
     Friction,
@@ -20,19 +19,19 @@ from chipglow.cutting.conditions import (
     unresolved,
 )
 from chipglow.cutting.damage import Damage
-from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.heat import (
     CELLS,
+    HeatLoss,
     ToolHeat,
     border_nodes,
     conduct,
     conduct_beyond,
     conduct_tool,
     heat_contact,
+    lose_heat,
     return_heat,
     tool_fraction as fraction_of_tool,
 )
-from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import tool_material, workpiece
 from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.mean_rate import average_rates
@@ -66,7 +65,16 @@ from chipglow.cutting.points import (
     find_trouble,
     sort_by_cell,
 )
-from chipglow.cutting.recording import Preview, Recorder
+from chipglow.cutting.recording import (
+    ENERGIES,
+    Checkpoint,
+    EnergyHistory,
+    Preview,
+    Recorder,
+    capture,
+    held_energy,
+    restore,
+)
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice

@@ -252,18 +252,25 @@ class StoredScene(Scene):
 
     Fields that are packed as `SceneWriter` packs them are read without the way through xarray,
     in half the time; what was read last stays in memory, up to `CACHED_BYTES`. `lattice` states
-    where the nodes are if the file holds splines, None if it holds samples.
+    where the nodes are if the file holds splines, None if it holds samples; `coarser` gives it
+    another one, and some of the frames.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self, path: Path, lattice: Lattice | None = None, kept: Sequence[int] | None = None
+    ) -> None:
         self.path = path
         self._file = h5py.File(path, "r")
         data = xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
-        self.lattice = spline_file.stored_lattice(self._file, data)
+        self.lattice = lattice or spline_file.stored_lattice(self._file, data)
+        self._kept = range(data.sizes.get("time", 0)) if kept is None else kept
         fields = (*CUT_FIELDS, QUALITY) if self.lattice is None else spline_file.CHUNKED
         datasets = {name: self._file[name] for name in fields if name in data}
         packings = {name: Packing.stored(dataset) for name, dataset in datasets.items()}
         self._direct = {name: packing for name, packing in packings.items() if packing}
+        if lattice is not None:
+            places = raster_coordinates(lattice.raster, data["time"].values[self._kept])
+            data = xr.Dataset(coords=places, attrs=data.attrs)
         if self.lattice is not None:
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
         shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
@@ -271,7 +278,7 @@ class StoredScene(Scene):
         self._chunk = lru_cache(chunks)(partial(_read_chunk, path, datasets))
         super().__init__(data)
 
-    def coarser(self, step: int, every: int = 1) -> Scene:
+    def coarser(self, step: int, every: int = 1) -> "StoredScene":
         """Return the scene of splines with fewer samples, for a quick look.
 
         `step` samples in either direction become one; one frame of `every` is kept, the first
@@ -280,7 +287,7 @@ class StoredScene(Scene):
         if self.lattice is None:
             raise ValueError(f"{self.path}: has samples, expected splines")
         kept = [index for block in self.blocks for index in block[::every]]
-        return _CoarserScene(self, self.lattice.coarser(step), kept)
+        return StoredScene(self.path, self.lattice.coarser(step), kept)
 
     @property
     def hottest(self) -> float:
@@ -305,8 +312,8 @@ class StoredScene(Scene):
         """Return the splines of one frame; None if the file has samples."""
         if self.lattice is None:
             return None
-        index = range(len(self.times))[index]
-        nodes, limits = (self._chunk(name, index) for name in spline_file.CHUNKED)
+        stored = self._kept[index]
+        nodes, limits = (self._chunk(name, stored) for name in spline_file.CHUNKED)
         frame = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
         spline_file.check(frame)
         return frame
@@ -339,30 +346,6 @@ def _telling(path: Path, name: str, index: int) -> Iterator[None]:
         raise SceneError(
             f"{path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
         ) from error
-
-
-class _CoarserScene(Scene):
-    """A stored scene of splines on fewer samples; see `StoredScene.coarser`."""
-
-    def __init__(self, stored: StoredScene, lattice: Lattice, kept: Sequence[int]) -> None:
-        self._stored, self._lattice, self._kept = stored, lattice, kept
-        places = raster_coordinates(lattice.raster, stored.times[kept])
-        empty = xr.Dataset(coords=places, attrs=stored.data.attrs)
-        super().__init__(spline_file.with_samples(empty, self._read, _LONG_NAMES))
-
-    def splines(self, index: int) -> SplineFrame:
-        """Return the splines of one frame."""
-        found = self._stored.splines(self._kept[index])
-        assert found is not None
-        return SplineFrame(self._lattice, found.time, found.nodes, found.limits)
-
-    def _unchecked(self, index: int, names: Collection[str] | None) -> Frame:
-        return self.splines(index).frame(names)
-
-    def _read(self, name: str, index: int) -> NDArray[Any]:
-        frame = self.splines(index)
-        material = frame.material()
-        return material if name == "material" else frame.values(name, material)
 
 
 def open_scene(path: str | os.PathLike[str]) -> StoredScene:

@@ -5,7 +5,6 @@ from chipglow.surface.directional import (
     Direction as Direction,
     Fresnel as Fresnel,
 )
-from chipglow.surface.emissivity import Emissivity as Emissivity
 from chipglow.surface.exchange import Exchange as Exchange
 from chipglow.surface.feature import (
     CHIP_1 as CHIP_1,
@@ -55,4 +54,4 @@ from chipglow.surface.temperature import (
     TrendSurface as TrendSurface,
     UniformSurface as UniformSurface,
 )
-from chipglow.surface.texture import Texture as Texture
+from chipglow.surface.texture import Emissivity as Emissivity, Texture as Texture

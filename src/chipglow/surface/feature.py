@@ -21,12 +21,11 @@ from chipglow.surface.blend import (
     STRAIN_OF_WORKPIECE,
     Textures,
     blend_row,
+    in_blocks,
 )
-from chipglow.surface.blocks import in_blocks
-from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.surface import Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import EmissivityTrend, draw_text, drawn_trends
-from chipglow.surface.texture import Texture, padded
+from chipglow.surface.texture import Emissivity, Texture, padded
 
 UNDEFORMED_STRAIN: Final = 0.01
 """Plastic strain under which material is not affected by the cut."""
@@ -175,16 +174,8 @@ class Features:
         result: NDArray[np.float32] = self.emissivities(frame)[0]
         return result
 
-    def beside(self, others: Sequence[object]) -> "Features | None":
-        """Return the features with others after them; None if those move in another way."""
-        surfaces = list(self.surfaces)
-        for other in others:
-            if not (isinstance(other, Features) and self._moves_like(other)):
-                return None
-            surfaces += other.surfaces
-        return replace(self, surfaces=tuple(surfaces))
-
-    def _moves_like(self, other: "Features") -> bool:
+    def moves_like(self, other: "Features") -> bool:
+        """Whether textures of both are looked up at the same places."""
         names = ("grain", "follow", "restore_standard_deviation")
         one, two = self.surfaces[0], other.surfaces[0]
         alike = all(getattr(one, name) == getattr(two, name) for name in names)
@@ -260,8 +251,10 @@ class EmissivityStack:
     @cached_property
     def features(self) -> Features | None:
         """The features under all fields, if they move alike."""
-        first, *others = (field.bare for field in self.fields)
-        return first.beside(others) if isinstance(first, Features) else None
+        bare = [field.bare for field in self.fields if isinstance(field.bare, Features)]
+        if len(bare) < len(self.fields) or not all(one.moves_like(bare[0]) for one in bare):
+            return None
+        return replace(bare[0], surfaces=tuple(one.surfaces[0] for one in bare))
 
     @property
     def is_bare(self) -> bool:
