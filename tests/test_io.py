@@ -27,7 +27,7 @@ from chipglow.io import (
 )
 from chipglow.io.packing import HOTTEST_PACKED, PACKING
 from chipglow.radiometry import Band
-from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, ToolGeometry
+from chipglow.scene import FIELD_UNITS, Frame, Raster, SceneError, ToolGeometry
 from chipglow.scene.scene import raster_coordinates
 
 RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27)
@@ -418,15 +418,6 @@ def test_a_foreign_measurement_is_named(tmp_path):
     shutil.copy(scene, path)
     with pytest.raises(ValueError, match=r"m\.nc: .*'radiance_temperature' .* is missing"):
         read_measurement(path)
-
-
-def test_scene_in_memory_goes_to_a_file(tmp_path):
-    frames = [a_frame(index * 1e-6, seed=index) for index in range(2)]
-    names = (*FIELD_UNITS, "material_x", "material_y")
-    fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in names}
-    write_scene(Scene.from_fields(RASTER, [0.0, 1e-6], fields), tmp_path / "scene.nc")
-    for found, expected in zip(open_scene(tmp_path / "scene.nc").frames(), frames, strict=True):
-        assert_as_kept(found, expected)
 
 
 def test_a_hot_scene_comes_back_and_survives_a_copy(tmp_path):
