@@ -7,13 +7,10 @@ import pytest
 from cases.heat import CAPACITY, CONDUCTIVITY, DIFFUSIVITY, constant_properties
 from scipy.constants import Stefan_Boltzmann
 from solver import DENSITY, Block
+from test_cutting_solver import short_cut
 
 from chipglow.cutting import (
     CARBIDE,
-    CuttingConditions,
-    CuttingSimulation,
-    Numerics,
-    OutputWindow,
     Surroundings,
 )
 from chipglow.cutting.heat import (
@@ -29,7 +26,7 @@ from chipglow.cutting.heat import (
     tool_fraction,
 )
 from chipglow.cutting.points import Grid
-from chipglow.scene import Raster, ToolGeometry
+from chipglow.scene import ToolGeometry
 from chipglow.study import Study
 
 EVERYWHERE = HeatLoss(0.0, 0.0, 293.15, -1.0, 1.0, -1.0, 1.0)
@@ -354,28 +351,16 @@ def test_only_the_window_loses_heat():
     assert lost == pytest.approx(1e5 * (1000.0 - 293.15) * 40e-6 * 1e-6, rel=0.03)
 
 
-def short_cut(surroundings):
-    simulation = CuttingSimulation(
-        CuttingConditions(cutting_length=0.06e-3),
-        numerics=Numerics(cell=30e-6),
-        surroundings=surroundings,
-    )
-    raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
-    window = OutputWindow(start=0.05e-3, end=0.06e-3, interval=1e-6, later_bands=0)
-    frames = []
-    history = simulation.run(window, raster, frames.append)
-    return history.energy.lost_heat, frames[-1].temperature
-
-
 def test_a_cut_loses_heat_if_asked_to():
-    none, still = short_cut(Surroundings())
-    some, cooled = short_cut(Surroundings(convection=1e6, emissivity=0.9, temperature=250.0))
+    losses = Surroundings(), Surroundings(convection=1e6, emissivity=0.9, temperature=250.0)
+    (one, still), (other, cooled) = (short_cut(0.06e-3, surroundings=each) for each in losses)
+    none, some = one.energy.lost_heat, other.energy.lost_heat
     assert not none.any()
     assert (np.diff(some) > 0).all()
     # All of the workpiece's upper face and the cut surface cool from 293 K.
     least = 1e6 * 43.0 * 1e-3 * 14.4e-6
     assert 0.5 * least < some[-1] < 5 * least
-    assert np.nanmin(cooled) < np.nanmin(still) - 1.0
+    assert cooled[-1].temperature.min() < still[-1].temperature.min() - 1.0
 
 
 def test_a_study_names_the_surroundings():
