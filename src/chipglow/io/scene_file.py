@@ -21,16 +21,8 @@ from chipglow.io import spline_file
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import (
-    COMPRESSION,
-    HOTTEST_PACKED,
-    Packing,
-    chunk_of,
-    packing_for,
-    read_chunk,
-)
+from chipglow.io.packing import COMPRESSION, PACKING, Packing, chunk_of, read_chunk
 from chipglow.io.spool import UnfinishedScene, spooled
-from chipglow.quantities.units import HOTTEST
 from chipglow.scene import (
     ENERGY_UNITS,
     FIELD_UNITS,
@@ -86,14 +78,13 @@ CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
-    A context manager: frames lie in a `Spool` beside the file, which is written at the end.
-    `hottest` is the greatest temperature in K that frames may have; over the default it takes 32
-    bits instead of 16. With a `lattice` the splines of the frames are kept instead of their
-    samples. `resume` begins with the frames of the last checkpoint of an earlier writer.
+    A context manager: frames lie in a `Spool` beside the file, which is written at the end. With a
+    `lattice` the splines of the frames are kept instead of their samples. `resume` begins with the
+    frames of the last checkpoint of an earlier writer.
 
-    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K up,
-    material coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are
-    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
+    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK, material
+    coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are within 2⁻¹⁴,
+    2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
     """
 
     def __init__(
@@ -104,7 +95,6 @@ class SceneWriter:
         attributes: Mapping[str, Any] | None = None,
         fields: Sequence[str] = CUT_FIELDS,
         *,
-        hottest: float = HOTTEST_PACKED,
         lattice: Lattice | None = None,
         resume: UnfinishedScene | None = None,
     ) -> None:
@@ -114,7 +104,6 @@ class SceneWriter:
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         self._units = {name: units[name] for name in fields}
         self._lattice = lattice
-        self._packing = packing_for(hottest)
         self._forces: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._stack = ExitStack()
         self._resume = resume
@@ -193,7 +182,7 @@ class SceneWriter:
                 f"scene: {name!r} is {found} at {frame.time:.9g} s, expected {self.raster.shape}"
             )
         try:
-            packing = self._packing[name]
+            packing = PACKING[name]
             return np.asarray(packing.pack(values), packing.dtype)
         except ValueError as error:
             raise SceneError(f"scene: {name!r} at {frame.time:.9g} s: {error}") from None
@@ -240,7 +229,7 @@ class SceneWriter:
     def _create_fields(self, file: h5netcdf.File) -> None:
         chunks = (1, *self.raster.shape)
         for name, unit in self._units.items():
-            packing = self._packing[name]
+            packing = PACKING[name]
             variable = file.create_variable(
                 name, ("time", "y", "x"), packing.dtype, chunks=chunks, **COMPRESSION
             )
@@ -288,13 +277,6 @@ class StoredScene(Scene):
             raise ValueError(f"{self.path}: has samples, expected splines")
         kept = [index for block in self.blocks for index in block[::every]]
         return StoredScene(self.path, self.lattice.coarser(step), kept)
-
-    @property
-    def hottest(self) -> float:
-        """Temperature in K over which the file can have none."""
-        packing = self._direct.get("temperature")
-        narrow = packing and packing.step and packing.range[1] < HOTTEST_PACKED + packing.step
-        return HOTTEST_PACKED if narrow else HOTTEST
 
     @property
     def compression(self) -> str:
@@ -414,7 +396,6 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
         scene.raster,
         attributes=scene.data.attrs,
         fields=scene.fields,
-        hottest=stored.hottest if stored is not None else HOTTEST,
         lattice=stored.lattice if stored is not None and not samples else None,
     ) as writer:
         for frame in scene.frames():
