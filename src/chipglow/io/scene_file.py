@@ -148,19 +148,12 @@ class SceneWriter:
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         """Write the force history, and the energy balance with it."""
-        units = {"force_time": "s", **FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
-        given = {"cutting_force": cutting, "thrust_force": thrust, **(energies or {})}
-        if set(given) != set(units) - {"force_time"}:
-            raise SceneError(f"scene: energies {list(energies or {})}, expected {list(units)[3:]}")
-        time = np.asarray(times, dtype=np.float64)
-        if time.ndim != 1 or (np.diff(time) <= 0).any() or not np.isfinite(time).all():
-            raise SceneError("scene: force_time must be one finite, ascending row of times")
-        history = {"force_time": time}
-        for name in given:
-            history[name] = np.asarray(given[name], dtype=np.float64)
-            if history[name].shape != time.shape or not np.isfinite(history[name]).all():
-                raise SceneError(f"scene: {name!r} must be finite and have shape {time.shape}")
-        self._forces = {name: (unit, history[name]) for name, unit in units.items()}
+        units = {"force_time": "s", **FORCE_UNITS, **ENERGY_UNITS}
+        history = {"force_time": times, "cutting_force": cutting, "thrust_force": thrust}
+        history |= energies or {}
+        self._forces = {
+            name: (units[name], np.asarray(values, np.float64)) for name, values in history.items()
+        }
 
     def _kept(self, frame: Frame) -> list[NDArray[Any]]:
         """Return what the file keeps of a frame, in the order of the variables."""
