@@ -410,10 +410,6 @@ MIRRORED = UniformSurface(0.4).modified(Wedge())
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Exchange(np.zeros((0, 2)), np.zeros((0, 2))), "shapes"),
-        (lambda: Exchange(np.zeros((2, 2)), np.ones((3, 2))), "shapes"),
-        (lambda: Exchange(np.zeros((2, 2)), np.zeros((2, 2))), "no length"),
-        (lambda: Exchange(np.zeros((2, 2)), np.ones((2, 2)), 0), "rays is 0"),
         (lambda: Wedge(overhang=-40e-6), "covers the rake face"),
         (lambda: MIRRORED.on(a_scene()), "no band is given"),
         (

@@ -134,7 +134,7 @@ class Packing:
 # their blends the rounding of strain and strain rate changes the emissivity by under 6e-5. Half a
 # step of the material coordinates is 1.5 % of a sample: 5e-5 on a typical slope of a texture.
 PACKING: Final[Mapping[str, Packing]] = {
-    "temperature": Packing(np.uint16, step=0.025, offset=200.0),
+    "temperature": Packing(np.int32, step=0.025, offset=200.0),
     "plastic_strain": Packing(bits=13),
     "plastic_strain_rate": Packing(bits=11),
     "velocity_x": Packing(bits=10),
@@ -145,14 +145,3 @@ PACKING: Final[Mapping[str, Packing]] = {
     "quality": Packing(np.uint8),
 }
 """Resolution of each field of a scene."""
-
-HOTTEST_PACKED: Final = 1838.375
-"""Greatest temperature in K that 16 bits of its steps reach."""
-
-HOT: Final = Packing(np.int32, step=0.025, offset=200.0)
-"""The temperature of a scene that may be hotter."""
-
-
-def packing_for(hottest: float) -> Mapping[str, Packing]:
-    """Return the packing of each field of a scene with temperatures in K up to `hottest`."""
-    return PACKING if hottest <= HOTTEST_PACKED else {**PACKING, "temperature": HOT}

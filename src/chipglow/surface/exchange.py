@@ -48,18 +48,6 @@ class Exchange:
     rays: int = RAYS
     """Rays that leave each element, evenly over its length and the sine of their angle."""
 
-    def __post_init__(self) -> None:
-        shape = self.starts.shape
-        if len(shape) != 2 or shape[1] != 2 or shape[0] < 1 or self.ends.shape != shape:
-            raise ValueError(
-                f"exchange: starts and ends have shapes {shape} and {self.ends.shape}, "
-                "expected (elements, 2) of both"
-            )
-        if not (self.lengths > 0).all():
-            raise ValueError("exchange: an element has no length, expected over 0 m")
-        if self.rays < 1:
-            raise ValueError(f"exchange: rays is {self.rays!r}, expected 1 or more")
-
     @cached_property
     def lengths(self) -> NDArray[np.float64]:
         """Lengths of the elements in m."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
-from chipglow.io.cameras.binary import check_picture, chosen_frames
+from chipglow.io.cameras.binary import check_picture, chosen_frames, evenly
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
@@ -169,7 +169,7 @@ def _times(
 ) -> NDArray[np.float64] | None:
     """Return times of the chosen frames in s; None if neither the user nor the file says them."""
     if stated.interval is not None:
-        return np.asarray(chosen, np.float64) * stated.interval
+        return evenly(chosen, stated.interval)
     count = one.shape[axes.index("time")] if "time" in axes else 1
     if count == 1:
         return np.zeros(1)
