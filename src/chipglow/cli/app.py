@@ -122,11 +122,12 @@ def init(
     current().file(path)
 
 
-for command in run, error, cut:
-    app.command()(command)
+app.command()(run)
+app.command()(error)
+app.command()(cut)
 app.command("import")(import_source)
-for command in measure, wavelengths:
-    app.command()(command)
+app.command()(measure)
+app.command()(wavelengths)
 
 
 @app.command()
