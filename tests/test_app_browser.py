@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 from urllib.error import HTTPError
-from urllib.request import Request, urlopen
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -86,8 +86,7 @@ def visit(opening):
     """Open a page; nothing may go wrong in it or leave the machine."""
     opened, wrong = opening
     yield opened
-    refused = "Failed to load resource: the server responded with a status of 400"
-    assert [one for one in wrong if not one.startswith(refused)] == []
+    assert wrong == []
 
 
 @pytest.fixture(scope="module")
@@ -159,12 +158,6 @@ def test_a_page_opens_only_with_the_token(server, visit, model):
     for wrong in (server.split("?")[0], re.sub(r"token=.*", "token=x", server)):
         with pytest.raises(HTTPError) as refused:
             urlopen(wrong)
-        assert refused.value.code == 403
-    port = server.split("?")[0]
-    for headers in ({"Origin": "http://elsewhere.org"}, {}):
-        token = server.split("?")[1]
-        with pytest.raises(HTTPError) as refused:
-            urlopen(Request(f"{port}upload?{token}", b"x", headers))
         assert refused.value.code == 403
     page = visit()
     assert "token" not in page.url

@@ -5,6 +5,7 @@ const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
 const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
 const VIEW_WIDTH = 160; // µm
 const GRIP = 12; // pixels
+const PIECE = 2 ** 22; // bytes of a file in one message
 
 export function render({ view, model, el }) {
   const spec = JSON.parse(model.spec);
@@ -58,7 +59,7 @@ export function render({ view, model, el }) {
 
   function header() {
     const actions = element("div", { class: "actions", role: "toolbar", "aria-label": "Files and view" });
-    if (spec.uploads) {
+    if (spec.most_uploaded) {
       const file = element("input", {
         type: "file", accept: ".nc", class: "hidden", "aria-label": "Open a file", tabindex: -1,
         onchange: () => file.files.length && upload(file.files[0]),
@@ -354,13 +355,17 @@ export function render({ view, model, el }) {
 
   // Files, links, theme and size.
 
-  async function upload(file) {
+  // A file is sent in pieces, the next one when Python has the one before.
+  let sendMore = null;
+  async function upload(file, begin = 0) {
+    const refuse = (text) => showStatus({ text: `${file.name}: ${text}`, kind: "error" });
+    if (file.size > spec.most_uploaded) return refuse(`refused, a file may have up to ${spec.most_uploaded / 2 ** 20} MiB`);
     showStatus({ text: `Checking ${file.name}`, kind: "busy", progress: null });
-    const url = `upload?name=${encodeURIComponent(file.name)}`;
-    const answer = await fetch(url, { method: "POST", body: file }).catch(() => null);
-    const text = await answer?.text();
-    if (answer?.ok) location.search = `?open=${text}`;
-    else showStatus({ text: text || `${file.name}: refused, a file may have up to ${spec.uploads}`, kind: "error" });
+    const end = begin + PIECE;
+    const data = await file.slice(begin, end).arrayBuffer().catch(() => null);
+    if (data === null) return refuse("cannot be read");
+    sendMore = () => upload(file, end);
+    send("piece", { name: file.name, data, first: begin === 0, last: end >= file.size });
   }
 
   async function copyLink() {
@@ -422,7 +427,8 @@ export function render({ view, model, el }) {
       for (let one = page; one; one = one.getRootNode().host) one.setAttribute("data-lm-suppress-shortcuts", "true");
     });
   }
-  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture };
+  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
+    more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   const watcher = new ResizeObserver(refit);
   model.on("after_render", () => {

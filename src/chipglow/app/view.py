@@ -19,9 +19,9 @@ from panel.io import unlocked
 
 from chipglow.app.controls import CURSOR, Texts
 from chipglow.app.figures import TITLES, Figures
-from chipglow.app.opening import Opened, OpenedScene
+from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
-from chipglow.app.session import PHASES, TEXTURES, Session
+from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 
@@ -72,10 +72,12 @@ class View:
         opened: Opened,
         texts: Texts | None = None,
         link: Texts | None = None,
-        uploads: str = "",
+        files: OpenFiles | None = None,
         embedded: bool = False,
     ) -> None:
-        self._link, self._embedded = link or {}, embedded
+        self._link, self._files, self._embedded = link or {}, files, embedded
+        self._upload: Path | None = None
+        self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
         self._refused = self._restore(texts or {})
         if isinstance(opened, OpenedScene):
@@ -93,7 +95,7 @@ class View:
         panes = [
             pn.pane.Bokeh(one, sizing_mode="fixed", margin=0) for one in self.figures.all.values()
         ]
-        spec = json.dumps(self._spec(opened, uploads))
+        spec = json.dumps(self._spec(opened))
         self.page = Page(spec=spec, figures=panes, sizing_mode="stretch_width")
         self.page.on_msg(self._receive)
 
@@ -103,6 +105,12 @@ class View:
         if document is None:
             with suppress(RuntimeError):  # not in a notebook's kernel: nothing shows the page
                 self._loop = get_running_loop()
+
+    def end(self) -> None:
+        """End the work for a page that was closed."""
+        self.session.end()
+        if self._upload is not None:
+            self._upload.unlink(missing_ok=True)
 
     def _restore(self, texts: Texts) -> str:
         """Set the controls of a link that are possible; return what is wrong with the others."""
@@ -183,6 +191,35 @@ class View:
             data = measurement_file(picture, model)
         self._send("download", {"name": name, "data": b64encode(data).decode()})
         self._say(f"{name} is saved.")
+
+    def _on_piece(self, piece: dict[str, Any]) -> None:
+        """Append a piece of an uploaded file; the last one opens it."""
+        assert self._files is not None
+        if self._upload is None or piece["first"]:
+            self._upload = self._files.new_path()
+        with self._upload.open("ab") as file:
+            file.write(piece["data"])
+            size = file.tell()
+        if size > MOST_UPLOADED:
+            self._upload.unlink()
+        elif piece["last"]:
+            self._uploads.ask((self._upload, piece["name"]))
+            self._upload = None
+        else:
+            self._send("more", None)
+
+    def _open(self, upload: tuple[Path, str]) -> None:
+        path, name = upload
+        assert self._files is not None
+        try:
+            key = self._files.add(path, name)
+        except (ValueError, OSError):
+            path.unlink(missing_ok=True)
+            raise
+        self._notified("opened", key)
+
+    def _show_opened(self, key: str) -> None:
+        self._send("open", key)
 
     def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture, self._drawn = picture, None
@@ -272,7 +309,7 @@ class View:
         }
         self._send("values", content)
 
-    def _spec(self, opened: Opened, uploads: str) -> dict[str, Any]:
+    def _spec(self, opened: Opened) -> dict[str, Any]:
         is_scene = isinstance(opened, OpenedScene)
         left, right, bottom, top = self.figures.extent
         views = {"whole": "Whole view", CURSOR: "Cursor"}
@@ -282,7 +319,7 @@ class View:
         return {
             "name": opened.name,
             "embedded": self._embedded,
-            "uploads": uploads,
+            "most_uploaded": MOST_UPLOADED if self._files else 0,
             "rows": [
                 {name: getattr(row, name) for name in _OF_CONTROL}
                 | {
