@@ -183,8 +183,8 @@ class CuttingSimulation:
         state = _State(self, window.interval)
         if isinstance(self.tool_temperature, ToolBody) and resume is None:
             state.warm(self.steady_tool(), self.tool_temperature)
-        picture = self._picture(raster, state)
-        coarse = self._picture(preview.raster, state) if preview is not None else None
+        picture = state.picture(raster)
+        coarse = state.picture(preview.raster) if preview is not None else None
         last = recorder.last
         records = np.empty((last, 2 + ENERGIES))
         done = restore(state, resume, records) if resume is not None else 0
@@ -309,20 +309,6 @@ class CuttingSimulation:
     def lattice(self, raster: Raster) -> Lattice:
         """Return the nodes whose splines the frames are; the raster must be simulated."""
         grid = _grid(self.numerics)
-        self._check_raster(raster, grid)
-        return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
-
-    def _picture(self, raster: Raster, state: "_State") -> Picture:
-        self._check_raster(raster, state.grid)
-        return Picture(
-            state.grid,
-            raster,
-            self.tool,
-            state.tool_fraction,
-            self.conditions.initial_temperature,
-        )
-
-    def _check_raster(self, raster: Raster, grid: Grid) -> None:
         left, right, bottom, top = raster.extent
         edge = 3 * grid.cell
         inside = (
@@ -336,6 +322,7 @@ class CuttingSimulation:
                 f"field of view: x {left * 1e6:.0f} to {right * 1e6:.0f} um, "
                 f"y {bottom * 1e6:.0f} to {top * 1e6:.0f} um reaches beyond the simulated region"
             )
+        return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
 
 
 class _State:
@@ -576,6 +563,10 @@ class _State:
             filled, self.tool, heat, capacity, mass, grid,
         )  # fmt: skip
         return_heat(points, count, rise, grid)
+
+    def picture(self, raster: Raster) -> Picture:
+        """Return the maker of frames of a raster."""
+        return Picture(self.grid, self.simulation.lattice(raster), self.tool_fraction)
 
     def frame(self, picture: Picture) -> Frame:
         """Return the fields now; the strain rate is the mean over the last interval."""

@@ -131,7 +131,6 @@ class FeatureSurface(Surface, Part):
         return replace(self, seed=self.seed + number) if number else self
 
     def without_texture(self) -> Self:
-        """See `Surface.without_texture`."""
         return replace(
             self,
             chip=Emissivity(self.chip.mean),

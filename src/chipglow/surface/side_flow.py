@@ -97,14 +97,14 @@ class Sections:
         heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
         section = np.floor(along / raster.spacing).astype(np.intp)
         beside = np.flatnonzero((section >= 0) & (section < count))
-        number, weight, known = _between(elements, depth.ravel()[beside])
+        known, number, weight = _between(elements, depth.ravel()[beside])
         beside = beside[known]
-        placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number[known])
+        placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number)
         return cls(
             *_samples_at(raster, tool, foot, _looked_up(elements, raster.spacing)),
             np.stack(_samples_at(raster, tool, foot, heights)),
             np.stack(placed),
-            weight[known],
+            weight,
         )
 
     def touching(self, material: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -333,23 +333,18 @@ def _looked_up(elements: SideElements, spacing: float) -> NDArray[np.float64]:
 
 
 def _between(
-    elements: SideElements, depth: NDArray[np.float64]
-) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the element before each depth, the way to the next, and whether any is so near."""
-    middles = elements.depths
-    number, weight = np.zeros(depth.size, np.intp), np.zeros(depth.size)
-    known = np.zeros(depth.size, np.bool_)
-    sides = (
-        (range(elements.tool_side), (depth < 0) & (depth >= middles[0])),
-        (range(elements.chip.start, middles.size), (depth > 0) & (depth <= middles[-1])),
-    )
-    for part, near in sides:
-        if len(part) > 1:
-            place = np.interp(depth[near], middles[part], np.arange(len(part)))
-            first = np.minimum(place.astype(np.intp), len(part) - 2)
-            number[near], weight[near] = part.start + first, place - first
-            known |= near
-    return number, weight, known
+    elements: SideElements, depth: Array
+) -> tuple[NDArray[np.bool_], NDArray[np.intp], Array]:
+    """Return which depths are beside a side, the element before each of them, and the way on."""
+    middles, in_tool = elements.depths, depth < 0
+    first = np.where(in_tool, 0, elements.chip.start)
+    last = np.where(in_tool, elements.tool_side, middles.size) - 1
+    known = (first < last) & (depth != 0) & (depth >= middles[0]) & (depth <= middles[-1])
+    depth = depth[known]
+    number = np.searchsorted(middles, depth) - 1
+    number = np.clip(number, first[known], last[known] - 1)
+    weight = (depth - middles[number]) / (middles[number + 1] - middles[number])
+    return known, number, np.clip(weight, 0.0, 1.0)
 
 
 def _samples_at(
