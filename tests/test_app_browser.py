@@ -212,20 +212,6 @@ def test_of_a_link_that_is_wrong_in_part_the_rest_counts(visit, model):
     assert page.locator("#status.error").is_visible()
 
 
-def test_the_wheel_leads_no_further_than_three_times_the_image(page):
-    page.mouse.move(*place(page, "measured_figure", -300, 200))
-    for _ in range(15):
-        page.mouse.wheel(0, 2000)
-    page.wait_for_timeout(300)
-    left, right, bottom, top = page.evaluate("""() => {
-      const { x_range, y_range } = Bokeh.documents[0].get_model_by_name("measured_figure");
-      return [x_range.start, x_range.end, y_range.start, y_range.end];
-    }""")
-    assert -1280.001 <= left < right <= 700.001
-    assert -620.001 <= bottom < top <= 1000.001
-    assert (right - left) / (top - bottom) == pytest.approx(660 / 540, rel=0.02)
-
-
 def test_a_line_and_the_cursor_are_dragged(page, model):
     (x, y), _ = model.controls.initial.line("band_line").corners
     start = place(page, "measured_figure", 1e6 * x, 1e6 * y)
