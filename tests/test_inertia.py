@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
-from chipglow.cli.cutting import say_of_cut
 from chipglow.cli.screen import begin
+from chipglow.cli.studies import say_of_cut
 from chipglow.cutting import (
     AISI_1045,
     CuttingConditions,
