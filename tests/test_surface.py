@@ -343,7 +343,10 @@ def emissivity_of_a_bare_frame():
         (lambda: Emissivity(1.0, 0.1), "deviation: 0.1, expected up to 0 about a mean of 1"),
         (lambda: UniformSurface(-0.5), "UniformSurface.emissivity: -0.5, expected 0 to 1"),
         (lambda: texture(grain=0.0), "grain must be over 0 m, got 0.0 m"),
-        (lambda: CHIP_1.on(a_scene()), "no material coordinates for 'material', expected 'mean'"),
+        (
+            lambda: CHIP_1.on(a_scene()),
+            "no coordinates of the material for 'material'",
+        ),
         (emissivity_of_another_shape, r"has shape \(10, 60\), expected \(50, 60\)"),
         (emissivity_of_a_bare_frame, "frame: has no material coordinates"),
         (lambda: PhaseSurface(0.4, 0.2, 1700.0, 1600.0), "liquidus: 1600 K, expected over"),
