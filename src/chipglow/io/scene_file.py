@@ -4,7 +4,7 @@ import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import KW_ONLY, dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from importlib.metadata import version
 from importlib.resources import files
 from math import prod
@@ -255,7 +255,13 @@ class StoredScene(Scene):
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
         shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
         chunks = CACHED_BYTES // max(prod(shape) * np.dtype(np.float32).itemsize, 1)
-        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, datasets))
+
+        @lru_cache(chunks)
+        def chunk(name: str, index: int) -> NDArray[Any]:
+            with _telling(path, name, index):
+                return read_chunk(datasets[name], index)
+
+        self._chunk = chunk
         super().__init__(data)
 
     def coarser(self, step: int, every: int = 1) -> "StoredScene":
@@ -301,13 +307,6 @@ class StoredScene(Scene):
             with _telling(self.path, name, index):
                 return super()._read(name, index)
         return self._direct[name].unpack(self._chunk(name, index))
-
-
-def _read_chunk(
-    path: Path, datasets: Mapping[str, h5py.Dataset], name: str, index: int
-) -> NDArray[Any]:
-    with _telling(path, name, index):
-        return read_chunk(datasets[name], index)
 
 
 @contextmanager
