@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -289,24 +288,6 @@ def test_a_feature_keeps_its_velocity_while_it_is_not_seen():
     scene = a_scene(times, plastic_strain=0.9, plastic_strain_rate=rate, velocity_y=3.0)
     field = replace(CHIP_1, follow="mean").on(scene)
     np.testing.assert_allclose(field.bare.shift(2e-6)[2], [0.0, 6e-6])
-
-
-def test_result_does_not_depend_on_the_number_of_threads():
-    strain = np.random.default_rng(5).uniform(0.0, 0.8, RASTER.shape)
-    velocity = np.random.default_rng(6).uniform(0.0, 5.0, RASTER.shape)
-    scene = a_scene((0.0, 1e-6), plastic_strain=strain, velocity_x=velocity, velocity_y=velocity)
-
-    def maps(threads):
-        before = numba.get_num_threads()
-        numba.set_num_threads(threads)
-        try:
-            field = replace(CHIP_2, follow="mean").on(scene)
-            return field.bare.shifts, field.emissivity(scene.frame(1))
-        finally:
-            numba.set_num_threads(before)
-
-    for one, many in zip(maps(1), maps(numba.config.NUMBA_NUM_THREADS), strict=True):
-        np.testing.assert_array_equal(one, many)
 
 
 def test_a_uniform_surface_is_black_but_for_the_void():
