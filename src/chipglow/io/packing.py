@@ -93,31 +93,23 @@ class Packing:
             return {}
         return {"scale_factor": np.float32(self.step), "add_offset": np.float32(self.offset)}
 
-    @property
-    def range(self) -> tuple[float, float]:
-        """Smallest and largest value that integers reach."""
-        limits = np.iinfo(self.dtype)
-        return self.offset + self.step * limits.min, self.offset + self.step * limits.max
-
     def pack(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values as they are stored; raise ValueError if one is beyond the range."""
         if self.step:
-            return self._counts(values)
+            counts = values - np.float32(self.offset)
+            counts *= np.float32(1.0 / self.step)
+            np.rint(counts, out=counts)
+            limits = np.iinfo(self.dtype)
+            if not (limits.min <= float(counts.min()) and float(counts.max()) <= limits.max):
+                worst = float(values.flat[np.abs(counts).argmax()])
+                low, high = (self.offset + self.step * end for end in (limits.min, limits.max))
+                raise ValueError(f"{worst:.7g} is beyond the file's range, {low:g} to {high:g}")
+            return counts.astype(self.dtype)
         if self.bits:
             # Veltkamp's splitting: the large product pushes the lower bits out.
             product = values * np.float32(2 ** (23 - self.bits) + 1)
             return np.asarray(product - (product - values))
         return values
-
-    def _counts(self, values: NDArray[Any]) -> NDArray[Any]:
-        lowest, highest = self.range
-        least, greatest = float(values.min()), float(values.max())
-        if not (lowest <= least and greatest <= highest):
-            wrong = greatest if lowest <= least else least
-            raise ValueError(f"{wrong:.7g} is beyond the file's range, {lowest:g} to {highest:g}")
-        counts = values - np.float32(self.offset)
-        counts *= np.float32(1.0 / self.step)
-        return np.rint(counts, out=counts).astype(self.dtype)
 
     def unpack(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Return a copy of the values of what `pack` returned."""

@@ -3,7 +3,8 @@
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import lru_cache, partial
+from dataclasses import KW_ONLY, dataclass
+from functools import lru_cache
 from importlib.metadata import version
 from importlib.resources import files
 from math import prod
@@ -75,6 +76,7 @@ CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 """The fields that the cutting simulation knows."""
 
 
+@dataclass
 class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
@@ -87,29 +89,24 @@ class SceneWriter:
     2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
     """
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        raster: Raster,
-        tool: Tool | None = None,
-        attributes: Mapping[str, Any] | None = None,
-        fields: Sequence[str] = CUT_FIELDS,
-        *,
-        lattice: Lattice | None = None,
-        resume: UnfinishedScene | None = None,
-    ) -> None:
-        self.path = Path(path)
-        self.raster = raster
-        self._attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
+    path: str | os.PathLike[str]
+    raster: Raster
+    tool: Tool | None = None
+    attributes: Mapping[str, Any] | None = None
+    fields: Sequence[str] = CUT_FIELDS
+    _: KW_ONLY
+    lattice: Lattice | None = None
+    resume: UnfinishedScene | None = None
+
+    def __post_init__(self) -> None:
+        self._path = Path(self.path)
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
-        self._units = {name: units[name] for name in fields}
-        self._lattice = lattice
+        self._units = {name: units[name] for name in self.fields}
         self._forces: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._stack = ExitStack()
-        self._resume = resume
 
     def __enter__(self) -> "SceneWriter":
-        self._spool = self._stack.enter_context(spooled(self.path, self._resume))
+        self._spool = self._stack.enter_context(spooled(self._path, self.resume))
         return self
 
     @uninterrupted()
@@ -124,7 +121,7 @@ class SceneWriter:
                 raise error
             if not self._spool.times:
                 raise SceneError(f"{self.path}: no frame was written, expected 1 or more")
-            write_hdf5(self.path, self._write)
+            write_hdf5(self._path, self._write)
 
     def append(self, frame: Frame) -> None:
         """Write the next frame."""
@@ -157,12 +154,12 @@ class SceneWriter:
 
     def _kept(self, frame: Frame) -> list[NDArray[Any]]:
         """Return what the file keeps of a frame, in the order of the variables."""
-        if self._lattice is None:
+        if self.lattice is None:
             return [self._packed(name, frame) for name in self._units]
-        if frame.splines is None or frame.splines.nodes.shape != self._lattice.shape:
+        if frame.splines is None or frame.splines.nodes.shape != self.lattice.shape:
             raise SceneError(
                 f"scene: the frame at {frame.time:.9g} s has no splines of shape "
-                f"{self._lattice.shape}, expected those of the lattice"
+                f"{self.lattice.shape}, expected those of the lattice"
             )
         kept = spline_file.rounded(frame.splines)
         return [np.asarray(kept[name], np.float32) for name in spline_file.CHUNKED]
@@ -186,7 +183,7 @@ class SceneWriter:
             h5netcdf.File(hdf, "w") as file,
         ):
             self._create_variables(file)
-            chunked = spline_file.CHUNKED if self._lattice else tuple(self._units)
+            chunked = spline_file.CHUNKED if self.lattice else tuple(self._units)
             for index, chunk in enumerate(self._spool.chunks()):
                 frame, place = divmod(index, len(chunked))
                 dataset = hdf[chunked[place]].id
@@ -199,7 +196,8 @@ class SceneWriter:
         file.dimensions = {"time": times.size, "y": rows, "x": columns}
         file.attrs.update(
             {
-                **self._attributes,
+                **(self.attributes or {}),
+                **(tool_attributes(self.tool) if self.tool else {}),
                 "Conventions": "CF-1.11",
                 "chipglow_version": version("chipglow"),
                 "chipglow_format": SCENE_FORMAT,
@@ -208,8 +206,8 @@ class SceneWriter:
         for name, (dimension, values, attributes) in raster_coordinates(self.raster, times).items():
             variable = file.create_variable(name, (dimension,), data=values, **COMPRESSION)
             variable.attrs.update(attributes)
-        if self._lattice is not None:
-            spline_file.create(file, self._lattice)
+        if self.lattice is not None:
+            spline_file.create(file, self.lattice)
         else:
             self._create_fields(file)
         if self._forces:
@@ -257,7 +255,13 @@ class StoredScene(Scene):
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
         shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
         chunks = CACHED_BYTES // max(prod(shape) * np.dtype(np.float32).itemsize, 1)
-        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, datasets))
+
+        @lru_cache(chunks)
+        def chunk(name: str, index: int) -> NDArray[Any]:
+            with _telling(path, name, index):
+                return read_chunk(datasets[name], index)
+
+        self._chunk = chunk
         super().__init__(data)
 
     def coarser(self, step: int, every: int = 1) -> "StoredScene":
@@ -303,13 +307,6 @@ class StoredScene(Scene):
             with _telling(self.path, name, index):
                 return super()._read(name, index)
         return self._direct[name].unpack(self._chunk(name, index))
-
-
-def _read_chunk(
-    path: Path, datasets: Mapping[str, h5py.Dataset], name: str, index: int
-) -> NDArray[Any]:
-    with _telling(path, name, index):
-        return read_chunk(datasets[name], index)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from numba import njit
@@ -82,7 +82,12 @@ class FeatureSurface(Surface, Part):
         """Textures by the names of `FEATURES`; their ``standard_deviation`` is the realised one."""
         streams = np.random.SeedSequence(self.seed).spawn(len(FEATURES))
         return {
-            name: self._texture(getattr(self, name), np.random.default_rng(stream))
+            name: Texture.random(
+                getattr(self, name),
+                self.grain,
+                np.random.default_rng(stream),
+                restore_standard_deviation=self.restore_standard_deviation,
+            )
             for name, stream in zip(FEATURES, streams, strict=True)
         }
 
@@ -108,14 +113,12 @@ class FeatureSurface(Surface, Part):
                 "apart; expected a surface of another kind, such as {kind: uniform, emissivity: "
                 "0.5}"
             )
-        if self.follow == "mean" and "velocity_x" not in scene.fields:
+        needed = {"mean": ("velocity_x", "velocity"), "material": ("material_x", "coordinates")}
+        field, what = needed.get(self.follow, ("plastic_strain", ""))
+        if field not in scene.fields:
             raise ValueError(
-                "follow: the scene has no velocity for 'mean', expected 'material' or 'none'"
-            )
-        if self.follow == "material" and not scene.has_material_coordinates:
-            raise ValueError(
-                "follow: the scene has no material coordinates for 'material', expected 'mean' or "
-                "'none'"
+                f"follow: the scene has no {what} of the material for {self.follow!r}, expected "
+                "another of 'material', 'mean' and 'none'"
             )
         times, shifts = scene.times, np.zeros((len(scene.times), 3, 2))
         if self.follow == "mean":
@@ -131,21 +134,8 @@ class FeatureSurface(Surface, Part):
         return replace(self, seed=self.seed + number) if number else self
 
     def without_texture(self) -> Self:
-        return replace(
-            self,
-            chip=Emissivity(self.chip.mean),
-            shear_band=Emissivity(self.shear_band.mean),
-            workpiece=Emissivity(self.workpiece.mean),
-            tool=Emissivity(self.tool.mean),
-        )
-
-    def _texture(self, emissivity: Emissivity, generator: np.random.Generator) -> Texture:
-        return Texture.random(
-            emissivity,
-            self.grain,
-            generator,
-            restore_standard_deviation=self.restore_standard_deviation,
-        )
+        means: Any = {name: Emissivity(getattr(self, name).mean) for name in FEATURES}
+        return replace(self, **means)
 
 
 CHIP_1: Final = FeatureSurface(chip=Emissivity(0.42, 0.07), shear_band=Emissivity(0.53, 0.05))
