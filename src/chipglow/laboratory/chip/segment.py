@@ -80,7 +80,7 @@ class Instant:
         """Find the band during an exposure."""
         indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
         rate = _mean(scene, "plastic_strain_rate", indices, weights)
-        band = _band(scene, rate, scene.field("material", indices[len(indices) // 2]))
+        band = shear_band(scene, rate, scene.field("material", indices[len(indices) // 2]))
         if band is None:
             return cls(start, None, np.zeros(0))
         temperature = _mean(scene, "temperature", indices, weights)
@@ -102,8 +102,6 @@ class Segment:
     """Length over which the chip touches the rake face in m."""
     momentary_band: ShearBand | None
     """The band in `frame` alone, which motion does not blur; None if undefined."""
-    sweep: float
-    """Travel in m of the band's middle across itself during the exposure; NaN if undefined."""
 
     @property
     def moment(self) -> ShearBand:
@@ -128,8 +126,7 @@ class Segment:
             tool=scene.tool,
             band=instant.band,
             contact_length=contact_length(scene.raster, workpiece, scene.tool, touching),
-            momentary_band=_band(scene, frame.needed("plastic_strain_rate"), frame.material),
-            sweep=_sweep(scene, indices, instant.band),
+            momentary_band=shear_band(scene, frame.needed("plastic_strain_rate"), frame.material),
         )
 
 
@@ -140,23 +137,12 @@ def _mean(scene: Scene, field_name: str, indices: range, weights: Array) -> Arra
     return total
 
 
-def _band(
+def shear_band(
     scene: Scene, rate: NDArray[np.floating], material: NDArray[np.integer]
 ) -> ShearBand | None:
+    """Find the shear band in a strain rate of a scene; None without one."""
     assert scene.tool is not None
     try:
         return find_shear_band(scene.raster, rate, material == Material.WORKPIECE, scene.tool)
     except NoShearBandError:
         return None
-
-
-def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
-    """Return the travel of the largest strain rate on the line across the band's middle."""
-    line = band.across(40e-6, scene.raster.spacing / 2)
-    places = []
-    for index in (indices[0], indices[-1]):
-        rate = scene.field("plastic_strain_rate", index)
-        values = np.nan_to_num(sample(rate, scene.raster, line.points))
-        inside = 0 < values.argmax() < values.size - 1
-        places.append(float(line.distance[values.argmax()]) if inside else nan)
-    return abs(places[1] - places[0])
