@@ -516,6 +516,8 @@ def test_the_band_of_the_study_is_the_chips(study, chip):
     assert np.abs(offset[inner]).max() < 1e-6
     assert segment.momentary_band is not None
     assert segment.band_width == pytest.approx(chip.band_width, rel=0.03)
+    drift = chip.shear_angle_drift * CAMERA.integration_time * band.length / 2
+    assert segment.sweep == pytest.approx(drift, abs=2e-6)
     period = study.cut.forces.segmentation.period
     assert period == pytest.approx(chip.segment_period, rel=0.02)
 

@@ -394,12 +394,13 @@ def test_a_width_is_found_where_the_series_meets_the_value():
 
 
 def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_path):
+    segments = tuple(replace(segment, sweep=float("nan")) for segment in result.cut.segments)
     ideal = replace(result.camera, psf=None, lower_limit=None)
     unseen = result.data.copy()
     unseen["measured"] = unseen.measured.where(
         (unseen.reading != "rake") | (unseen.pixel_phase != 1)
     )
-    bare = replace(of_cut(result, forces=None), camera=ideal, data=unseen)
+    bare = replace(of_cut(result, forces=None, segments=segments), camera=ideal, data=unseen)
     write_report(bare, tmp_path, TITLE, STUDY, PROVENANCE, study=PAPERS)
     row = next(row for row in result_rows(bare) if row.key == "rake_error_degC")
     assert (row.cells["mean"], row.differs) == ("–", None)

@@ -102,6 +102,8 @@ class Segment:
     """Length over which the chip touches the rake face in m."""
     momentary_band: ShearBand | None
     """The band in `frame` alone, which motion does not blur; None if undefined."""
+    sweep: float
+    """Travel in m of the band's middle across itself during the exposure; NaN if undefined."""
 
     @property
     def moment(self) -> ShearBand:
@@ -127,6 +129,7 @@ class Segment:
             band=instant.band,
             contact_length=contact_length(scene.raster, workpiece, scene.tool, touching),
             momentary_band=shear_band(scene, frame.needed("plastic_strain_rate"), frame.material),
+            sweep=_sweep(scene, indices, instant.band),
         )
 
 
@@ -146,3 +149,15 @@ def shear_band(
         return find_shear_band(scene.raster, rate, material == Material.WORKPIECE, scene.tool)
     except NoShearBandError:
         return None
+
+
+def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
+    """Return the travel of the largest strain rate on the line across the band's middle."""
+    line = band.across(40e-6, scene.raster.spacing / 2)
+    places = []
+    for index in (indices[0], indices[-1]):
+        rate = scene.field("plastic_strain_rate", index)
+        values = np.nan_to_num(sample(rate, scene.raster, line.points))
+        inside = 0 < values.argmax() < values.size - 1
+        places.append(float(line.distance[values.argmax()]) if inside else nan)
+    return abs(places[1] - places[0])
