@@ -319,7 +319,7 @@ def test_a_scene_of_temperature_alone_is_seen_with_one_emissivity(tmp_path):
     hot = np.full((1, 30, 40), 900.0)
     scene = chipglow.Scene.from_fields(raster, [0.0], {"temperature": hot})
     view = chipglow.explore(scene)
-    assert "plastic_strain" not in view.spec
+    assert "plastic_strain" not in view.html
     opened = open_any(None)
     assert opened.controls.row("scene_image").options.keys() >= {"speed", "plastic_strain"}
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, sqrt
 from pathlib import Path
+from secrets import token_urlsafe
+from tempfile import TemporaryDirectory
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -27,6 +29,8 @@ QUICK_SAMPLES: Final = 35_000
 
 MOST_UPLOADED: Final = 512 * 1024**2
 """Maximum size of an uploaded file in bytes."""
+
+_MOST_OPEN: Final = 8
 
 _PATIENCE: Final = 4.0
 """Factor on the time that reading an upload may take: the server has other work."""
@@ -92,6 +96,34 @@ def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
     if is_measurement(path):
         return OpenedMeasurement.of(read_measurement(path), path.name)
     return OpenedScene.of(open_scene(path), study or Study(), path.name, from_file=True)
+
+
+class OpenFiles:
+    """What the command opened, and what was uploaded since: the key of an upload is its name."""
+
+    def __init__(self, first: Opened) -> None:
+        self._folder = TemporaryDirectory(prefix="chipglow-app-")
+        self.folder = Path(self._folder.name)
+        self._opened = {"": first}
+
+    def find(self, key: str) -> Opened | None:
+        """Return an upload by its key, the first file without one; None if it is not open."""
+        return self._opened.get(key)
+
+    def new_path(self) -> Path:
+        """Return a path for an upload, which nobody can guess."""
+        return self.folder / f"{token_urlsafe(12)}.nc"
+
+    def add(self, path: Path, name: str) -> str:
+        """Open an uploaded file and return its key; the oldest of too many is removed."""
+        self._opened[path.stem] = open_uploaded(path, name)
+        for old in list(self._opened)[1:-_MOST_OPEN]:
+            del self._opened[old]
+            (self.folder / f"{old}.nc").unlink(missing_ok=True)
+        return path.stem
+
+    def close(self) -> None:
+        self._folder.cleanup()
 
 
 def open_uploaded(path: Path, name: str) -> Opened:
