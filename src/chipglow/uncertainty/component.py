@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from chipglow.quantities import Array
+
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
 
 _MOST: Final = 200_000_000
@@ -89,12 +91,12 @@ class Component:
             self.effects.setflags(write=False)
 
     @property
-    def variance(self) -> NDArray[np.float64]:
+    def variance(self) -> Array:
         """Contribution to the variance of each value, shape (values,)."""
         return np.asarray(_squared(self.effects).sum(axis=1), np.float64).ravel()
 
     @property
-    def fourth_moment(self) -> NDArray[np.float64]:
+    def fourth_moment(self) -> Array:
         """Sum of u⁴/ν in the formula of Welch and Satterthwaite, shape (values,)."""
         if self.cause.pooled or self.cause.errors == 1:
             return self.variance**2 / self.cause.degrees_of_freedom
@@ -119,7 +121,7 @@ class Component:
         cause = replace(self.cause, errors=len(errors), parts=())
         return Component(cause, self.effects[:, errors])
 
-    def scaled(self, factors: NDArray[np.float64]) -> Any:
+    def scaled(self, factors: Array) -> Any:
         """Return the effects on values that are multiplied by factors of shape (values,)."""
         if sparse.issparse(self.effects):
             found = self.effects.copy()

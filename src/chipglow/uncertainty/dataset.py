@@ -14,9 +14,9 @@ from typing import Any, Final
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import sparse
 
+from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.estimate import Estimate, factor
 
@@ -86,7 +86,7 @@ def from_xarray(data: xr.Dataset, name: str) -> Estimate:
     return Estimate(variable.values, tuple(components), *remarks)
 
 
-def _parts(component: Component, name: str) -> Iterator[tuple[NDArray[np.float64], dict[str, Any]]]:
+def _parts(component: Component, name: str) -> Iterator[tuple[Array, dict[str, Any]]]:
     """Yield values and attributes of the uncertainty variables of a component."""
     if component.per_element:
         yield component.effects.diagonal(), {**_attributes(component.cause, 0), "form": _RANDOM}
@@ -174,9 +174,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
     return cause, int(attributes.get("error", 0)), effects
 
 
-def _effects(
-    data: xr.Dataset, part: xr.DataArray, label: str, values: NDArray[np.float64]
-) -> tuple[Any, bool]:
+def _effects(data: xr.Dataset, part: xr.DataArray, label: str, values: Array) -> tuple[Any, bool]:
     """Return the effects of an uncertainty variable, and whether they are random."""
     form = dict.fromkeys(part.dims, _RANDOM)
     params: tuple[str, ...] = ()

@@ -3,15 +3,16 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, cast
+from typing import Any, Literal
 from uuid import uuid4
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.special import stdtrit
 
+from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component, Distribution
 
 
@@ -44,7 +45,7 @@ class Estimate:
     they are the products of effects.
     """
 
-    values: NDArray[np.float64]
+    values: Array
     components: tuple[Component, ...] = ()
     unevaluated: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -164,28 +165,28 @@ class Estimate:
         return tuple(dict.fromkeys((*known, *self.unevaluated)))
 
     @cached_property
-    def standard_uncertainty(self) -> NDArray[np.float64]:
+    def standard_uncertainty(self) -> Array:
         """Combined standard uncertainty (JCGM 100:2008, 5.1.2), of the shape of the values."""
         return np.sqrt(self._summed(component.variance for component in self.components))
 
     @cached_property
-    def degrees_of_freedom(self) -> NDArray[np.float64]:
+    def degrees_of_freedom(self) -> Array:
         """Effective number by Welch and Satterthwaite (JCGM 100:2008, G.4.1), of that shape."""
         parts = self._summed(component.fourth_moment for component in self.components)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(parts > 0, self.standard_uncertainty**4 / parts, np.inf)
 
-    def coverage_factor(self, level: float = 0.95) -> NDArray[np.float64]:
+    def coverage_factor(self, level: float = 0.95) -> Array:
         """Return Student's t of a level of confidence (JCGM 100:2008, G.3), of that shape."""
         if not 0 < level < 1:
             raise ValueError(f"level of confidence: is {level!r}, expected between 0 and 1")
         return np.asarray(stdtrit(self.degrees_of_freedom, (1 + level) / 2), np.float64)
 
-    def expanded_uncertainty(self, level: float = 0.95) -> NDArray[np.float64]:
+    def expanded_uncertainty(self, level: float = 0.95) -> Array:
         """Return coverage factor times standard uncertainty (JCGM 100:2008, 6.2.1)."""
         return self.coverage_factor(level) * self.standard_uncertainty
 
-    def contribution(self, name: str) -> NDArray[np.float64]:
+    def contribution(self, name: str) -> Array:
         """Return the standard uncertainty of one line of the budget; NaN if it is unevaluated."""
         found = self.of_line(name)
         if not found.components and name in self.unevaluated:
@@ -217,7 +218,7 @@ class Estimate:
         kept = tuple(one for one in self.components if one.cause.name != name)
         return replace(self, components=kept)
 
-    def effect(self, name: str) -> NDArray[np.float64]:
+    def effect(self, name: str) -> Array:
         """Return the signed effect of the systematic component of a name; 0 if there is none."""
         for component in self.components:
             if component.cause.key == (name, "") and component.cause.errors == 1:
@@ -245,7 +246,7 @@ class Estimate:
             {"cause": np.array(self.names, dtype=object)},
         )
 
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Array:
         """Return the covariance of all values, flat: JCGM 100:2008, H.2.3."""
         total = np.zeros((self.values.size, self.values.size))
         for component in self.components:
@@ -253,14 +254,14 @@ class Estimate:
             total += product.toarray() if sparse.issparse(product) else product
         return total
 
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(self) -> Array:
         """Return the correlation of all values, flat; NaN with an exact one."""
         covariance = self.covariance()
         spread = np.sqrt(np.diag(covariance))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(covariance / np.outer(spread, spread))
 
-    def _summed(self, parts: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def _summed(self, parts: Iterable[Array]) -> Array:
         return sum(parts, np.zeros(self.values.size)).reshape(self.shape)
 
     def __getitem__(self, index: Any) -> "Estimate":
@@ -348,9 +349,9 @@ def as_estimate(value: Any) -> Estimate:
 
 
 def chain(
-    values: NDArray[np.float64],
+    values: Array,
     inputs: Sequence[Estimate],
-    partials: Sequence[NDArray[np.float64]],
+    partials: Sequence[Array],
 ) -> Estimate:
     """Return the estimate of values that were computed from inputs, element by element.
 
@@ -397,9 +398,7 @@ def propagate(
     return chain(values, estimates, partials)
 
 
-def _partial(
-    function: Callable[..., Any], estimates: Sequence[Estimate], index: int
-) -> NDArray[np.float64]:
+def _partial(function: Callable[..., Any], estimates: Sequence[Estimate], index: int) -> Array:
     """Return the slope over one standard uncertainty to both sides; 0 where an input is exact."""
     places = [one.values for one in estimates]
     step = estimates[index].standard_uncertainty
@@ -422,7 +421,7 @@ def remarks(estimates: Iterable[Estimate]) -> tuple[tuple[str, ...], tuple[str, 
     )
 
 
-def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def factor(covariance: Array, name: str) -> Array:
     """Return effects of independent errors that have a covariance, shape (values, errors)."""
     scale = np.sqrt(np.abs(np.diag(covariance)))
     scale[scale == 0.0] = 1.0
@@ -437,7 +436,7 @@ def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
             "direction, relative to the values' own, expected 0 or more"
         )
     effects = scale[:, None] * directions * np.sqrt(np.maximum(variances, 0.0))
-    return cast(NDArray[np.float64], effects)
+    return np.asarray(effects, np.float64)
 
 
 def check_same(one: Cause, other: Cause) -> None:
@@ -449,7 +448,7 @@ def check_same(one: Cause, other: Cause) -> None:
         )
 
 
-def _diagonal(values: NDArray[np.float64]) -> Any:
+def _diagonal(values: Array) -> Any:
     """Return a sparse array with values on its diagonal, those that are 0 too."""
     return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
 

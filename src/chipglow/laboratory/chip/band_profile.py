@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
-from chipglow.laboratory.chip.frames import budget_columns, frame_numbers, unit_table
+from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
 from chipglow.laboratory.chip.ridge import (
     NoShearBandError,
     across_curve,
@@ -119,14 +119,12 @@ class BandProfile:
 
     def to_frame(self) -> pd.DataFrame:
         """Return every point of each frame's band; one row each."""
-        budget = budget_columns(self.estimate, BAND_BUDGET)
-        data = self.to_dataset().assign({name: (_DIMS, part) for name, part in budget.items()})
         names = {
             **{"time": "time_us", "stage": "stage", "distance": "distance_um"},
             **{"x": "x_um", "y": "y_um", "temperature": "radiance_temperature_degC"},
-            **{name: name for name in budget},
         }
-        return unit_table(data, names).dropna(subset="x_um", ignore_index=True)
+        table = budget_table(self.to_dataset(), names, self.estimate, BAND_BUDGET)
+        return table.dropna(subset="x_um", ignore_index=True)
 
     def to_dataset(self) -> xr.Dataset:
         """Return every point of each frame's band as arrays in SI units."""

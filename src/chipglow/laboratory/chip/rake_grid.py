@@ -16,12 +16,11 @@ from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.laboratory.chip.frames import (
     FRAMES,
-    budget_columns,
+    budget_table,
     frame_mean,
     frame_numbers,
     frame_scatter,
     known_uncertainty,
-    unit_table,
 )
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
@@ -117,14 +116,11 @@ class RakeGrid:
 
     def to_frame(self) -> pd.DataFrame:
         """Return every square of every frame; one row each."""
-        budget = budget_columns(self.estimate, RAKE_BUDGET)
-        data = self.to_dataset().assign({name: (_DIMS, part) for name, part in budget.items()})
         names = {
             **{"time": "time_us", "depth": "depth_um", "along": "along_um", "mean": "mean_degC"},
             **{"standard_deviation": "standard_deviation_K", "count": "usable_pixels"},
-            **{name: name for name in budget},
         }
-        return unit_table(data, names)
+        return budget_table(self.to_dataset(), names, self.estimate, RAKE_BUDGET)
 
     def to_dataset(self) -> xr.Dataset:
         """Return every square of every frame as arrays in SI units."""
