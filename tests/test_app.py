@@ -488,26 +488,19 @@ print(app.files.folder.exists())
     assert ended.stdout == "False\n"
 
 
-def test_a_notebooks_page_changes_while_no_message_of_it_is_taken():
+def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
     """Panel drops what another thread changes while it takes a message of a notebook's page."""
-    from bokeh.document import Document
+    from chipglow.app.view import JSComponent, Page
 
-    from chipglow.app.view import Page
+    taken, ended, changed = Event(), Event(), Event()
 
-    page, taken, ended, changed = Page(), Event(), Event(), Event()
-    document = Document()
-    root = page.get_root(document)
+    def take(*_):
+        taken.set()
+        assert ended.wait(10)
 
-    class Message:
-        def apply_to_document(self, *_):
-            taken.set()
-            assert ended.wait(10)
-
-    class Comms:
-        def assemble(self, _):
-            return Message()
-
-    taking = Thread(target=page._on_msg, args=(root.ref["id"], Comms(), {"content": {}}))
+    monkeypatch.setattr(JSComponent, "_on_msg", take)
+    page = Page()
+    taking = Thread(target=page._on_msg, args=("", None, {}))
     changing = Thread(target=page.alone, args=(changed.set,))
     taking.start()
     assert taken.wait(10)
