@@ -22,7 +22,6 @@ from chipglow.app.session import Newest, Session, SupersededError
 from chipglow.camera import View, expose
 from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
-from chipglow.io.sources import SourceError
 from chipglow.scene import sample
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit, load_study
@@ -306,7 +305,7 @@ def test_what_is_saved_can_be_opened(model, tmp_path):
 def test_what_is_no_scene_is_refused_by_its_own_name(tmp_path):
     file = tmp_path / "x7y8.nc"
     file.write_bytes(b"no scene at all")
-    with pytest.raises(SourceError, match=r"^my scene\.nc: "):
+    with pytest.raises(ValueError, match=r"^my scene\.nc: "):
         open_uploaded(file, "my scene.nc")
     with pytest.raises(FileNotFoundError, match="expected a folder of results"):
         open_any(tmp_path)
