@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil, sqrt
 from pathlib import Path
 from secrets import token_urlsafe
@@ -14,10 +13,8 @@ import numpy as np
 from chipglow.analysis import spread_starts
 from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded
-from chipglow.app.probing import probed
 from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
-from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.quantities import unchecked
 from chipglow.scene import Material, Raster, Scene
@@ -31,9 +28,6 @@ MOST_UPLOADED: Final = 512 * 1024**2
 """Maximum size of an uploaded file in bytes."""
 
 _MOST_OPEN: Final = 8
-
-_PATIENCE: Final = 4.0
-"""Factor on the time that reading an upload may take: the server has other work."""
 
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
@@ -127,10 +121,7 @@ class OpenFiles:
 
 
 def open_uploaded(path: Path, name: str) -> Opened:
-    """Open an uploaded file by the name that its owner gave it: first in a subprocess."""
-    patience = _PATIENCE * patience_for((str(path),))
-    with Sandbox(name, patience).answers(partial(probed, path, name)) as answers:
-        next(answers)
+    """Open an uploaded file by the name that its owner gave it."""
     try:
         opened = open_any(path)
     except (ValueError, OSError) as error:

@@ -20,7 +20,7 @@ from jinja2 import Environment, PackageLoader
 from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
-from chipglow.app.controls import CURSOR, Texts
+from chipglow.app.controls import Texts
 from chipglow.app.figures import TITLES, Figures
 from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
@@ -38,11 +38,6 @@ _PARTS: Final = (
     ("psf", "PSF", "Case 1 − case 2: with minus without the point spread function"),
     ("detector", "Detector", "Noise, counts and calibration"),
     ("texture", "of it: texture", "Error minus that without texture: part of the others"),
-)
-_SAVES: Final = (
-    ("study.yaml", "study.yaml", "Save the settings as a study"),
-    ("chipglow.png", "Figure", "Save the images and lines as PNG"),
-    ("measurement.nc", "NetCDF", "Save the measurement and its error"),
 )
 
 
@@ -85,12 +80,10 @@ class View:
         self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
         self._refused = self._restore(texts or {})
-        if isinstance(opened, OpenedScene):
-            raster, tool, images = opened.scene.raster, opened.scene.tool, tuple(TITLES)
-        else:
-            measurement = opened.measurement
-            raster, tool, images = measurement.raster, measurement.tool, ("measured",)
-        self.figures = Figures(raster, tool, images)
+        self._is_scene = isinstance(opened, OpenedScene)
+        shown = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
+        images = tuple(TITLES) if self._is_scene else ("measured",)
+        self.figures = Figures(shown.raster, shown.tool, images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._handled = 0
@@ -315,22 +308,17 @@ class View:
 
     def _html(self, opened: Opened) -> str:
         """Return the page without figures and numbers."""
-        is_scene = isinstance(opened, OpenedScene)
-        views = {"whole": "Whole view", CURSOR: "Cursor"}
-        if is_scene:
-            views |= {"rake_line": "Rake face", "band_line": "Shear band"}
         figures = self.figures
         rows = (row for row in opened.controls.rows if row.group)
         return _TEMPLATES.get_template("page.html").render(
             name=opened.name,
+            is_scene=self._is_scene,
             embedded=self._embedded,
             may_upload=self._files is not None,
-            saves=_SAVES if is_scene else (),
             groups=[(name, list(of)) for name, of in groupby(rows, lambda row: row.group)],
-            views=views,
             images={name: one.figure.title.text for name, one in figures.images.items()},
             lines={name: one.figure.title.text for name, one in figures.lines.items()},
-            draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures" if is_scene else "",
+            draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
         )
 
     def _spec(self, opened: Opened) -> str:

@@ -12,12 +12,11 @@ import typer
 
 from chipglow.cli import options as opt
 from chipglow.cli.boundary import Boundary
-from chipglow.cli.calibrate import calibrate
+from chipglow.cli.camera import calibrate, psf
 from chipglow.cli.chip import rake, shearband
 from chipglow.cli.compare import compare
 from chipglow.cli.emissivity import emissivity, temperature
 from chipglow.cli.materials import materials
-from chipglow.cli.psf import psf
 from chipglow.cli.register import register
 from chipglow.cli.screen import current
 from chipglow.cli.sources import convert, import_source

@@ -40,15 +40,15 @@ def rake(
 
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
-    chosen = chosen_tool(measured, tool, position)
-    given = chosen.uncertainty if position is None else ToolUncertainty(position, position)
-    grid = rake_grid(measured, chosen.tool, pixels, depth, frames, given)
+    chosen, known, notes = chosen_tool(measured, tool, position)
+    given = known if position is None else ToolUncertainty(position, position)
+    grid = rake_grid(measured, chosen, pixels, depth, frames, given)
     _print_squares(grid)
     screen = current()
     screen.budget("budget", grid.frame_estimate, "Standard uncertainty of the squares' means")
-    screen.remarks(chosen.notes + grid.notes)
+    screen.remarks(notes + grid.notes)
     finish(
-        measured.notes + chosen.notes + grid.notes,
+        measured.notes + notes + grid.notes,
         (out, partial(write_result, grid)),
         (plot, figure(draw_rake_grid, measured, grid)),
     )
@@ -125,10 +125,10 @@ def shearband(
 
     measured = load_measurement(measurement, settings or ())
     times = measured.times
-    chosen = chosen_tool(measured, tool, position)
+    chosen, known, notes = chosen_tool(measured, tool, position)
     profile = band_profile(
         measured,
-        chosen.tool,
+        chosen,
         frames=sorted({shown_frame(times, time, option="--at: ") for time in at}) if at else None,
         curve=None if curve == "found" else read_curve(curve),
         reference=None
@@ -136,15 +136,15 @@ def shearband(
         else shown_frame(times, reference, option="--reference: "),
         width=width,
         position=position,
-        uncertainty=chosen.uncertainty,
+        uncertainty=known,
     )
     screen = current()
     title = f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm"
     screen.table("stages", profile.stage_frame(), title=title, unbroken=("stage",))
     screen.budget("budget", profile.estimate, "Standard uncertainty of the points along the band")
-    screen.remarks(chosen.notes)
+    screen.remarks(notes)
     finish(
-        measured.notes + chosen.notes + profile.notes,
+        measured.notes + notes + profile.notes,
         (out, partial(write_result, profile)),
-        (plot, figure(draw_band_profile, measured, chosen.tool, profile)),
+        (plot, figure(draw_band_profile, measured, chosen, profile)),
     )
