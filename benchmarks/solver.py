@@ -7,11 +7,11 @@ from numba import get_num_threads
 
 from chipglow.cutting import AISI_1045
 from chipglow.cutting.damage import Damage
-from chipglow.cutting.energy import held_energy
 from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.material import ROOM_TEMPERATURE
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
+from chipglow.cutting.recording import held_energy
 from chipglow.scene import ToolGeometry
 
 FAR = 1.0

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 from urllib.error import HTTPError
-from urllib.request import Request, urlopen
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -86,8 +86,7 @@ def visit(opening):
     """Open a page; nothing may go wrong in it or leave the machine."""
     opened, wrong = opening
     yield opened
-    refused = "Failed to load resource: the server responded with a status of 400"
-    assert [one for one in wrong if not one.startswith(refused)] == []
+    assert wrong == []
 
 
 @pytest.fixture(scope="module")
@@ -160,12 +159,6 @@ def test_a_page_opens_only_with_the_token(server, visit, model):
         with pytest.raises(HTTPError) as refused:
             urlopen(wrong)
         assert refused.value.code == 403
-    port = server.split("?")[0]
-    for headers in ({"Origin": "http://elsewhere.org"}, {}):
-        token = server.split("?")[1]
-        with pytest.raises(HTTPError) as refused:
-            urlopen(Request(f"{port}upload?{token}", b"x", headers))
-        assert refused.value.code == 403
     page = visit()
     assert "token" not in page.url
     assert expected(model, {}) in number(page, "measured").inner_text()
@@ -217,20 +210,6 @@ def test_of_a_link_that_is_wrong_in_part_the_rest_counts(visit, model):
     texts = {"camera.psf.numerical_aperture": "0.2"}
     number(page, "measured").get_by_text(expected(model, texts)).wait_for()
     assert page.locator("#status.error").is_visible()
-
-
-def test_the_wheel_leads_no_further_than_three_times_the_image(page):
-    page.mouse.move(*place(page, "measured_figure", -300, 200))
-    for _ in range(15):
-        page.mouse.wheel(0, 2000)
-    page.wait_for_timeout(300)
-    left, right, bottom, top = page.evaluate("""() => {
-      const { x_range, y_range } = Bokeh.documents[0].get_model_by_name("measured_figure");
-      return [x_range.start, x_range.end, y_range.start, y_range.end];
-    }""")
-    assert -1280.001 <= left < right <= 700.001
-    assert -620.001 <= bottom < top <= 1000.001
-    assert (right - left) / (top - bottom) == pytest.approx(660 / 540, rel=0.02)
 
 
 def test_a_line_and_the_cursor_are_dragged(page, model):
@@ -309,20 +288,17 @@ def test_a_wrong_file_is_one_clear_error(page, tmp_path):
     assert number(page, "measured").is_visible()
 
 
-def test_reloading_brings_the_state_back_and_sessions_stay_apart(visit, model):
-    first, second = visit("&camera.pitch=5+um"), visit()
-    turn(second, "Pixel pitch", "8")
-    turn(first, "Numerical aperture", "0.3")
+def test_reloading_brings_the_state_back(visit, model):
+    page = visit("&camera.pitch=5+um")
+    turn(page, "Numerical aperture", "0.3")
     texts = {"camera.pitch": "5", "camera.psf.numerical_aperture": "0.3"}
-    number(first, "measured").get_by_text(expected(model, texts)).wait_for()
-    number(second, "measured").get_by_text(expected(model, {"camera.pitch": "8"})).wait_for()
-    first.wait_for_url("**numerical_aperture=0.3*")
-    assert "camera.pitch=5" in first.url
-    first.reload()
-    ready(first)
-    number(first, "measured").get_by_text(expected(model, texts)).wait_for()
-    assert control(first, "camera.pitch").input_value() == "5"
-    assert control(second, "camera.pitch").input_value() == "8"
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+    page.wait_for_url("**numerical_aperture=0.3*")
+    assert "camera.pitch=5" in page.url
+    page.reload()
+    ready(page)
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+    assert control(page, "camera.pitch").input_value() == "5"
 
 
 def test_draws_show_progress_and_can_be_cancelled(page):

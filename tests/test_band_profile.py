@@ -9,7 +9,6 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
-from scipy.signal import savgol_filter
 from typer.testing import CliRunner
 
 from chipglow.camera import Flag, Measurement
@@ -24,7 +23,6 @@ from chipglow.laboratory.chip import (
     read_curve,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
-from chipglow.laboratory.chip.ridge import local_parabolas
 from chipglow.scene import PlacedTool
 from chipglow.uncertainty import from_xarray
 
@@ -76,14 +74,6 @@ def test_a_band_that_has_left_the_edge_is_found_where_it_is():
     along, across = image.place(line.points)
     assert np.abs(across[(along > 100e-6) & (along < LENGTH - 40e-6)]).max() < 0.1 * PITCH
     assert line.distance[0] > 50e-6
-
-
-@given(st.integers(1, 8), st.integers(0, 30), st.integers(0, 2**32 - 1))
-def test_local_parabolas_are_those_of_savitzky_and_golay(half, more, seed):
-    window = 2 * half + 1
-    values = np.random.default_rng(seed).normal(size=(window + more, 2))
-    expected = savgol_filter(values, window, 2, axis=0, mode="interp")
-    np.testing.assert_allclose(local_parabolas(values, window), expected, atol=1e-12)
 
 
 def test_the_noise_of_an_image_is_estimated():

@@ -172,29 +172,27 @@ def test_ptw(tmp_path, lock_in):
 
 def test_ptw_as_altair_560_writes_it(tmp_path):
     # Three letters and two zeros; the size of a frame in words; every third frame is kept.
-    stamps = 3 * np.arange(5) / 100
-    content = files.ptw(PICTURES, period=1 / 100, stamps=stamps, words=True)
+    content = files.ptw(PICTURES, period=1 / 100, stamps=0.03 * np.arange(5), words=True)
     path = make(tmp_path, "a.ptw", content)
     assert find_format(path) == "ptw"
     recording = read_recording(path)
     assert np.array_equal(recording.signal, PICTURES)
-    assert recording.times == pytest.approx(stamps, rel=1e-6)
-    assert any("30000 us apart by their time stamps" in one for one in recording.notes.assumed)
-    assert not recording.notes.warnings
     assert np.array_equal(read_recording(path, slice(2, 4)).times, recording.times[2:4])
 
 
-def test_frames_missing_in_ptw_are_said(tmp_path):
-    stamps = np.array([0, 1, 2, 12, 13]) / 600
-    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, stamps=stamps)))
-    assert any("frames may be missing" in warning for warning in recording.notes.warnings)
-
-
-def test_ptw_whose_stamps_no_multiple_of_the_period_explains_has_their_times(tmp_path):
-    stamps = 0.025 * np.arange(5)
-    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, 1 / 100, stamps)))
-    assert recording.times == pytest.approx(stamps, rel=1e-6)
-    assert any("the period in the header is 10000 us" in one for one in recording.notes.assumed)
+@pytest.mark.parametrize(
+    ("period", "stamps", "times", "told"),
+    [
+        (1 / 100, [0, 0.03, 0.06, 0.09, 0.12], 0.03, "30000 us apart by their time stamps"),
+        (1 / 100, [0, 0.025, 0.05, 0.075, 0.1], 0.025, "the period in the header is 10000 us"),
+        (1 / 600, np.array([0, 1, 2, 12, 13]) / 600, 1 / 600, "frames may be missing"),
+    ],
+)
+def test_times_of_ptw_whose_stamps_do_not_fit_its_period(tmp_path, period, stamps, times, told):
+    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, period, stamps)))
+    assert recording.times == pytest.approx(times * np.arange(5), rel=1e-6)
+    (note,) = recording.notes.assumed + recording.notes.warnings
+    assert told in note
 
 
 def test_ptw_without_period_has_the_times_of_its_stamps_also_over_midnight(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chipglow.cutting.heat import tool_fraction
-from chipglow.cutting.picture import Picture
+from chipglow.cutting.picture import Picture, lattice_of
 from chipglow.cutting.points import Grid, block_of_points
 from chipglow.scene import Material, Raster, ToolGeometry
 
@@ -28,7 +28,7 @@ def lattice(angle=0.0, spacing=CELL / 2, top=100e-6):
 
 def frame_of(points, tool=AWAY, **fields):
     fraction = tool_fraction(GRID, tool.surface)
-    picture = Picture(GRID, RASTER, tool, fraction, 293.0)
+    picture = Picture(GRID, lattice_of(GRID, RASTER, tool, 293.0), fraction)
     names = ["temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y"]
     values = {name: np.zeros(points.size) for name in [*names, "material_x", "material_y"]}
     values["temperature"] = np.full(points.size, 300.0)

@@ -37,6 +37,17 @@ TITANIUM = HyperbolicTangent(
 SOFTENING = replace(AISI_1045, flow_stress=TITANIUM, damage=None)
 
 
+def short_cut(length, **changes):
+    """Forces and frames of a coarse cut of a length in m, recorded in its last 10 um."""
+    simulation = CuttingSimulation(
+        CuttingConditions(cutting_length=length), numerics=Numerics(cell=30e-6), **changes
+    )
+    window = OutputWindow(start=length - 10e-6, end=length, interval=1e-6, later_bands=0)
+    frames = []
+    history = simulation.run(window, Raster(-100e-6, 100e-6, 10e-6, 20, 20), frames.append)
+    return history, frames
+
+
 def test_rigid_rotation_makes_no_stress():
     block = Block((100e-6, 60e-6))
     spin = 2e5
@@ -193,17 +204,10 @@ def test_shear_limit_holds_whatever_the_temperature():
 
 def test_thermal_exponent_reaches_the_cut():
     """So small an exponent takes the friction away, whatever the temperature: 0.17^0.01 = 0.98."""
-    work = []
-    for exponent in (None, 0.01):
-        simulation = CuttingSimulation(
-            CuttingConditions(cutting_length=0.03e-3),
-            friction=Friction(thermal_exponent=exponent),
-            numerics=Numerics(cell=30e-6),
-        )
-        raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
-        window = OutputWindow(start=0.02e-3, end=0.03e-3, interval=1e-6, later_bands=0)
-        history = simulation.run(window, raster, lambda frame: None)
-        work.append(history.energy.friction_work[-1])
+    work = [
+        short_cut(0.03e-3, friction=Friction(thermal_exponent=one))[0].energy.friction_work[-1]
+        for one in (None, 0.01)
+    ]
     # A fiftieth of the force at most, on a chip that slides up to ten times as fast for it.
     assert 0 < work[1] < 0.2 * work[0]
 
@@ -229,15 +233,10 @@ def test_energy_of_a_vibrating_block_is_kept_but_for_what_the_transfer_dissipate
 
 
 def test_energy_account_of_a_short_cut_closes():
-    simulation = CuttingSimulation(
-        CuttingConditions(cutting_length=0.1e-3), numerics=Numerics(cell=30e-6)
-    )
-    raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
-    window = OutputWindow(start=0.09e-3, end=0.1e-3, interval=1e-6, later_bands=0)
-    history = simulation.run(window, raster, lambda frame: None)
+    history, _ = short_cut(0.1e-3)
     energy = history.energy
     # The force through the tool and the work of the drive are counted apart; inertia is 1 %.
-    work = np.cumsum(history.cutting) * 1e-6 * simulation.conditions.speed
+    work = np.cumsum(history.cutting) * 1e-6 * CuttingConditions().speed
     assert energy.drive_work[-1] == pytest.approx(work[-1], rel=0.03)
     # What is left over is the dissipation of the transfer, which only takes.
     assert 0 < energy.closing_error[-1] < 0.015

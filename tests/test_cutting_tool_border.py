@@ -7,10 +7,18 @@ import pytest
 from scipy.special import erfc
 
 from chipglow.cutting import CARBIDE, CuttingSimulation, Numerics
-from chipglow.cutting.heat import SMALLEST_FRACTION, ToolHeat, conduct_tool, tool_fraction
+from chipglow.cutting.heat import (
+    CELLS,
+    GROWTH,
+    SMALLEST_FRACTION,
+    ToolHeat,
+    border_nodes,
+    conduct_beyond,
+    conduct_tool,
+    tool_fraction,
+)
 from chipglow.cutting.points import Grid
 from chipglow.cutting.simulation import _State
-from chipglow.cutting.tool_border import CELLS, GROWTH, border_nodes, conduct_beyond
 from chipglow.scene import ToolGeometry
 
 HEAT = ToolHeat(CARBIDE.density * CARBIDE.heat_capacity, CARBIDE.conductivity, 0.5, 0.0, 1.0)

@@ -10,7 +10,7 @@ import yaml
 from experiments import Experiment, Means, Published
 
 from chipglow.cutting import EnergyHistory, ForceHistory
-from chipglow.cutting.energy import ENERGIES
+from chipglow.cutting.recording import ENERGIES
 
 MEANS = Means(
     cutting_force=330e3,

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from chipglow.camera import Measurement
 from chipglow.cli import app
-from chipglow.io import read_measurement, write_measurement
+from chipglow.io import write_measurement
 from chipglow.laboratory.chip import find_tool, rake_grid
 from chipglow.laboratory.comparison import normalised_error
 from chipglow.quantities import uncertain_text
@@ -180,17 +180,6 @@ def test_the_table_has_units_and_gaps(folder, seen):
     np.testing.assert_allclose(first[:-1], expected, atol=6e-5)
     without = [line.split(",")[3] == "" for line in lines]
     assert sum(without) == np.isnan(grid.mean).sum() > 0
-
-
-def test_a_given_and_a_found_tool(folder):
-    (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
-    code, given, _ = command("real.nc", "--tool", "tool.yaml", "--at", "9 us")
-    assert code == 0 and "over a square's pixels" in given
-    code, found, assumed = command("real.nc", "--tool", "found", "--frame", "0")
-    assert code == 0
-    angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
-    assert f"Found: rake angle {angle:.1f} deg, tip at x " in found
-    assert "Assumed: The clearance angle is 7 deg, the edge radius 20 um." in assumed
 
 
 def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis.cut import _unaccounted
-from chipglow.cli.cutting import say_of_cut
 from chipglow.cli.screen import begin
+from chipglow.cli.studies import say_of_cut
 from chipglow.cutting import (
     AISI_1045,
     CuttingConditions,
     CuttingSimulation,
-    EnergyHistory,
     Numerics,
 )
 from chipglow.laboratory.chip import Inertia, inertia
@@ -110,10 +108,3 @@ def test_a_warning_over_one_per_cent(kinetic, force, words, capsys):
     assert "Warning: The feed is 2 cells [small]." in said
     assert said.count("Warning") == 1 + bool(words)
     assert all(word in fraction.warning and word in said for word in words)
-
-
-def test_the_analysis_and_the_solver_close_the_account_alike():
-    size = CHIP.forces()[0].size
-    # Powers of two: no entry, nor a sum of some, can stand in for another.
-    account = {name: np.full(size, 2.0**-k) for k, name in enumerate(ENERGY_UNITS)}
-    assert _unaccounted(scene_with(**account)) == EnergyHistory(**account).closing_error[-1]

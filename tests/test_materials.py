@@ -174,9 +174,9 @@ def _write(path: Path, old: str, new: str) -> Path:
         ),
         ("[400 degC, 184 GPa]", "[400 degC]", "young_modulus: ['400 degC'], expected [temperature"),
         ("[400 degC, 184 GPa]", "[100 degC, 184 GPa]", "young_modulus: temperature table: temp"),
-        ("poisson_ratio", "poison_ratio", "poison_ratio: unknown, expected one of kind, name"),
+        ("poisson_ratio", "poison_ratio", "unknown key 'poison_ratio', did you mean"),
         ("    hardening: 580 MPa\n", "", "flow_stress.pantale.hardening: is missing"),
-        ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a number without a unit"),
+        ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a valid number"),
         ("d2: 3.44", "d2: -3.44", "damage: d1 + d2 exp(d3 triaxiality) falls to"),
         ("kind: workpiece", "kind: chip", "kind: 'chip', expected workpiece or tool"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
@@ -296,7 +296,7 @@ def test_a_number_needs_a_source(tmp_path: Path) -> None:
     data = yaml.safe_load((FOLDER / "tools" / "ceramic.yaml").read_text(encoding="utf-8"))
     del data["density"]["source"]
     (tmp_path / "tool.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
-    with pytest.raises(MaterialError, match=r"density\.source: is missing, expected a value"):
+    with pytest.raises(MaterialError, match=r"density\.source: is missing, expected text"):
         read_material(tmp_path / "tool.yaml")
 
 

@@ -103,8 +103,8 @@ def test_an_isothermal_room_is_a_blackbody(emissivity, mirror, angle):
         exchange.incident(black, emissivity, 7.0, mirror),
         exchange.incident(black, emissivity, 7.0, mirror, (0.3, 1.0)),
     ):
-        # The iteration ends at steps of 1e-9; what is left is 1 / (1 - 0.99) times as much.
-        np.testing.assert_allclose(found, 7.0, rtol=1e-7)
+        # Rounding, 1 / (1 - 0.99) times.
+        np.testing.assert_allclose(found, 7.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [20.0, 45.0, 90.0, 140.0])
@@ -201,16 +201,6 @@ def test_energy_is_conserved(first, second, angle, surroundings):
 
 
 # ---- the side of chip and tool
-
-
-def test_without_mirrors_it_is_solved_at_once_as_the_iteration_would():
-    elements = Wedge(angle=np.radians(30.0)).elements.exchange
-    generator = np.random.default_rng(4)
-    black, emissivity = generator.uniform(0.1, 1.0, (2, 5, len(elements.lengths)))
-    at_once = elements.incident(black, emissivity, 0.2)
-    # A mirror that reflects nothing takes the other way, which ends at changes of 1e-9.
-    step_by_step = elements.incident(black, emissivity, 0.2, mirror=1e-300)
-    np.testing.assert_allclose(at_once, step_by_step, rtol=1e-7)
 
 
 def test_the_wedge_is_as_wide_and_deep_as_its_arc():
@@ -410,10 +400,6 @@ MIRRORED = UniformSurface(0.4).modified(Wedge())
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Exchange(np.zeros((0, 2)), np.zeros((0, 2))), "shapes"),
-        (lambda: Exchange(np.zeros((2, 2)), np.ones((3, 2))), "shapes"),
-        (lambda: Exchange(np.zeros((2, 2)), np.zeros((2, 2))), "no length"),
-        (lambda: Exchange(np.zeros((2, 2)), np.ones((2, 2)), 0), "rays is 0"),
         (lambda: Wedge(overhang=-40e-6), "covers the rake face"),
         (lambda: MIRRORED.on(a_scene()), "no band is given"),
         (

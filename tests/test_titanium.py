@@ -1,15 +1,12 @@
 """The benchmark that sets measured cuts of Ti-6Al-4V beside computed ones: data, means, ratios."""
 
 from dataclasses import replace
-from math import nan
 
 import pytest
 import titanium
 import yaml
 from hypothesis import given, strategies as st
 from titanium import Condition, Cut, Trial
-
-from chipglow.cutting import SolverError
 
 SLOW, FAST = 60 / 60, 120 / 60
 FINE, COARSE = 0.1e-3, 0.2e-3
@@ -111,37 +108,3 @@ def test_no_ratio_depends_on_the_width_of_cut(width, forces):
     wide = {at: Cut(width * f, width * t, h) for at, (f, t, h) in narrow.items()}
     assert titanium.ratios(wide) == pytest.approx(titanium.ratios(narrow), rel=1e-12)
     assert len(titanium.ratios(narrow)) == 4 + 4 + 2 + 2
-
-
-def test_differences_are_over_measured_and_a_cut_that_failed_is_a_dash():
-    measured = {"Ff / Fc": 0.5, "thickness / feed": 1.25}
-    computed = {0.0: {"Ff / Fc": 0.4, "thickness / feed": 1.5}, 10.0: {"thickness / feed": nan}}
-    assert titanium.comparison(measured, computed) == [
-        ["quantity", "measured", "rake 0°", "difference", "rake 10°", "difference"],
-        ["Ff / Fc", "0.50", "0.40", "−20 %", "–", "–"],
-        ["thickness / feed", "1.25", "1.50", "+20 %", "–", "–"],
-    ]
-
-
-def test_a_cut_that_stops_is_told_and_the_others_stay(monkeypatch, capsys):
-    def fail(cut, name, folder):
-        raise SolverError(f"{name}: a point crossed a cell")
-
-    monkeypatch.setattr(titanium, "means_of", fail)
-    tests = {Condition(SLOW, FINE): [trial()]}
-    outcome = {(at, 10.0): titanium.outcome_of(one, 10.0, 10e-6) for at, one in tests.items()}
-    assert titanium.computed_ratios(outcome) == {0.0: {}, 10.0: {}}
-    head, row = titanium.cuts_made(outcome, tests)
-    assert row[:4] == ["60", "0.1", "10", "60-0.1-10: a point crossed a cell"]
-    assert len(row) == len(head)
-
-
-def test_forces_of_one_width_tell_it(monkeypatch):
-    means = titanium.Means(200e3, 100e3, 0.12e-3, 0.2e-3, 80e-6, 5, 0.2, -0.02, 0.012, 60.0)
-    tests = {Condition(SLOW, FINE): [trial(), trial(cutting_force=110.0)]}
-    head, row = titanium.cuts_made({(Condition(SLOW, FINE), 0.0): means}, tests)
-    told = dict(zip(head, row, strict=True))
-    # 105 N over 200 N/mm; 80 us at 1 m/s.
-    assert told["Fc measured / computed / mm"] == "0.53"
-    assert told["segment / µm"] == "80"
-    assert (told["drift / %"], told["unaccounted work / %"]) == ("−2", "1.2")

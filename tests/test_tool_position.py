@@ -1,7 +1,7 @@
 """How uncertain a tool's place is, in the squares at the rake face and along the shear band."""
 
 from dataclasses import replace
-from math import hypot, radians
+from math import degrees, hypot, radians
 
 import numpy as np
 import pytest
@@ -214,8 +214,12 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
         (["--tool", "tool.yaml", "--position", "5 um"], None, stated, None),
         (["--tool", "tool.yaml"], None, None, None),
     ):
-        code, text, _ = command("rake", "real.nc", *options, "--out", "grid.nc")
+        code, text, assumed = command("rake", "real.nc", *options, "--out", "grid.nc")
         assert code == 0
+        if tool is found.tool:
+            angle = degrees(tool.rake_angle)
+            assert f"Found: rake angle {angle:.1f} deg, tip at x " in text
+            assert "Assumed: The clearance angle is 7 deg, the edge radius 20 um." in assumed
         with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
             written = from_xarray(data.load(), "mean")
         tool = tool or PlacedTool(ToolGeometry(radians(-7.0)), (0.0, 0.0))

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil, sqrt
 from pathlib import Path
+from secrets import token_urlsafe
+from tempfile import TemporaryDirectory
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -12,10 +13,8 @@ import numpy as np
 from chipglow.analysis import spread_starts
 from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded
-from chipglow.app.probing import probed
 from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
-from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.quantities import unchecked
 from chipglow.scene import Material, Raster, Scene
@@ -28,8 +27,7 @@ QUICK_SAMPLES: Final = 35_000
 MOST_UPLOADED: Final = 512 * 1024**2
 """Maximum size of an uploaded file in bytes."""
 
-_PATIENCE: Final = 4.0
-"""Factor on the time that reading an upload may take: the server has other work."""
+_MOST_OPEN: Final = 8
 
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
@@ -94,11 +92,36 @@ def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
     return OpenedScene.of(open_scene(path), study or Study(), path.name, from_file=True)
 
 
+class OpenFiles:
+    """What the command opened, and what was uploaded since: the key of an upload is its name."""
+
+    def __init__(self, first: Opened) -> None:
+        self._folder = TemporaryDirectory(prefix="chipglow-app-")
+        self.folder = Path(self._folder.name)
+        self._opened = {"": first}
+
+    def find(self, key: str) -> Opened | None:
+        """Return an upload by its key, the first file without one; None if it is not open."""
+        return self._opened.get(key)
+
+    def new_path(self) -> Path:
+        """Return a path for an upload, which nobody can guess."""
+        return self.folder / f"{token_urlsafe(12)}.nc"
+
+    def add(self, path: Path, name: str) -> str:
+        """Open an uploaded file and return its key; the oldest of too many is removed."""
+        self._opened[path.stem] = open_uploaded(path, name)
+        for old in list(self._opened)[1:-_MOST_OPEN]:
+            del self._opened[old]
+            (self.folder / f"{old}.nc").unlink(missing_ok=True)
+        return path.stem
+
+    def close(self) -> None:
+        self._folder.cleanup()
+
+
 def open_uploaded(path: Path, name: str) -> Opened:
-    """Open an uploaded file by the name that its owner gave it: first in a subprocess."""
-    patience = _PATIENCE * patience_for((str(path),))
-    with Sandbox(name, patience).answers(partial(probed, path, name)) as answers:
-        next(answers)
+    """Open an uploaded file by the name that its owner gave it."""
     try:
         opened = open_any(path)
     except (ValueError, OSError) as error:

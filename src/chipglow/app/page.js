@@ -5,32 +5,22 @@ const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
 const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
 const VIEW_WIDTH = 160; // µm
 const GRIP = 12; // pixels
+const PIECE = 2 ** 22; // bytes of a file in one message
 
 export function render({ view, model, el }) {
-  const spec = JSON.parse(model.spec);
-  const extent = spec.extent;
-  const figures = model.get_child("figures");
-  const page = element("div", { class: "app" });
-  const controls = new Map();
-  el.style.width = "100%";
-  page.append(header(), aside(), main());
-  el.append(page);
+  const spec = JSON.parse(model.spec), extent = spec.extent;
+  const page = document.createElement("div");
+  page.className = "app";
+  page.innerHTML = model.html;
   const find = (selector) => page.querySelector(selector);
+  const each = (selector, kind, act) => {
+    for (const one of page.querySelectorAll(selector)) one.addEventListener(kind, () => act(one));
+  };
   const named = (name) => view.model.document.get_model_by_name(name);
-
-  function element(tag, attributes = {}, ...children) {
-    const made = document.createElement(tag);
-    for (const [key, value] of Object.entries(attributes)) {
-      if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
-      else if (value === true) made.setAttribute(key, "");
-      else if (value !== false && value != null) made.setAttribute(key, value);
-    }
-    made.append(...children);
-    return made;
-  }
-  function button(text, click, attributes = {}) {
-    return element("button", { type: "button", onclick: click, ...attributes }, text);
-  }
+  const figures = model.get_child("figures");
+  spec.figures.forEach((name, i) => find(`#figure-${name}`).prepend(figures[i]));
+  el.style.width = "100%";
+  el.append(page);
 
   // Messages to Python. A moving control sends once per frame of the screen at most.
 
@@ -54,149 +44,54 @@ export function render({ view, model, el }) {
     });
   }
 
-  // Controls.
+  each("[data-send]", "click", ({ dataset }) => send(dataset.send, dataset.content ?? ""));
 
-  function header() {
-    const actions = element("div", { class: "actions", role: "toolbar", "aria-label": "Files and view" });
-    if (spec.uploads) {
-      const file = element("input", {
-        type: "file", accept: ".nc", class: "hidden", "aria-label": "Open a file", tabindex: -1,
-        onchange: () => file.files.length && upload(file.files[0]),
+  // Controls: those of the column, and the positions of the cursor and of the ends of the lines.
+
+  const controls = new Map();
+  for (const box of page.querySelectorAll("[data-path]")) {
+    const path = box.dataset.path, stops = spec.stops[path] ?? [];
+    const field = box.querySelector("select, input[type=text]"), slider = box.querySelector("input[type=range]");
+    const entry = { box, field, slider, stops, sent: 0, text: "", typing: false };
+    controls.set(path, entry);
+    // A text that is being typed stays, whatever comes from Python meanwhile.
+    field.addEventListener("input", () => { entry.typing = field.type === "text"; });
+    field.addEventListener("change", () => {
+      entry.typing = false;
+      change(path, field.value, true);
+    });
+    field.addEventListener("blur", () => {
+      if (entry.typing) field.value = entry.text;
+      entry.typing = false;
+    });
+    for (const kind of slider ? ["input", "change"] : []) {
+      slider.addEventListener(kind, () => {
+        const at = Number(slider.value);
+        setText(entry, stops.length ? stops[at] : Number(at.toPrecision(9)));
+        change(path, field.value, kind === "change");
       });
-      actions.append(file, button("Open…", () => file.click(), { title: "A scene or a measurement, NetCDF" }));
     }
-    for (const [name, text, title] of spec.saves) {
-      actions.append(button(text, () => send("save", name), { title }));
-    }
-    actions.append(
-      button("Undo", () => send("step", false), { id: "undo", title: "Ctrl+Z" }),
-      button("Redo", () => send("step", true), { id: "redo", title: "Ctrl+Y" }));
-    if (!spec.embedded) {
-      actions.append(button("Copy link", copyLink, { title: "A link that restores this state" }));
-    }
-    actions.append(button("Dark", () => setTheme(theme === "dark" ? "light" : "dark"), { id: "theme" }));
-    return element("header", {}, element("h1", {}, "chipglow"),
-      element("span", { class: "name", title: spec.name }, spec.name), actions);
   }
-
-  function aside() {
-    const column = element("aside", { "aria-label": "Controls" });
-    let title = null;
-    for (const row of spec.rows) {
-      if (row.group !== title) {
-        title = row.group;
-        column.append(element("fieldset", {}, element("legend", {}, title)));
-      }
-      column.lastChild.append(control(row));
-      if (row.stops.length > 1) column.lastChild.append(player(row.path));
-    }
-    return column;
-  }
-
-  function entryOf(row, box) {
-    controls.set(row.path, { row, box, sent: 0, text: "", typing: false });
-    return controls.get(row.path);
-  }
-
-  function control(row) {
-    const id = `control-${row.path}`;
-    const label = element("label", { for: id }, row.label);
-    const box = element("div", { class: "control" }, label);
-    const entry = entryOf(row, box);
-    if (row.options) {
-      const options = row.options.map(([value, text]) => element("option", { value }, text));
-      entry.field = element("select", { id, onchange: () => change(row.path, entry.field.value, true) }, ...options);
-      box.classList.add("choice");
-      box.append(entry.field);
-      return box;
-    }
-    textField(entry, { id, inputmode: "decimal", placeholder: row.optional ? "none" : null });
-    box.append(element("span", { class: "value" }, entry.field, element("span", { class: "unit" }, row.unit)));
-    if (row.stops.length === 1) return box;
-    const [min, max, step] = row.stops.length ? [0, row.stops.length - 1, 1] : [row.low, row.high, row.step];
-    const moved = (final) => {
-      const at = Number(entry.slider.value);
-      setText(entry, row.stops.length ? row.stops[at] : Number(at.toPrecision(9)));
-      change(row.path, entry.field.value, final);
-    };
-    entry.slider = element("input", {
-      type: "range", min, max, step, "aria-label": row.label,
-      oninput: () => moved(false), onchange: () => moved(true),
-    });
-    box.append(entry.slider);
-    return box;
-  }
-
-  // A text that is being typed stays, whatever comes from Python meanwhile.
-  function textField(entry, attributes) {
-    entry.field = element("input", {
-      type: "text", autocomplete: "off", spellcheck: "false", ...attributes,
-      oninput: () => { entry.typing = true; },
-      onchange: () => {
-        entry.typing = false;
-        change(entry.row.path, entry.field.value, true);
-      },
-      onblur: () => {
-        if (entry.typing) entry.field.value = entry.text;
-        entry.typing = false;
-      },
-    });
-  }
-  function setText(entry, text) {
-    entry.field.value = text;
-    entry.slider.setAttribute("aria-valuetext", text === "" ? "none" : `${text} ${entry.row.unit}`);
-  }
-
-  function placeField(name, label) {
-    const entry = entryOf({ path: name });
-    textField(entry, { id: `place-${name}` });
-    return element("span", { class: "place" }, element("label", { for: `place-${name}` }, label), entry.field);
+  function setText({ field, slider, box }, text) {
+    field.value = text;
+    const unit = box.querySelector(".unit").textContent;
+    slider.setAttribute("aria-valuetext", text === "" ? "none" : `${text} ${unit}`);
   }
 
   // The player goes on when the page has painted the picture before.
   let playing = false, stepped = 0;
-  function player(path) {
-    const play = button("Play", () => {
-      playing = !playing;
-      play.textContent = playing ? "Pause" : "Play";
-      if (playing) step(path, 1);
-    }, { id: "play" });
-    return element("div", { class: "player" },
-      button("◀", () => step(path, -1), { "aria-label": "One frame back" }), play,
-      button("▶", () => step(path, 1), { "aria-label": "One frame on" }));
-  }
-  function step(path, by) {
-    const { slider, row } = controls.get(path);
-    const count = row.stops.length;
-    slider.value = (Number(slider.value) + by + count) % count;
+  function step(by) {
+    const { slider, stops } = controls.get("start");
+    slider.value = (Number(slider.value) + by + stops.length) % stops.length;
     stepped = performance.now();
     slider.dispatchEvent(new Event(playing ? "input" : "change"));
   }
-
-  function main() {
-    const views = element("div", { class: "views", role: "toolbar", "aria-label": "View" });
-    for (const [name, text] of spec.views) views.append(button(text, () => showView(name)));
-    views.append(placeField("cursor", "Cursor x, y / µm"),
-      element("span", { class: "hint" }, "Drag: cursor, line, view. Wheel: zoom. Grey: out of range."));
-    const images = element("div", { class: "images", onpointerdown: grip });
-    const below = element("div", { class: "below" });
-    spec.figures.forEach(([name, title], i) => {
-      const cell = element("div", { class: "figure", id: `figure-${name}`, role: "group", "aria-label": title }, figures[i]);
-      if (spec.images.includes(name)) { images.append(cell); return; }
-      cell.append(placeField(name, "Ends x, y / µm"));
-      below.append(cell);
-    });
-    below.append(element("section", { class: "numbers", "aria-label": "Numbers at the cursor" }));
-    const status = element("div", { class: "status" },
-      element("span", { id: "status", role: "status" }),
-      element("progress", { id: "progress", max: 1, hidden: true, "aria-label": "Progress" }));
-    if (spec.draws) {
-      status.append(
-        button("Draw phases and textures", () => send("draw"), { id: "draw", title: spec.draws }),
-        button("Cancel", () => send("cancel"), { id: "cancel", hidden: true }));
-    }
-    return element("main", {}, views, images, below, status);
-  }
+  each("[data-step]", "click", ({ dataset }) => step(Number(dataset.step)));
+  each("#play", "click", (play) => {
+    playing = !playing;
+    play.textContent = playing ? "Pause" : "Play";
+    if (playing) step(1);
+  });
 
   // Places on the images: the cursor, the lines and the view are dragged; a click sets the cursor.
 
@@ -263,10 +158,10 @@ export function render({ view, model, el }) {
     for (const [kind, handler] of Object.entries(handlers)) addEventListener(kind, handler);
   }
 
-  function showView(name) {
+  each("[data-view]", "click", ({ dataset }) => {
     let [left, right, bottom, top] = extent;
-    if (name !== "whole") {
-      const places = points(name);
+    if (dataset.view !== "whole") {
+      const places = points(dataset.view);
       const [x, y] = [0, 1].map((axis) => places.reduce((sum, one) => sum + one[axis] / places.length, 0));
       const [half, tall] = [VIEW_WIDTH / 2, VIEW_WIDTH / 2 * spec.shape];
       [left, right, bottom, top] = [x - half, x + half, y - tall, y + tall];
@@ -274,26 +169,26 @@ export function render({ view, model, el }) {
     const { x_range, y_range } = named("measured_figure");
     x_range.setv({ start: left, end: right });
     y_range.setv({ start: bottom, end: top });
-  }
+  });
 
   // Messages from Python.
 
   function showValues({ n, values, shown, can_undo, can_redo, link }) {
     for (const [path, text] of Object.entries(values)) {
-      const entry = controls.get(path), { row } = entry;
+      const entry = controls.get(path), { box, field, slider, stops } = entry;
+      box.hidden = !shown.includes(path);
       if (entry.sent > n) continue;
       entry.text = text;
       if (!entry.typing) {
-        entry.field.removeAttribute("aria-invalid");
-        entry.field.value = text;
+        field.removeAttribute("aria-invalid");
+        field.value = text;
       }
-      if (!row.label) setPlaces(path, points(path));
-      if (!entry.slider) continue;
-      const nearest = (best, one, i) => Math.abs(one - text) < Math.abs(row.stops[best] - text) ? i : best;
-      entry.slider.value = row.stops.length ? row.stops.reduce(nearest, 0) : text === "" ? row.low : text;
+      if (box.className === "place") setPlaces(path, points(path));
+      if (!slider) continue;
+      const nearest = (best, one, i) => Math.abs(one - text) < Math.abs(stops[best] - text) ? i : best;
+      slider.value = stops.length ? stops.reduce(nearest, 0) : text === "" ? slider.min : text;
       if (!entry.typing) setText(entry, text);
     }
-    for (const [path, { box }] of controls) if (box) box.hidden = !shown.includes(path);
     find("#undo").disabled = !can_undo;
     find("#redo").disabled = !can_redo;
     if (!spec.embedded) {
@@ -309,35 +204,21 @@ export function render({ view, model, el }) {
     const bar = find("#progress"), draws = typeof progress === "number";
     bar.hidden = progress === undefined;
     draws ? (bar.value = progress) : bar.removeAttribute("value");
-    if (spec.draws) {
+    if (find("#draw")) {
       find("#cancel").hidden = !draws;
       find("#draw").disabled = draws;
     }
     for (const path of invalid ?? []) controls.get(path)?.field.setAttribute("aria-invalid", "true");
   }
 
-  function showNumbers({ rows, parts }) {
-    const head = (label) => element("th", { scope: "row" }, label);
-    const table = element("table", {}, element("caption", {}, "At the cursor"),
-      ...rows.map(([label, value, tip]) => element("tr", { title: tip }, head(label), element("td", {}, value))));
-    const box = find(".numbers");
-    box.classList.remove("old");
-    box.replaceChildren(table);
-    if (!parts.length) return;
-    const most = Math.max(1e-9, ...parts.map((part) => Math.abs(part.kelvin)));
-    const bars = parts.map(({ name, label, kelvin, text, tip }) => {
-      const style = `width:${50 * Math.abs(kelvin) / most}%;${kelvin < 0 ? "right" : "left"}:50%`;
-      return element("tr", { title: tip }, head(label),
-        element("td", { class: "track", "aria-hidden": "true" }, element("span", { class: "axis" }),
-          element("span", { class: `bar ${name}`, style })),
-        element("td", {}, text));
-    });
-    box.append(element("table", { class: "parts" }, element("caption", {}, "Parts of the error"), ...bars),
-      element("p", { class: "note" }, "They sum to the error; ± is the standard uncertainty (k = 1)."));
+  function showNumbers(html) {
+    find(".numbers").classList.remove("old");
+    find(".numbers").innerHTML = html;
   }
 
   function saveDownload({ name, data }) {
-    element("a", { href: `data:application/octet-stream;base64,${data}`, download: name }).click();
+    const link = document.createElement("a");
+    Object.assign(link, { href: `data:application/octet-stream;base64,${data}`, download: name }).click();
   }
 
   // A picture counts as painted when the browser had time for it: then come the curves along its
@@ -348,26 +229,32 @@ export function render({ view, model, el }) {
       send("painted", number);
       for (const [name, data] of Object.entries(lines)) named(name).setv({ data }, { sync: false });
       const left = 80 - (performance.now() - stepped);
-      if (playing) setTimeout(() => playing && step("start", 1), Math.max(left, 0));
+      if (playing) setTimeout(() => playing && step(1), Math.max(left, 0));
     }, 0));
   }
 
   // Files, links, theme and size.
 
-  async function upload(file) {
+  // A file is sent in pieces, the next one when Python has the one before.
+  let sendMore = null;
+  each("#open", "click", () => find("#file").click());
+  each("#file", "change", ({ files }) => files.length && upload(files[0]));
+  async function upload(file, begin = 0) {
+    const refuse = (text) => showStatus({ text: `${file.name}: ${text}`, kind: "error" });
+    if (file.size > spec.most_uploaded) return refuse(`refused, a file may have up to ${spec.most_uploaded / 2 ** 20} MiB`);
     showStatus({ text: `Checking ${file.name}`, kind: "busy", progress: null });
-    const url = `upload?name=${encodeURIComponent(file.name)}`;
-    const answer = await fetch(url, { method: "POST", body: file }).catch(() => null);
-    const text = await answer?.text();
-    if (answer?.ok) location.search = `?open=${text}`;
-    else showStatus({ text: text || `${file.name}: refused, a file may have up to ${spec.uploads}`, kind: "error" });
+    const end = begin + PIECE;
+    const data = await file.slice(begin, end).arrayBuffer().catch(() => null);
+    if (data === null) return refuse("cannot be read");
+    sendMore = () => upload(file, end);
+    send("piece", { name: file.name, data, first: begin === 0, last: end >= file.size });
   }
 
-  async function copyLink() {
+  each("#link", "click", async () => {
     const text = location.href;
     const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
     find("#status").textContent = copied ? "The link is copied." : text;
-  }
+  });
 
   let theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
   function setTheme(name) {
@@ -380,6 +267,7 @@ export function render({ view, model, el }) {
     find("#theme").textContent = theme === "dark" ? "Light" : "Dark";
     send("theme", theme);
   }
+  each("#theme", "click", () => setTheme(theme === "dark" ? "light" : "dark"));
 
   // Figures fit their places, in CSS pixels. All change at once: each change lays the page out.
   let size = "";
@@ -397,7 +285,7 @@ export function render({ view, model, el }) {
     const numbers = width > NARROW ? 345 : 60;
     const pair = (width - 2 * BORDER - numbers) / 2 - 20;
     const across = Math.trunc(Math.max(count === 1 ? wide : pair, LEAST_FRAME));
-    for (const [name] of spec.figures) {
+    for (const name of spec.figures) {
       const [frame_width, frame_height] = spec.images.includes(name)
         ? [frame, Math.trunc(frame * spec.shape)] : [across, below];
       named(`${name}_figure`).setv({ frame_width, frame_height }, { sync: false, silent: true });
@@ -410,7 +298,7 @@ export function render({ view, model, el }) {
     const typing = event.target.type === "text", key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && "zy".includes(key) && !typing) {
       event.preventDefault();
-      send("step", key === "y" || event.shiftKey);
+      send("step", key === "y" || event.shiftKey ? "on" : "");
     } else if (key === "enter" && typing) {
       event.preventDefault(); // a notebook would make no change of it
       event.target.dispatchEvent(new Event("change"));
@@ -422,8 +310,10 @@ export function render({ view, model, el }) {
       for (let one = page; one; one = one.getRootNode().host) one.setAttribute("data-lm-suppress-shortcuts", "true");
     });
   }
-  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture };
+  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
+    more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
+  find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);
   model.on("after_render", () => {
     send("ready");

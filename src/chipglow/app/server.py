@@ -1,28 +1,21 @@
-"""The app as a local server: access by a token, uploads, and the end on a signal."""
+"""The app as a local server: access by a token, and the end on a signal."""
 
 import secrets
 import signal
 import socket
-from asyncio import get_running_loop
 from contextlib import suppress
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
-from urllib.parse import urlsplit
 
 import panel as pn
 from bokeh.server.auth_provider import AuthProvider
-from tornado.web import HTTPError, RequestHandler, stream_request_body
+from tornado.web import RequestHandler
 
-from chipglow.app.opening import MOST_UPLOADED, Opened, open_uploaded
+from chipglow.app.opening import Opened, OpenFiles
 from chipglow.app.view import View
 
 LOCAL: Final = "127.0.0.1"
 TOKEN: Final = "token"
 OPEN: Final = "open"
-
-_MOST_OPEN: Final = 8
-UPLOADS: Final = f"{MOST_UPLOADED // 1024**2} MiB"
 
 
 class _Closed(RequestHandler):  # type: ignore[misc]
@@ -53,75 +46,6 @@ class TokenAuth(AuthProvider):  # type: ignore[misc]
         return "user"
 
 
-class OpenFiles:
-    """What the command opened, and what was uploaded since: the key of an upload is its name."""
-
-    def __init__(self, first: Opened) -> None:
-        self._folder = TemporaryDirectory(prefix="chipglow-app-")
-        self.folder = Path(self._folder.name)
-        self._opened = {"": first}
-
-    def find(self, key: str) -> Opened | None:
-        """Return an upload by its key, the first file without one; None if it is not open."""
-        return self._opened.get(key)
-
-    def add(self, path: Path, name: str) -> str:
-        """Open an uploaded file and return its key; the oldest of too many is removed."""
-        self._opened[path.stem] = open_uploaded(path, name)
-        for old in list(self._opened)[1:-_MOST_OPEN]:
-            del self._opened[old]
-            (self.folder / f"{old}.nc").unlink(missing_ok=True)
-        return path.stem
-
-    def close(self) -> None:
-        self._folder.cleanup()
-
-
-@stream_request_body
-class Upload(RequestHandler):  # type: ignore[misc]
-    """Receives a file in pieces and opens it."""
-
-    def initialize(self, files: OpenFiles, auth: TokenAuth, origins: tuple[str, ...]) -> None:
-        self._files, self._auth, self._origins = files, auth, origins
-        self._path: Path | None = None
-
-    def prepare(self) -> None:
-        """Refuse requests without token or of other origins, and end those of large files."""
-        origin = urlsplit(self.request.headers.get("Origin", "")).netloc
-        if self._auth.get_user(self) is None or origin not in self._origins:
-            raise HTTPError(403)
-        self.request.connection.set_max_body_size(MOST_UPLOADED)
-        self._path = self._files.folder / f"{secrets.token_urlsafe(12)}.nc"
-        self._path.touch(mode=0o600)
-
-    def data_received(self, chunk: bytes) -> None:
-        if self._path is not None:
-            with self._path.open("ab") as file:
-                file.write(chunk)
-
-    async def post(self) -> None:
-        """Open the file; answer with its key or the reason why it cannot be opened."""
-        path, add = self._path, self._files.add
-        assert path is not None
-        try:
-            self.finish(await get_running_loop().run_in_executor(None, add, path, self._name))
-        except (ValueError, OSError) as error:
-            path.unlink(missing_ok=True)
-            self.set_status(400)
-            self.set_header("Content-Type", "text/plain; charset=utf-8")
-            self.finish(" ".join(str(error).split()))
-
-    def on_connection_close(self) -> None:
-        """Remove a file whose sender has closed the connection."""
-        if self._path is not None:
-            self._path.unlink(missing_ok=True)
-
-    @property
-    def _name(self) -> str:
-        name = Path(self.get_query_argument("name", "file")).name
-        return "".join(letter for letter in name if letter.isprintable())[:100]
-
-
 class App:
     """The running app; port 0 means any that is free."""
 
@@ -132,7 +56,6 @@ class App:
         everywhere = address == "0.0.0.0"
         names = _own_names() if everywhere else {address, LOCAL, "localhost"}
         origins = tuple(f"{name}:{port}" for name in sorted(names))
-        upload = {"files": self.files, "auth": auth, "origins": origins}
         self.url = f"http://{LOCAL if everywhere else address}:{port}/?{TOKEN}={auth.token}"
         self.server = pn.io.server.get_server(
             {"/": self._page},
@@ -142,7 +65,6 @@ class App:
             title="chipglow",
             location=False,
             auth_provider=auth,
-            extra_patterns=[(r"/upload", Upload, upload)],
             unused_session_lifetime_milliseconds=15_000,
             check_unused_sessions_milliseconds=5_000,
         )
@@ -174,9 +96,9 @@ class App:
         opened = self.files.find(key)
         if opened is None:
             return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
-        view = View(opened, given, {OPEN: key} if key else {}, UPLOADS)
+        view = View(opened, given, {OPEN: key} if key else {}, self.files)
         view.start(pn.state.curdoc)
-        pn.state.on_session_destroyed(lambda _: view.session.end())
+        pn.state.on_session_destroyed(lambda _: view.end())
         return view.page
 
 

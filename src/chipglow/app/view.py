@@ -5,29 +5,33 @@ from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
 from typing import Any, ClassVar, Final
 
+import numpy as np
 import panel as pn
 import param
 from bokeh.document import Document
+from jinja2 import Environment, PackageLoader
 from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
-from chipglow.app.controls import CURSOR, Texts
+from chipglow.app.controls import Texts
 from chipglow.app.figures import TITLES, Figures
-from chipglow.app.opening import Opened, OpenedScene
+from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
-from chipglow.app.session import PHASES, TEXTURES, Session
+from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 
 _FOLDER: Final = Path(__file__).parent
-_OF_CONTROL: Final = "path", "label", "group", "unit", "low", "high", "step", "optional"
-
+_TEMPLATES: Final = Environment(
+    loader=PackageLoader("chipglow.app"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+)
 _PARTS: Final = (
     ("motion", "Motion", "Mean over the exposure minus its maximum"),
     ("footprint", "Footprint", "Mean over the pixel minus its hottest sample"),
@@ -35,16 +39,12 @@ _PARTS: Final = (
     ("detector", "Detector", "Noise, counts and calibration"),
     ("texture", "of it: texture", "Error minus that without texture: part of the others"),
 )
-_SAVES: Final = (
-    ("study.yaml", "study.yaml", "Save the settings as a study"),
-    ("chipglow.png", "Figure", "Save the images and lines as PNG"),
-    ("measurement.nc", "NetCDF", "Save the measurement and its error"),
-)
 
 
 class Page(JSComponent):  # type: ignore[misc]
     """The page around the figures; it exchanges messages with `View`."""
 
+    html = param.String()
     spec = param.String()
     figures = Children()
 
@@ -72,18 +72,18 @@ class View:
         opened: Opened,
         texts: Texts | None = None,
         link: Texts | None = None,
-        uploads: str = "",
+        files: OpenFiles | None = None,
         embedded: bool = False,
     ) -> None:
-        self._link, self._embedded = link or {}, embedded
+        self._link, self._files, self._embedded = link or {}, files, embedded
+        self._upload: Path | None = None
+        self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
         self._refused = self._restore(texts or {})
-        if isinstance(opened, OpenedScene):
-            raster, tool, images = opened.scene.raster, opened.scene.tool, tuple(TITLES)
-        else:
-            measurement = opened.measurement
-            raster, tool, images = measurement.raster, measurement.tool, ("measured",)
-        self.figures = Figures(raster, tool, images)
+        self._is_scene = isinstance(opened, OpenedScene)
+        shown = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
+        images = tuple(TITLES) if self._is_scene else ("measured",)
+        self.figures = Figures(shown.raster, shown.tool, images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._handled = 0
@@ -93,8 +93,12 @@ class View:
         panes = [
             pn.pane.Bokeh(one, sizing_mode="fixed", margin=0) for one in self.figures.all.values()
         ]
-        spec = json.dumps(self._spec(opened, uploads))
-        self.page = Page(spec=spec, figures=panes, sizing_mode="stretch_width")
+        self.page = Page(
+            html=self._html(opened),
+            spec=self._spec(opened),
+            figures=panes,
+            sizing_mode="stretch_width",
+        )
         self.page.on_msg(self._receive)
 
     def start(self, document: Document | None) -> None:
@@ -103,6 +107,12 @@ class View:
         if document is None:
             with suppress(RuntimeError):  # not in a notebook's kernel: nothing shows the page
                 self._loop = get_running_loop()
+
+    def end(self) -> None:
+        """End the work for a page that was closed."""
+        self.session.end()
+        if self._upload is not None:
+            self._upload.unlink(missing_ok=True)
 
     def _restore(self, texts: Texts) -> str:
         """Set the controls of a link that are possible; return what is wrong with the others."""
@@ -143,8 +153,8 @@ class View:
             return
         self._changed()
 
-    def _on_step(self, forward: bool) -> None:
-        self.session.step(forward)
+    def _on_step(self, forward: str) -> None:
+        self.session.step(forward=bool(forward))
         self._changed()
 
     def _changed(self) -> None:
@@ -184,6 +194,35 @@ class View:
         self._send("download", {"name": name, "data": b64encode(data).decode()})
         self._say(f"{name} is saved.")
 
+    def _on_piece(self, piece: dict[str, Any]) -> None:
+        """Append a piece of an uploaded file; the last one opens it."""
+        assert self._files is not None
+        if self._upload is None or piece["first"]:
+            self._upload = self._files.new_path()
+        with self._upload.open("ab") as file:
+            file.write(piece["data"])
+            size = file.tell()
+        if size > MOST_UPLOADED:
+            self._upload.unlink()
+        elif piece["last"]:
+            self._uploads.ask((self._upload, piece["name"]))
+            self._upload = None
+        else:
+            self._send("more", None)
+
+    def _open(self, upload: tuple[Path, str]) -> None:
+        path, name = upload
+        assert self._files is not None
+        try:
+            key = self._files.add(path, name)
+        except (ValueError, OSError):
+            path.unlink(missing_ok=True)
+            raise
+        self._notified("opened", key)
+
+    def _show_opened(self, key: str) -> None:
+        self._send("open", key)
+
     def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture, self._drawn = picture, None
         self.figures.show(picture)
@@ -218,18 +257,13 @@ class View:
                 ("reference", _celsius(readout.reference), "Maximum in the pixel"),
             ]
             rows.append(("error", _kelvins(known["case_1"]), "Measured minus reference"))
-            parts = [
-                {
-                    "name": name,
-                    "label": label,
-                    "tip": tip,
-                    "kelvin": known[name] if isfinite(known[name]) else 0.0,
-                    "text": _kelvins(known[name]),
-                }
-                for name, label, tip in _PARTS
-                if name in known
-            ]
-        self._send("numbers", {"rows": rows, "parts": parts})
+            shown = [part for part in _PARTS if part[0] in known]
+            kelvins = [known[part[0]] for part in shown]
+            bars = np.nan_to_num(kelvins)
+            percents = 50 * bars / max(1e-9, np.abs(bars).max())
+            parts = list(zip(shown, percents, map(_kelvins, kelvins), strict=True))
+        template = _TEMPLATES.get_template("numbers.html")
+        self._send("numbers", template.render(rows=rows, parts=parts))
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
@@ -272,34 +306,38 @@ class View:
         }
         self._send("values", content)
 
-    def _spec(self, opened: Opened, uploads: str) -> dict[str, Any]:
-        is_scene = isinstance(opened, OpenedScene)
+    def _html(self, opened: Opened) -> str:
+        """Return the page without figures and numbers."""
+        figures = self.figures
+        rows = (row for row in opened.controls.rows if row.group)
+        return _TEMPLATES.get_template("page.html").render(
+            name=opened.name,
+            is_scene=self._is_scene,
+            embedded=self._embedded,
+            may_upload=self._files is not None,
+            groups=[(name, list(of)) for name, of in groupby(rows, lambda row: row.group)],
+            images={name: one.figure.title.text for name, one in figures.images.items()},
+            lines={name: one.figure.title.text for name, one in figures.lines.items()},
+            draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
+        )
+
+    def _spec(self, opened: Opened) -> str:
+        """Return what page.js needs beside the page."""
         left, right, bottom, top = self.figures.extent
-        views = {"whole": "Whole view", CURSOR: "Cursor"}
-        if is_scene:
-            views |= {"rake_line": "Rake face", "band_line": "Shear band"}
-        titles = {name: one.title.text for name, one in self.figures.all.items()}
-        return {
-            "name": opened.name,
-            "embedded": self._embedded,
-            "uploads": uploads,
-            "rows": [
-                {name: getattr(row, name) for name in _OF_CONTROL}
-                | {
-                    "stops": [float(row.shown(stop)) for stop in row.stops],
-                    "options": [(word, one.label) for word, one in row.options.items()] or None,
-                }
-                for row in opened.controls.rows
-                if row.group
-            ],
-            "saves": _SAVES if is_scene else (),
-            "views": list(views.items()),
-            "images": list(self.figures.images),
-            "figures": list(titles.items()),
-            "extent": self.figures.extent,
-            "shape": (top - bottom) / (right - left),
-            "draws": f"{PHASES}² positions of the pixels, {TEXTURES} textures" if is_scene else "",
-        }
+        return json.dumps(
+            {
+                "embedded": self._embedded,
+                "most_uploaded": MOST_UPLOADED,
+                "stops": {
+                    row.path: [float(row.shown(stop)) for stop in row.stops]
+                    for row in opened.controls.rows
+                },
+                "images": list(self.figures.images),
+                "figures": list(self.figures.all),
+                "extent": self.figures.extent,
+                "shape": (top - bottom) / (right - left),
+            }
+        )
 
     def _later(self, show: Callable[[], None]) -> None:
         if self._loop is not None:

@@ -23,8 +23,7 @@ from chipglow.quantities.units import COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface import EmissivityStack, Features
-from chipglow.surface.blend import SCRATCH, blend_row
-from chipglow.surface.blocks import in_blocks
+from chipglow.surface.blend import SCRATCH, blend_row, in_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
 """Values of the table of radiance in a kelvin; a straight line between them is exact enough."""

@@ -6,30 +6,21 @@ import sys
 from collections.abc import Callable
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 
 from chipglow.cli import options as opt
 from chipglow.cli.boundary import Boundary
-from chipglow.cli.calibrate import calibrate
+from chipglow.cli.camera import calibrate, psf
+from chipglow.cli.chip import rake, shearband
 from chipglow.cli.compare import compare
-from chipglow.cli.convert import convert
-from chipglow.cli.cutting import cut
-from chipglow.cli.emissivity import emissivity
-from chipglow.cli.importing import import_source
+from chipglow.cli.emissivity import emissivity, temperature
 from chipglow.cli.materials import materials
-from chipglow.cli.measuring import measure
-from chipglow.cli.psf import psf
-from chipglow.cli.rake import rake
 from chipglow.cli.register import register
 from chipglow.cli.screen import current
-from chipglow.cli.shearband import shearband
-from chipglow.cli.temperature import temperature
-from chipglow.cli.wavelengths import wavelengths
-
-PAPER_FOLDER: Final = Path("chipglow-paper")
-ERROR_FOLDER: Final = Path("chipglow-error")
+from chipglow.cli.sources import convert, import_source
+from chipglow.cli.studies import cut, error, measure, reproduce, run, wavelengths
 
 app = typer.Typer(
     cls=Boundary,
@@ -40,8 +31,6 @@ app = typer.Typer(
 )
 cache_app = typer.Typer(help="List or delete cached scenes.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
-
-ResultFolder = Annotated[Path, opt.folder("Results folder; earlier results are replaced.")]
 
 
 def main() -> None:
@@ -92,30 +81,7 @@ def _chipglow(
     pass
 
 
-@app.command()
-def reproduce(
-    quick: Annotated[
-        bool, opt.flag("--quick", "Use coarse cells and samples; takes about a minute.")
-    ] = False,
-    steady_tool: Annotated[
-        bool,
-        opt.flag(
-            "--steady-tool",
-            "Also run the study with a steady-state tool temperature; doubles the run time.",
-        ),
-    ] = False,
-    out: ResultFolder = PAPER_FOLDER,
-    force: opt.Force = False,
-    resume: opt.Resume = False,
-    yes: opt.Yes = False,
-) -> None:
-    """Reproduce the paper's study and compare the results with the published values."""
-    from chipglow.cli.results import write_results
-    from chipglow.report import QUICK
-    from chipglow.study import Study
-
-    study, remarks = (Study.quick(), [QUICK]) if quick else (Study(), [])
-    write_results(study, out, force, resume, yes, remarks, steady_tool)
+app.command()(reproduce)
 
 
 @app.command()
@@ -155,52 +121,8 @@ def init(
     current().file(path)
 
 
-@app.command()
-def run(
-    study: opt.StudyFile,
-    out: ResultFolder,
-    force: opt.Force = False,
-    resume: opt.Resume = False,
-    yes: opt.Yes = False,
-) -> None:
-    """Run a study: cut, measure, analyse and report."""
-    from chipglow.cli.results import write_results
-    from chipglow.study import load_study
-
-    write_results(load_study(study), out, force, resume, yes)
-
-
-@app.command()
-def error(
-    scene: opt.SceneFile,
-    study: Annotated[
-        Path | None,
-        opt.value(
-            "STUDY",
-            "Study file defining surface, camera and places; omitted settings default to the "
-            "paper's.",
-        ),
-    ] = None,
-    emissivity: Annotated[
-        float | None, opt.value("NUMBER", "Uniform emissivity, instead of the study's surface.")
-    ] = None,
-    out: ResultFolder = ERROR_FOLDER,
-    force: opt.Force = False,
-) -> None:
-    """Compute the measurement error for any scene (cut, weld, melt pool, plate, ...)."""
-    from chipglow.cli.results import write_results
-    from chipglow.quantities import changed
-    from chipglow.study import Study, errors, load_study
-    from chipglow.surface import UniformSurface
-
-    if not scene.is_file():
-        raise FileNotFoundError(f"{scene}: no such file")
-    loaded = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
-    if emissivity is not None:
-        loaded = changed(loaded, {"surface": UniformSurface(emissivity)})
-    write_results(loaded, out, force, compute=errors)
-
-
+app.command()(run)
+app.command()(error)
 app.command()(cut)
 app.command("import")(import_source)
 app.command()(measure)

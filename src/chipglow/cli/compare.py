@@ -70,15 +70,13 @@ def compare(
     if uncertainty is not None and not uncertainty > 0.0:
         raise ValueError(f"--uncertainty: {uncertainty:g} K, expected over 0 K")
     whole = load_measurement(measured, settings or ())
-    chosen = chosen_tool(whole, tool, position)
+    chosen, known, notes = chosen_tool(whole, tool, position)
     result = lab.compare(
         whole,
         lab.labelled_simulations(simulated),
-        chosen.tool,
+        chosen,
         None if curve is None else read_curve(curve),
-        lab.StatedUncertainties(
-            uncertainty or 0.0, emissivity_uncertainty, position, chosen.uncertainty
-        ),
+        lab.StatedUncertainties(uncertainty or 0.0, emissivity_uncertainty, position, known),
         None if reference is None else shown_frame(whole.times, reference, option="--reference: "),
     )
     screen, fits = current(), result.fits.copy()
@@ -87,14 +85,14 @@ def compare(
     columns += ["values_with_E_n_up_to_1", "values"]
     title = f"simulated minus measured radiance temperature, ± U (k = {COVERAGE:g})"
     screen.table("fits", fits, columns, title)
-    screen.remarks(chosen.notes)
+    screen.remarks(notes)
     screen.heading()
     for sentence in result.sentences:
         screen.say(sentence)
     screen.heading()
     screen.say(result.statement)
     finish(
-        whole.notes + chosen.notes + result.notes,
+        whole.notes + notes + result.notes,
         (out, partial(_write, result, force)),
         (plot, figure(draw_comparison, result)),
     )

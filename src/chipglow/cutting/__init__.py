@@ -1,6 +1,5 @@
 """The embedded cutting simulation."""
 
-from chipglow.cutting.checkpoint import Checkpoint as Checkpoint
 from chipglow.cutting.conditions import (
     CuttingConditions as CuttingConditions,
     Friction as Friction,
@@ -13,7 +12,6 @@ from chipglow.cutting.damage import (
     FittedDamage as FittedDamage,
     JohnsonCookDamage as JohnsonCookDamage,
 )
-from chipglow.cutting.energy import EnergyHistory as EnergyHistory
 from chipglow.cutting.flow_stress import FLOW_LAWS as FLOW_LAWS, FlowStress as FlowStress
 from chipglow.cutting.laws import (
     HyperbolicTangent as HyperbolicTangent,
@@ -37,7 +35,11 @@ from chipglow.cutting.material import (
     ToolMaterial as ToolMaterial,
     WorkpieceMaterial as WorkpieceMaterial,
 )
-from chipglow.cutting.recording import Preview as Preview
+from chipglow.cutting.recording import (
+    Checkpoint as Checkpoint,
+    EnergyHistory as EnergyHistory,
+    Preview as Preview,
+)
 from chipglow.cutting.simulation import (
     SOLVER_VERSION as SOLVER_VERSION,
     CuttingSimulation as CuttingSimulation,

@@ -1,23 +1,23 @@
 """Materials as data files, each number with its unit and its source."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from pydantic import ValidationError
+
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
-from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FLOW_LAWS
 from chipglow.cutting.material import (
-    NonlocalViscosity,
     RateTable,
     TemperatureTable,
     ToolMaterial,
     WorkpieceMaterial,
 )
-from chipglow.quantities import Parameter, of_other_packages
+from chipglow.quantities import Parameter, adapter, of_other_packages, problem
 from chipglow.quantities.units import KELVINS, STRAIN_RATE
 from chipglow.text import read_yaml
 
@@ -28,10 +28,6 @@ _OWN: Final = {
 }
 _GROUP: Final = "chipglow.material"
 _NAME: Final = re.compile(r"(.+\.ya?ml|[^/]*)(?:/(.*))?")
-_HEADER: Final = ("kind", "name", "description")
-_GROUPS: Final = ("flow_stress", "damage")
-_OPTIONAL: Final = ("fitted_damage", "nonlocal_viscosity")
-_TABLES_ONLY: Final = ("conductivity", "heat_capacity")
 _RATE: Final = Parameter("Strain rate.", STRAIN_RATE, over=0.0)
 _TEMPERATURE: Final = Parameter("Temperature.", KELVINS)
 
@@ -138,89 +134,85 @@ def _material(data: Any) -> MaterialFile:
     kind = data.get("kind") if isinstance(data, Mapping) else None
     if kind not in _OWN:
         raise ValueError(f"kind: {kind!r}, expected workpiece or tool")
+    values = _without_sources("", data)
+    for key, value in values.items():
+        if isinstance(value, list) and key in WorkpieceMaterial.declared():
+            values[key] = _table(key, value)
+    del values["kind"]
+    name, description = (_text(key, values.get(key)) for key in ("name", "description"))
+    del values["description"]
     is_tool = kind == "tool"
-    declared = ToolMaterial.declared() if is_tool else WorkpieceMaterial.declared()
-    groups, optional = ((), ()) if is_tool else (_GROUPS, _OPTIONAL)
-    _check_keys("", data, (*_HEADER, *declared, *groups), optional)
-    name, description = (_text(key, data[key]) for key in ("name", "description"))
-    values = {key: _property(key, data[key], one) for key, one in declared.items()}
-    tool = _called("tool", ToolMaterial, name=name, **values) if is_tool else None
-    workpieces = {} if is_tool else _workpieces(name, data, values)
+    workpieces = {} if is_tool else _workpieces(name, values)
+    tool = _part("", ToolMaterial, values) if is_tool else None
     return MaterialFile(name, description, tuple(_numbers("", data)), workpieces, tool)
 
 
-def _workpieces(
-    name: str, data: Mapping[str, Any], values: dict[str, Any]
-) -> dict[str, WorkpieceMaterial]:
-    for key in _TABLES_ONLY:
-        if not isinstance(values[key], TemperatureTable):
-            given = data[key]["value"]
-            raise ValueError(f"{key}: {given!r}, expected rows of [temperature, value]")
-    failure: dict[str, Any] = {"damage": None}
-    if data["damage"] != "none":
-        failure["damage"] = _group("damage", data["damage"], JohnsonCookDamage)
-    if "fitted_damage" in data:
-        failure["fitted_damage"] = _fitted("fitted_damage", data["fitted_damage"])
-    if data.get("nonlocal_viscosity") is not None:
-        place = "nonlocal_viscosity"
-        values[place] = _group(place, data[place], NonlocalViscosity)
-    laws = data["flow_stress"]
+def _without_sources(place: str, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers of a file alone; what is no group of groups must state a source."""
+    values = {}
+    for key, value in data.items():
+        below = f"{place}.{key}".lstrip(".")
+        if key == "source":
+            continue
+        if isinstance(value, Mapping):
+            if not all(isinstance(one, Mapping) for one in value.values()):
+                _text(f"{below}.source", value.get("source"))
+            value = _without_sources(below, value)
+            if value.keys() == {"value"}:
+                value = value["value"]
+        values[key] = value
+    return values
+
+
+def _table(place: str, rows: list[Any]) -> RateTable | TemperatureTable:
+    """Return a table of a property over the temperature or the strain rate."""
+    by_rate = place == "taylor_quinney"
+    over, argument = ("strain rate", _RATE) if by_rate else ("temperature", _TEMPERATURE)
+    parameter = WorkpieceMaterial.declared()[place]
+    for row in rows or [rows]:
+        if not isinstance(row, list) or len(row) != 2:
+            raise ValueError(f"{place}: {row!r}, expected [{over}, value]")
+    try:
+        pairs = [(argument.number(first), parameter.number(value)) for first, value in rows]
+        columns = zip(*pairs, strict=True)
+        return RateTable(*columns) if by_rate else TemperatureTable(*columns)
+    except ValueError as error:
+        raise ValueError(f"{place}: {error}") from None
+
+
+def _workpieces(name: str, values: dict[str, Any]) -> dict[str, WorkpieceMaterial]:
+    """Return a material for each set of its flow stress."""
+    for key in ("conductivity", "heat_capacity"):
+        if key in values and not isinstance(values[key], TemperatureTable):
+            raise ValueError(f"{key}: {values[key]!r}, expected rows of [temperature, value]")
+    laws = values.get("flow_stress")
     if not isinstance(laws, Mapping) or not laws:
         raise ValueError(f"flow_stress: {laws!r}, expected one set or more by name")
     sets = {}
     for chosen, law in laws.items():
-        numbers: Any = dict(law) if isinstance(law, Mapping) else {}
+        place, numbers = f"flow_stress.{chosen}", dict(law) if isinstance(law, Mapping) else {}
         named, damage = numbers.pop("law", "johnson-cook"), numbers.pop("damage", None)
-        place, kind = f"flow_stress.{chosen}", FLOW_LAWS.find(named)
+        kind = FLOW_LAWS.find(named)
         if kind is None:
             known = ", ".join(sorted(FLOW_LAWS.kinds))
             raise ValueError(f"{place}.law: {named!r}, expected one of {known}")
         if damage not in (None, "none"):
             raise ValueError(f"{place}.damage: {damage!r}, expected none, or to be left out")
-        values |= {"name": f"{name}, flow stress {chosen}", **failure}
-        values["flow_stress"] = _group(place, numbers, kind)
+        own = {"name": f"{name}, flow stress {chosen}", "flow_stress": _part(place, kind, numbers)}
         if damage is not None:
-            values |= {"damage": None, "fitted_damage": None}
-        sets[str(chosen)] = _called("workpiece", WorkpieceMaterial, **values)
+            own |= {"damage": None, "fitted_damage": None}
+        sets[str(chosen)] = _part("", WorkpieceMaterial, values | own)
     return sets
 
 
-def _fitted(place: str, data: Any) -> Any:
-    names = tuple(FittedDamage.declared())
-    _check_keys(place, data, (*names, "source"))
-    _text(f"{place}.source", data["source"])
-    return _called(place, FittedDamage, **{name: data[name] for name in names})
-
-
-def _group(place: str, data: Any, kind: Any) -> Any:
-    """Return a part whose numbers share one source."""
-    declared = kind.declared()
-    _check_keys(place, data, (*declared, "source"))
-    _text(f"{place}.source", data["source"])
-    values = {
-        key: _called(f"{place}.{key}", one.number, data[key]) for key, one in declared.items()
-    }
-    return _called(place, kind, **values)
-
-
-def _property(place: str, data: Any, parameter: Parameter) -> Any:
-    """Return a number, or a table of rows over the temperature or the strain rate."""
-    _check_keys(place, data, ("value", "source"))
-    _text(f"{place}.source", data["source"])
-    rows = data["value"]
-    if not isinstance(rows, list):
-        return _called(place, parameter.number, rows)
-    by_rate = place == "taylor_quinney"
-    over, argument = ("strain rate", _RATE) if by_rate else ("temperature", _TEMPERATURE)
-    if not rows:
-        raise ValueError(f"{place}: [], expected rows of [{over}, value]")
-    pairs = []
-    for row in rows:
-        if not isinstance(row, list) or len(row) != 2:
-            raise ValueError(f"{place}: {row!r}, expected [{over}, value]")
-        columns = zip((argument, parameter), row, strict=True)
-        pairs.append([_called(place, column.number, value) for column, value in columns])
-    return _called(place, RateTable if by_rate else TemperatureTable, *zip(*pairs, strict=True))
+def _part(place: str, kind: Any, values: Any) -> Any:
+    """Read a part; an error names its place in the file."""
+    try:
+        return adapter(kind).validate_python(values, context={"folder": Path()})
+    except ValidationError as error:
+        named = error.errors(include_url=False)[0]["loc"]
+        separator = "." if named else ": "
+        raise ValueError(f"{place}{separator if place else ''}{problem(error)}") from None
 
 
 def _numbers(place: str, data: Mapping[str, Any]) -> Iterator[Property]:
@@ -241,30 +233,8 @@ def _numbers(place: str, data: Mapping[str, Any]) -> Iterator[Property]:
             yield Property(below, str(value), source)
 
 
-def _called(place: str, make: Callable[..., Any], *arguments: Any, **values: Any) -> Any:
-    """Call, and put the place before the message of a ValueError."""
-    try:
-        return make(*arguments, **values)
-    except ValueError as error:
-        raise ValueError(f"{place}: {error}") from None
-
-
-def _check_keys(
-    place: str, data: object, keys: tuple[str, ...], optional: tuple[str, ...] = ()
-) -> None:
-    if not isinstance(data, Mapping):
-        raise ValueError(f"{place}: {data!r}, expected keys {', '.join(keys)}")
-    prefix = f"{place}." if place else ""
-    for key in data:
-        if key not in (*keys, *optional):
-            expected = ", ".join((*keys, *optional))
-            raise ValueError(f"{prefix}{key}: unknown, expected one of {expected}")
-    for key in keys:
-        if key not in data:
-            raise ValueError(f"{prefix}{key}: is missing, expected a value")
-
-
 def _text(place: str, text: object) -> str:
     if not isinstance(text, str) or not text.strip():
-        raise ValueError(f"{place}: {text!r}, expected text")
+        shown = "is missing" if text is None else repr(text)
+        raise ValueError(f"{place}: {shown}, expected text")
     return text.strip()

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.cutting.damage import BAND_CELLS, BAND_LENGTHS, FittedDamage, JohnsonCookDamage
-from chipglow.cutting.flow_stress import FlowStress
+from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import (
     CONDUCTIVITY,
@@ -92,8 +92,7 @@ class NonlocalViscosity(Part):
 class WorkpieceMaterial(Part):
     """What is cut; a density over the temperature is thermal expansion."""
 
-    name: str
-    """With the source of the numbers."""
+    name: Annotated[str, Parameter("Name, with the source of the numbers.")]
     density: Annotated[float | TemperatureTable, Parameter("Density.", DENSITY, over=0.0)]
     young_modulus: Annotated[
         float | TemperatureTable, Parameter("Young's modulus.", STRESS, over=0.0)
@@ -101,17 +100,21 @@ class WorkpieceMaterial(Part):
     poisson_ratio: Annotated[
         float | TemperatureTable, Parameter("Poisson's ratio.", least=0.0, most=0.49)
     ]
-    flow_stress: FlowStress
-    damage: JohnsonCookDamage | None
-    """None for a material that does not fail."""
+    flow_stress: Annotated[Annotated[FlowStress, FLOW_LAWS], Parameter("Flow-stress law.")]
+    damage: Annotated[
+        JohnsonCookDamage | None, Parameter("Damage; none for a material that does not fail.")
+    ]
     conductivity: Annotated[TemperatureTable, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
     heat_capacity: Annotated[TemperatureTable, Parameter("Heat.", HEAT_CAPACITY, over=0.0)]
     taylor_quinney: Annotated[
         float | RateTable, Parameter("Fraction of work that is heat.", least=0.0, most=1.0)
     ] = 0.9
-    fitted_damage: FittedDamage | None = None
-    nonlocal_viscosity: NonlocalViscosity | None = None
-    """Without it, shear bands are as narrow as the cell."""
+    fitted_damage: Annotated[
+        FittedDamage | None, Parameter("How well fitted numbers of the damage are known.")
+    ] = None
+    nonlocal_viscosity: Annotated[
+        NonlocalViscosity | None, Parameter("Without it, shear bands are as narrow as the cell.")
+    ] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -185,8 +188,7 @@ class WorkpieceMaterial(Part):
 class ToolMaterial(Part):
     """What cuts: rigid, but it conducts heat."""
 
-    name: str
-    """With the source of the numbers."""
+    name: Annotated[str, Parameter("Name, with the source of the numbers.")]
     density: Annotated[float, Parameter("Density.", DENSITY, over=0.0)]
     conductivity: Annotated[float, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
     heat_capacity: Annotated[float, Parameter("Heat capacity.", HEAT_CAPACITY, over=0.0)]

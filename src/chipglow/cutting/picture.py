@@ -27,22 +27,12 @@ _FILL_PASSES: Final = 3
 class Picture:
     """Maker of a scene's frames from points and the tool's temperature.
 
-    The grid must cover the raster. `filled_by_tool` is the fraction of each node's square, shape
-    (columns, rows), `ambient` the temperature in K of samples that show nothing.
+    The grid must cover the lattice's raster. `filled_by_tool` is the fraction of each node's
+    square, shape (columns, rows).
     """
 
-    def __init__(
-        self,
-        grid: Grid,
-        raster: Raster,
-        tool: Tool,
-        filled_by_tool: NDArray[np.float64],
-        ambient: float,
-    ) -> None:
-        self._grid = grid
-        self._filled_by_tool = filled_by_tool
-        self._lattice = lattice_of(grid, raster, tool, ambient)
-        lattice = self._lattice
+    def __init__(self, grid: Grid, lattice: Lattice, filled_by_tool: NDArray[np.float64]) -> None:
+        self._grid, self._lattice, self._filled_by_tool = grid, lattice, filled_by_tool
         across = round((lattice.left - grid.left) / grid.cell)
         highest = round((lattice.top - grid.bottom) / grid.cell)
         self._seen_nodes = (
@@ -50,7 +40,7 @@ class Picture:
             slice(highest - lattice.rows + 1, highest + 1),
         )
         margin = 3 * grid.cell
-        left, right, bottom, top = raster.extent
+        left, right, bottom, top = lattice.raster.extent
         self._view = (left - margin, right + margin, bottom - margin, top + margin)
 
     def frame(

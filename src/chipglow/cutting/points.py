@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.cutting.material import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.quantities import Array
 
 _COLDEST: Final = TABLE_COLDEST - 1.0  # a workpiece of 200 K may round to less
 
@@ -48,9 +49,7 @@ class Grid(NamedTuple):
     rows: int
 
 
-def block_of_points(
-    x: NDArray[np.float64], y: NDArray[np.float64], spacing: float, temperature: float, speed: float
-) -> Points:
+def block_of_points(x: Array, y: Array, spacing: float, temperature: float, speed: float) -> Points:
     """Return points on the lattice of columns x and rows y (m), moving along x at `speed` (m/s)."""
     points = np.zeros(x.size * y.size, POINT)
     points["x"] = np.repeat(x, y.size)

@@ -10,7 +10,6 @@ import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 
-from chipglow.cutting.checkpoint import Checkpoint, capture, restore
 from chipglow.cutting.conditions import (
     CuttingConditions,
     Friction,
@@ -20,16 +19,19 @@ from chipglow.cutting.conditions import (
     unresolved,
 )
 from chipglow.cutting.damage import Damage
-from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.heat import (
+    CELLS,
+    HeatLoss,
     ToolHeat,
+    border_nodes,
     conduct,
+    conduct_beyond,
     conduct_tool,
     heat_contact,
+    lose_heat,
     return_heat,
     tool_fraction as fraction_of_tool,
 )
-from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import tool_material, workpiece
 from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.mean_rate import average_rates
@@ -63,9 +65,17 @@ from chipglow.cutting.points import (
     find_trouble,
     sort_by_cell,
 )
-from chipglow.cutting.recording import Preview, Recorder
+from chipglow.cutting.recording import (
+    ENERGIES,
+    Checkpoint,
+    EnergyHistory,
+    Preview,
+    Recorder,
+    capture,
+    held_energy,
+    restore,
+)
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
-from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
@@ -169,13 +179,12 @@ class CuttingSimulation:
         it has the results of an unbroken one with the same window, to the last bit, and hands over
         only the frames that are still to come. `preview` shows the cut while it is computed.
         """
-        self._check_window(window)
+        recorder = self._recorder(window)
         state = _State(self, window.interval)
         if isinstance(self.tool_temperature, ToolBody) and resume is None:
             state.warm(self.steady_tool(), self.tool_temperature)
-        picture = self._picture(raster, state)
-        coarse = self._picture(preview.raster, state) if preview is not None else None
-        recorder = self._recorder(window)
+        picture = state.picture(raster)
+        coarse = state.picture(preview.raster) if preview is not None else None
         last = recorder.last
         records = np.empty((last, 2 + ENERGIES))
         done = restore(state, resume, records) if resume is not None else 0
@@ -283,38 +292,23 @@ class CuttingSimulation:
         )
 
     def _recorder(self, window: OutputWindow) -> Recorder:
-        return Recorder(window, self.conditions.speed, self.conditions.cutting_length)
-
-    def _check_window(self, window: OutputWindow) -> None:
-        if window.end > self.conditions.cutting_length * (1 + 1e-9):
+        length = self.conditions.cutting_length
+        if window.end > length * (1 + 1e-9):
             raise ValueError(
                 f"window end: {window.end * 1e3:g} mm is beyond the cutting length of "
-                f"{self.conditions.cutting_length * 1e3:g} mm"
+                f"{length * 1e3:g} mm"
             )
-        recorder = self._recorder(window)
+        recorder = Recorder(window, self.conditions.speed, length)
         if recorder.last < recorder.first:
             raise ValueError(
                 f"window: no frame between {window.start * 1e3:g} mm and {window.end * 1e3:g} mm "
                 f"with an interval of {window.interval * 1e6:g} us"
             )
+        return recorder
 
     def lattice(self, raster: Raster) -> Lattice:
         """Return the nodes whose splines the frames are; the raster must be simulated."""
         grid = _grid(self.numerics)
-        self._check_raster(raster, grid)
-        return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
-
-    def _picture(self, raster: Raster, state: "_State") -> Picture:
-        self._check_raster(raster, state.grid)
-        return Picture(
-            state.grid,
-            raster,
-            self.tool,
-            state.tool_fraction,
-            self.conditions.initial_temperature,
-        )
-
-    def _check_raster(self, raster: Raster, grid: Grid) -> None:
         left, right, bottom, top = raster.extent
         edge = 3 * grid.cell
         inside = (
@@ -328,6 +322,7 @@ class CuttingSimulation:
                 f"field of view: x {left * 1e6:.0f} to {right * 1e6:.0f} um, "
                 f"y {bottom * 1e6:.0f} to {top * 1e6:.0f} um reaches beyond the simulated region"
             )
+        return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
 
 
 class _State:
@@ -378,8 +373,18 @@ class _State:
             material.heat_fractions(),
         )
         self.conductivity = material.conductivity.sampled()
-        self.diffusivity, self.effusivity = _conduction(material, conditions.initial_temperature)
-        self.tool_heat = _tool_heat(simulation, self.effusivity, spacing)
+        start, of_tool = conditions.initial_temperature, simulation.tool_material
+        conductivity = float(material.conductivity.at(start))
+        capacity = float(material.density_at(start) * material.heat_capacity.at(start))
+        self.diffusivity = conductivity / capacity
+        self.effusivity = sqrt(conductivity * capacity)
+        self.tool_heat = ToolHeat(
+            capacity=of_tool.density * of_tool.heat_capacity,
+            conductivity=of_tool.conductivity,
+            friction_fraction=float(of_tool.effusivity / (of_tool.effusivity + self.effusivity)),
+            conductance=simulation.friction.conductance,
+            area=spacing,
+        )
         self.loss = HeatLoss.of(simulation.surroundings, numerics)
         self.tool_fraction = fraction_of_tool(self.grid, self.tool)
         shape = (self.grid.columns, self.grid.rows)
@@ -395,12 +400,11 @@ class _State:
         self.contact_area = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
         given = simulation.tool_temperature
-        cold = conditions.initial_temperature
-        of_tool = given if isinstance(given, float) else cold
-        self.tool_temperature = np.full(shape, of_tool)
+        initial = given if isinstance(given, float) else start
+        self.tool_temperature = np.full(shape, initial)
         self.tool_border = border_nodes(self.tool_fraction)
         far = (len(self.tool_border), CELLS)
-        self.tool_beyond = np.full(far, of_tool)
+        self.tool_beyond = np.full(far, initial)
         self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
         self.grids = (
             self.starts, self.velocity, self.nodes, self.friction_heat, self.tool, self.grid
@@ -560,6 +564,10 @@ class _State:
         )  # fmt: skip
         return_heat(points, count, rise, grid)
 
+    def picture(self, raster: Raster) -> Picture:
+        """Return the maker of frames of a raster."""
+        return Picture(self.grid, self.simulation.lattice(raster), self.tool_fraction)
+
     def frame(self, picture: Picture) -> Frame:
         """Return the fields now; the strain rate is the mean over the last interval."""
         points: Points = self.points[: self.count]
@@ -637,25 +645,6 @@ def _time_steps(
     crossing = numerics.cell / (_sound(simulation) + fastest)
     steps = ceil(interval / cycles / (numerics.courant * crossing))
     return cycles, steps, interval / cycles / steps
-
-
-def _conduction(material: WorkpieceMaterial, temperature: float) -> tuple[float, float]:
-    """Return thermal diffusivity in m²/s and effusivity in W s^½/(m² K)."""
-    conductivity = material.conductivity.at(temperature)
-    capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
-    return float(conductivity / capacity), float(np.sqrt(conductivity * capacity))
-
-
-def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> ToolHeat:
-    """Return the heat of the tool, beside a chip of that effusivity."""
-    tool = simulation.tool_material
-    return ToolHeat(
-        capacity=tool.density * tool.heat_capacity,
-        conductivity=tool.conductivity,
-        friction_fraction=float(tool.effusivity / (tool.effusivity + chip)),
-        conductance=simulation.friction.conductance,
-        area=spacing,
-    )
 
 
 def _touching(tool: ToolSurface, heights: NDArray[np.float64]) -> float:

@@ -16,9 +16,8 @@ import scipy
 from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
-from chipglow.cutting.heat import ToolHeat
+from chipglow.cutting.heat import CELLS, GROWTH, ToolHeat, border_nodes
 from chipglow.cutting.points import Grid
-from chipglow.cutting.tool_border import CELLS, GROWTH, border_nodes
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
 

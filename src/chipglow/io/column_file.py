@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.radiometry import TabulatedResponse
 from chipglow.text import read_small_text
@@ -46,9 +47,7 @@ _CORNER_COLUMNS: Final = (Column("x", "um", "m"), Column("y", "um", "m"))
 _PIXEL_COLUMNS: Final = (Column("column"), Column("row"))
 
 
-def read_columns(
-    path: str | os.PathLike[str], columns: Sequence[Column]
-) -> dict[str, NDArray[np.float64]]:
+def read_columns(path: str | os.PathLike[str], columns: Sequence[Column]) -> dict[str, Array]:
     """Read a table of numbers from a CSV file: columns in SI by name, each of shape (rows,).
 
     In the first line the unit follows the name: ``temperature_degC,counts``.
@@ -56,9 +55,7 @@ def read_columns(
     return _table(Path(path), columns)[0]
 
 
-def _table(
-    path: Path, columns: Sequence[Column]
-) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
+def _table(path: Path, columns: Sequence[Column]) -> tuple[dict[str, Array], list[int]]:
     """Return the columns by name, and which line of the file each row is."""
     lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
@@ -87,7 +84,7 @@ def _table(
 
 def read_calibration_points(
     path: str | os.PathLike[str], counts_of: Callable[[str], float]
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Read a table of `POINT_COLUMNS` from a CSV file.
 
     A column ``file`` may replace ``counts``: `counts_of` gives the counts of that recording.
@@ -141,7 +138,7 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def read_polyline(path: Path) -> tuple[NDArray[np.float64], list[int]]:
+def read_polyline(path: Path) -> tuple[Array, list[int]]:
     """Read corners in m, shape (n, 2), and the line of the file of each: ``x_um,y_um``."""
     table, lines = _table(path, _CORNER_COLUMNS)
     return np.stack([table["x"], table["y"]], axis=1), lines

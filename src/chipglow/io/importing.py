@@ -17,7 +17,7 @@ from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
 from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import COLDEST, HOTTEST, LENGTH, POSITION
+from chipglow.quantities.units import COLDEST, LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
 from chipglow.text import Notes
@@ -193,7 +193,6 @@ def import_scene(
         completion.tool,
         _attributes(key, looked),
         fields,
-        hottest=HOTTEST,
         resume=resume,
     ) as writer:
         kept = f"{done} frames are kept" if done else ""

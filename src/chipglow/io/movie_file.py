@@ -86,7 +86,7 @@ class _Mp4:
 class _Gif:
     """Pillow's own writer of animations keeps all pictures; this one writes each at once.
 
-    Only the rectangle that changed is written, with what stayed in it transparent.
+    What stays from picture to picture is transparent.
     """
 
     def __init__(self, part: Path, shape: tuple[int, int], palette: NDArray[np.uint8]) -> None:
@@ -111,12 +111,9 @@ class _Gif:
         now = np.minimum(
             np.asarray(quantised), self._last
         )  # what follows in the palette are copies
-        changed = now != self._before
-        rows, columns = _extent(changed.any(axis=1)), _extent(changed.any(axis=0))
-        part = np.where(changed, now, _SAME).astype(np.uint8)[rows, columns]
+        part = Image.fromarray(np.where(now != self._before, now, _SAME).astype(np.uint8))
         how: dict[str, Any] = {"duration": 1000 // _RATE, "transparency": _SAME, "disposal": 1}
-        place = (columns.start, rows.start)
-        for block in GifImagePlugin.getdata(Image.fromarray(part), place, **how):
+        for block in GifImagePlugin.getdata(part, (0, 0), **how):
             self._file.write(block)
         self._before = now
 
@@ -126,9 +123,3 @@ class _Gif:
 
     def close(self) -> None:
         self._file.close()
-
-
-def _extent(changed: NDArray[np.bool_]) -> slice:
-    """Return the samples from the first to the last change; one if there is none."""
-    where = np.flatnonzero(changed)
-    return slice(int(where[0]), int(where[-1]) + 1) if where.size else slice(0, 1)

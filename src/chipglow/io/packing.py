@@ -93,31 +93,23 @@ class Packing:
             return {}
         return {"scale_factor": np.float32(self.step), "add_offset": np.float32(self.offset)}
 
-    @property
-    def range(self) -> tuple[float, float]:
-        """Smallest and largest value that integers reach."""
-        limits = np.iinfo(self.dtype)
-        return self.offset + self.step * limits.min, self.offset + self.step * limits.max
-
     def pack(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the values as they are stored; raise ValueError if one is beyond the range."""
         if self.step:
-            return self._counts(values)
+            counts = values - np.float32(self.offset)
+            counts *= np.float32(1.0 / self.step)
+            np.rint(counts, out=counts)
+            limits = np.iinfo(self.dtype)
+            if not (limits.min <= float(counts.min()) and float(counts.max()) <= limits.max):
+                worst = float(values.flat[np.abs(counts).argmax()])
+                low, high = (self.offset + self.step * end for end in (limits.min, limits.max))
+                raise ValueError(f"{worst:.7g} is beyond the file's range, {low:g} to {high:g}")
+            return counts.astype(self.dtype)
         if self.bits:
             # Veltkamp's splitting: the large product pushes the lower bits out.
             product = values * np.float32(2 ** (23 - self.bits) + 1)
             return np.asarray(product - (product - values))
         return values
-
-    def _counts(self, values: NDArray[Any]) -> NDArray[Any]:
-        lowest, highest = self.range
-        least, greatest = float(values.min()), float(values.max())
-        if not (lowest <= least and greatest <= highest):
-            wrong = greatest if lowest <= least else least
-            raise ValueError(f"{wrong:.7g} is beyond the file's range, {lowest:g} to {highest:g}")
-        counts = values - np.float32(self.offset)
-        counts *= np.float32(1.0 / self.step)
-        return np.rint(counts, out=counts).astype(self.dtype)
 
     def unpack(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Return a copy of the values of what `pack` returned."""
@@ -134,7 +126,7 @@ class Packing:
 # their blends the rounding of strain and strain rate changes the emissivity by under 6e-5. Half a
 # step of the material coordinates is 1.5 % of a sample: 5e-5 on a typical slope of a texture.
 PACKING: Final[Mapping[str, Packing]] = {
-    "temperature": Packing(np.uint16, step=0.025, offset=200.0),
+    "temperature": Packing(np.int32, step=0.025, offset=200.0),
     "plastic_strain": Packing(bits=13),
     "plastic_strain_rate": Packing(bits=11),
     "velocity_x": Packing(bits=10),
@@ -145,14 +137,3 @@ PACKING: Final[Mapping[str, Packing]] = {
     "quality": Packing(np.uint8),
 }
 """Resolution of each field of a scene."""
-
-HOTTEST_PACKED: Final = 1838.375
-"""Greatest temperature in K that 16 bits of its steps reach."""
-
-HOT: Final = Packing(np.int32, step=0.025, offset=200.0)
-"""The temperature of a scene that may be hotter."""
-
-
-def packing_for(hottest: float) -> Mapping[str, Packing]:
-    """Return the packing of each field of a scene with temperatures in K up to `hottest`."""
-    return PACKING if hottest <= HOTTEST_PACKED else {**PACKING, "temperature": HOT}

@@ -3,7 +3,8 @@
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import lru_cache, partial
+from dataclasses import KW_ONLY, dataclass
+from functools import lru_cache
 from importlib.metadata import version
 from importlib.resources import files
 from math import prod
@@ -21,16 +22,8 @@ from chipglow.io import spline_file
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import (
-    COMPRESSION,
-    HOTTEST_PACKED,
-    Packing,
-    chunk_of,
-    packing_for,
-    read_chunk,
-)
+from chipglow.io.packing import COMPRESSION, PACKING, Packing, chunk_of, read_chunk
 from chipglow.io.spool import UnfinishedScene, spooled
-from chipglow.quantities.units import HOTTEST
 from chipglow.scene import (
     ENERGY_UNITS,
     FIELD_UNITS,
@@ -83,44 +76,37 @@ CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
 """The fields that the cutting simulation knows."""
 
 
+@dataclass
 class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
-    A context manager: frames lie in a `Spool` beside the file, which is written at the end.
-    `hottest` is the greatest temperature in K that frames may have; over the default it takes 32
-    bits instead of 16. With a `lattice` the splines of the frames are kept instead of their
-    samples. `resume` begins with the frames of the last checkpoint of an earlier writer.
+    A context manager: frames lie in a `Spool` beside the file, which is written at the end. With a
+    `lattice` the splines of the frames are kept instead of their samples. `resume` begins with the
+    frames of the last checkpoint of an earlier writer.
 
-    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K up,
-    material coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are
-    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
+    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK, material
+    coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are within 2⁻¹⁴,
+    2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
     """
 
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        raster: Raster,
-        tool: Tool | None = None,
-        attributes: Mapping[str, Any] | None = None,
-        fields: Sequence[str] = CUT_FIELDS,
-        *,
-        hottest: float = HOTTEST_PACKED,
-        lattice: Lattice | None = None,
-        resume: UnfinishedScene | None = None,
-    ) -> None:
-        self.path = Path(path)
-        self.raster = raster
-        self._attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
+    path: str | os.PathLike[str]
+    raster: Raster
+    tool: Tool | None = None
+    attributes: Mapping[str, Any] | None = None
+    fields: Sequence[str] = CUT_FIELDS
+    _: KW_ONLY
+    lattice: Lattice | None = None
+    resume: UnfinishedScene | None = None
+
+    def __post_init__(self) -> None:
+        self._path = Path(self.path)
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
-        self._units = {name: units[name] for name in fields}
-        self._lattice = lattice
-        self._packing = packing_for(hottest)
+        self._units = {name: units[name] for name in self.fields}
         self._forces: dict[str, tuple[str, NDArray[np.float64]]] = {}
         self._stack = ExitStack()
-        self._resume = resume
 
     def __enter__(self) -> "SceneWriter":
-        self._spool = self._stack.enter_context(spooled(self.path, self._resume))
+        self._spool = self._stack.enter_context(spooled(self._path, self.resume))
         return self
 
     @uninterrupted()
@@ -135,7 +121,7 @@ class SceneWriter:
                 raise error
             if not self._spool.times:
                 raise SceneError(f"{self.path}: no frame was written, expected 1 or more")
-            write_hdf5(self.path, self._write)
+            write_hdf5(self._path, self._write)
 
     def append(self, frame: Frame) -> None:
         """Write the next frame."""
@@ -159,28 +145,21 @@ class SceneWriter:
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         """Write the force history, and the energy balance with it."""
-        units = {"force_time": "s", **FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
-        given = {"cutting_force": cutting, "thrust_force": thrust, **(energies or {})}
-        if set(given) != set(units) - {"force_time"}:
-            raise SceneError(f"scene: energies {list(energies or {})}, expected {list(units)[3:]}")
-        time = np.asarray(times, dtype=np.float64)
-        if time.ndim != 1 or (np.diff(time) <= 0).any() or not np.isfinite(time).all():
-            raise SceneError("scene: force_time must be one finite, ascending row of times")
-        history = {"force_time": time}
-        for name in given:
-            history[name] = np.asarray(given[name], dtype=np.float64)
-            if history[name].shape != time.shape or not np.isfinite(history[name]).all():
-                raise SceneError(f"scene: {name!r} must be finite and have shape {time.shape}")
-        self._forces = {name: (unit, history[name]) for name, unit in units.items()}
+        units = {"force_time": "s", **FORCE_UNITS, **ENERGY_UNITS}
+        history = {"force_time": times, "cutting_force": cutting, "thrust_force": thrust}
+        history |= energies or {}
+        self._forces = {
+            name: (units[name], np.asarray(values, np.float64)) for name, values in history.items()
+        }
 
     def _kept(self, frame: Frame) -> list[NDArray[Any]]:
         """Return what the file keeps of a frame, in the order of the variables."""
-        if self._lattice is None:
+        if self.lattice is None:
             return [self._packed(name, frame) for name in self._units]
-        if frame.splines is None or frame.splines.nodes.shape != self._lattice.shape:
+        if frame.splines is None or frame.splines.nodes.shape != self.lattice.shape:
             raise SceneError(
                 f"scene: the frame at {frame.time:.9g} s has no splines of shape "
-                f"{self._lattice.shape}, expected those of the lattice"
+                f"{self.lattice.shape}, expected those of the lattice"
             )
         kept = spline_file.rounded(frame.splines)
         return [np.asarray(kept[name], np.float32) for name in spline_file.CHUNKED]
@@ -193,7 +172,7 @@ class SceneWriter:
                 f"scene: {name!r} is {found} at {frame.time:.9g} s, expected {self.raster.shape}"
             )
         try:
-            packing = self._packing[name]
+            packing = PACKING[name]
             return np.asarray(packing.pack(values), packing.dtype)
         except ValueError as error:
             raise SceneError(f"scene: {name!r} at {frame.time:.9g} s: {error}") from None
@@ -204,7 +183,7 @@ class SceneWriter:
             h5netcdf.File(hdf, "w") as file,
         ):
             self._create_variables(file)
-            chunked = spline_file.CHUNKED if self._lattice else tuple(self._units)
+            chunked = spline_file.CHUNKED if self.lattice else tuple(self._units)
             for index, chunk in enumerate(self._spool.chunks()):
                 frame, place = divmod(index, len(chunked))
                 dataset = hdf[chunked[place]].id
@@ -217,7 +196,8 @@ class SceneWriter:
         file.dimensions = {"time": times.size, "y": rows, "x": columns}
         file.attrs.update(
             {
-                **self._attributes,
+                **(self.attributes or {}),
+                **(tool_attributes(self.tool) if self.tool else {}),
                 "Conventions": "CF-1.11",
                 "chipglow_version": version("chipglow"),
                 "chipglow_format": SCENE_FORMAT,
@@ -226,8 +206,8 @@ class SceneWriter:
         for name, (dimension, values, attributes) in raster_coordinates(self.raster, times).items():
             variable = file.create_variable(name, (dimension,), data=values, **COMPRESSION)
             variable.attrs.update(attributes)
-        if self._lattice is not None:
-            spline_file.create(file, self._lattice)
+        if self.lattice is not None:
+            spline_file.create(file, self.lattice)
         else:
             self._create_fields(file)
         if self._forces:
@@ -240,7 +220,7 @@ class SceneWriter:
     def _create_fields(self, file: h5netcdf.File) -> None:
         chunks = (1, *self.raster.shape)
         for name, unit in self._units.items():
-            packing = self._packing[name]
+            packing = PACKING[name]
             variable = file.create_variable(
                 name, ("time", "y", "x"), packing.dtype, chunks=chunks, **COMPRESSION
             )
@@ -252,26 +232,39 @@ class StoredScene(Scene):
 
     Fields that are packed as `SceneWriter` packs them are read without the way through xarray,
     in half the time; what was read last stays in memory, up to `CACHED_BYTES`. `lattice` states
-    where the nodes are if the file holds splines, None if it holds samples.
+    where the nodes are if the file holds splines, None if it holds samples; `coarser` gives it
+    another one, and some of the frames.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(
+        self, path: Path, lattice: Lattice | None = None, kept: Sequence[int] | None = None
+    ) -> None:
         self.path = path
         self._file = h5py.File(path, "r")
         data = xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
-        self.lattice = spline_file.stored_lattice(self._file, data)
+        self.lattice = lattice or spline_file.stored_lattice(self._file, data)
+        self._kept = range(data.sizes.get("time", 0)) if kept is None else kept
         fields = (*CUT_FIELDS, QUALITY) if self.lattice is None else spline_file.CHUNKED
         datasets = {name: self._file[name] for name in fields if name in data}
         packings = {name: Packing.stored(dataset) for name, dataset in datasets.items()}
         self._direct = {name: packing for name, packing in packings.items() if packing}
+        if lattice is not None:
+            places = raster_coordinates(lattice.raster, data["time"].values[self._kept])
+            data = xr.Dataset(coords=places, attrs=data.attrs)
         if self.lattice is not None:
             data = spline_file.with_samples(data, self._read, _LONG_NAMES)
         shape = self.lattice.shape if self.lattice else tuple(data.sizes.get(n, 1) for n in "yx")
         chunks = CACHED_BYTES // max(prod(shape) * np.dtype(np.float32).itemsize, 1)
-        self._chunk = lru_cache(chunks)(partial(_read_chunk, path, datasets))
+
+        @lru_cache(chunks)
+        def chunk(name: str, index: int) -> NDArray[Any]:
+            with _telling(path, name, index):
+                return read_chunk(datasets[name], index)
+
+        self._chunk = chunk
         super().__init__(data)
 
-    def coarser(self, step: int, every: int = 1) -> Scene:
+    def coarser(self, step: int, every: int = 1) -> "StoredScene":
         """Return the scene of splines with fewer samples, for a quick look.
 
         `step` samples in either direction become one; one frame of `every` is kept, the first
@@ -280,14 +273,7 @@ class StoredScene(Scene):
         if self.lattice is None:
             raise ValueError(f"{self.path}: has samples, expected splines")
         kept = [index for block in self.blocks for index in block[::every]]
-        return _CoarserScene(self, self.lattice.coarser(step), kept)
-
-    @property
-    def hottest(self) -> float:
-        """Temperature in K over which the file can have none."""
-        packing = self._direct.get("temperature")
-        narrow = packing and packing.step and packing.range[1] < HOTTEST_PACKED + packing.step
-        return HOTTEST_PACKED if narrow else HOTTEST
+        return StoredScene(self.path, self.lattice.coarser(step), kept)
 
     @property
     def compression(self) -> str:
@@ -305,8 +291,8 @@ class StoredScene(Scene):
         """Return the splines of one frame; None if the file has samples."""
         if self.lattice is None:
             return None
-        index = range(len(self.times))[index]
-        nodes, limits = (self._chunk(name, index) for name in spline_file.CHUNKED)
+        stored = self._kept[index]
+        nodes, limits = (self._chunk(name, stored) for name in spline_file.CHUNKED)
         frame = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
         spline_file.check(frame)
         return frame
@@ -323,13 +309,6 @@ class StoredScene(Scene):
         return self._direct[name].unpack(self._chunk(name, index))
 
 
-def _read_chunk(
-    path: Path, datasets: Mapping[str, h5py.Dataset], name: str, index: int
-) -> NDArray[Any]:
-    with _telling(path, name, index):
-        return read_chunk(datasets[name], index)
-
-
 @contextmanager
 def _telling(path: Path, name: str, index: int) -> Iterator[None]:
     """Name the place of what cannot be read."""
@@ -339,30 +318,6 @@ def _telling(path: Path, name: str, index: int) -> Iterator[None]:
         raise SceneError(
             f"{path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
         ) from error
-
-
-class _CoarserScene(Scene):
-    """A stored scene of splines on fewer samples; see `StoredScene.coarser`."""
-
-    def __init__(self, stored: StoredScene, lattice: Lattice, kept: Sequence[int]) -> None:
-        self._stored, self._lattice, self._kept = stored, lattice, kept
-        places = raster_coordinates(lattice.raster, stored.times[kept])
-        empty = xr.Dataset(coords=places, attrs=stored.data.attrs)
-        super().__init__(spline_file.with_samples(empty, self._read, _LONG_NAMES))
-
-    def splines(self, index: int) -> SplineFrame:
-        """Return the splines of one frame."""
-        found = self._stored.splines(self._kept[index])
-        assert found is not None
-        return SplineFrame(self._lattice, found.time, found.nodes, found.limits)
-
-    def _unchecked(self, index: int, names: Collection[str] | None) -> Frame:
-        return self.splines(index).frame(names)
-
-    def _read(self, name: str, index: int) -> NDArray[Any]:
-        frame = self.splines(index)
-        material = frame.material()
-        return material if name == "material" else frame.values(name, material)
 
 
 def open_scene(path: str | os.PathLike[str]) -> StoredScene:
@@ -431,7 +386,6 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
         scene.raster,
         attributes=scene.data.attrs,
         fields=scene.fields,
-        hottest=stored.hottest if stored is not None else HOTTEST,
         lattice=stored.lattice if stored is not None and not samples else None,
     ) as writer:
         for frame in scene.frames():

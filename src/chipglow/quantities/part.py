@@ -255,6 +255,8 @@ class Family:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         sections = [part.__get_pydantic_json_schema__({}, handler) for part in self.parts.values()]
+        if not sections:  # a family for the parts of other packages
+            return {"not": {}}
         return {"oneOf": sections, "discriminator": {"propertyName": "kind"}}
 
 

@@ -45,6 +45,7 @@ _SPELLINGS: Final = {
     "°f": "degF",
     "microns": "micron",
     "k": "K",
+    "kelvin": "K",
     "%": "percent",
 }
 _NO_UNIT: Final = ("", "1", "-", "none", "dimensionless", "m/m", "mm/mm", "m m-1")

@@ -294,7 +294,7 @@ class _Keeper:
             return
         file = self._writer.checkpoint(checkpoint.arrays, checkpoint.progress)
         self.note = _kept(checkpoint, file)
-        for left in unfinished_scenes(self._writer.path):
+        for left in unfinished_scenes(Path(self._writer.path)):
             if left.progress <= checkpoint.progress:
                 left.remove()
         end = monotonic()

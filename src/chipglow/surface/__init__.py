@@ -1,19 +1,11 @@
 """Surfaces: emissivity maps that follow the material."""
 
-from chipglow.surface.cross_section import (
-    SideElements as SideElements,
-)
 from chipglow.surface.directional import (
     DIRECTIONS as DIRECTIONS,
     Direction as Direction,
     Fresnel as Fresnel,
 )
-from chipglow.surface.emissivity import (
-    Emissivity as Emissivity,
-)
-from chipglow.surface.exchange import (
-    Exchange as Exchange,
-)
+from chipglow.surface.exchange import Exchange as Exchange
 from chipglow.surface.feature import (
     CHIP_1 as CHIP_1,
     CHIP_2 as CHIP_2,
@@ -25,9 +17,7 @@ from chipglow.surface.feature import (
     feature_fractions as feature_fractions,
     shear_band_fraction as shear_band_fraction,
 )
-from chipglow.surface.map import (
-    MapSurface as MapSurface,
-)
+from chipglow.surface.map import MapSurface as MapSurface
 from chipglow.surface.oxide import (
     OXIDES as OXIDES,
     Oxide as Oxide,
@@ -36,6 +26,7 @@ from chipglow.surface.oxide import (
 )
 from chipglow.surface.side_flow import (
     REFLECTIONS as REFLECTIONS,
+    SideElements as SideElements,
     SideShape as SideShape,
     Wedge as Wedge,
 )
@@ -63,6 +54,4 @@ from chipglow.surface.temperature import (
     TrendSurface as TrendSurface,
     UniformSurface as UniformSurface,
 )
-from chipglow.surface.texture import (
-    Texture as Texture,
-)
+from chipglow.surface.texture import Emissivity as Emissivity, Texture as Texture

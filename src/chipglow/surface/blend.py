@@ -4,10 +4,12 @@ Each step is a loop over the row without branches, which becomes vector instruct
 textures, whose nodes lie scattered, the four by four about a sample are vectors instead.
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import get_num_threads, njit
 from numpy.typing import NDArray
 
 from chipglow.scene import Material
@@ -139,3 +141,10 @@ def blend_row(  # type: ignore[no-untyped-def]
                 _add_linear(scratch[k], deviates, mean, deviation, result[n])
             else:
                 _add_tabled(scratch[k], deviates, tables[n, k], result[n])
+
+
+def in_blocks(count: int, work: Callable[[int, int], None], size: int = 16) -> None:
+    """Work on rows (or columns) from a first up to a last number, a block in each call."""
+    firsts = range(0, count, size)
+    with ThreadPoolExecutor(get_num_threads()) as pool:
+        list(pool.map(work, firsts, (min(first + size, count) for first in firsts)))

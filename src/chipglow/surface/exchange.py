@@ -8,17 +8,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.quantities import Array
+
 RAYS: Final = 2048
 """Rays that leave each element."""
 BOUNCES: Final = 64
 """Most reflections by mirrors along a ray; what is left then comes from the surroundings."""
-TOLERANCE: Final = 1e-9
-"""Change of the irradiation, of the largest radiance, at which the iteration ends."""
 
-_Paths: TypeAlias = tuple[NDArray[np.int16], NDArray[np.float64], NDArray[np.int64]]
+_Paths: TypeAlias = tuple[NDArray[np.int16], Array, NDArray[np.int64]]
 
 _GOLDEN: Final = (5.0**0.5 - 1.0) / 2.0
-_MOST_SWEEPS: Final = 10_000
 _OPEN: Final = -1
 _EDGE: Final = 1e-12
 
@@ -42,47 +41,31 @@ class Exchange:
     fraction s of the reflected light that mirrors make.
     """
 
-    starts: NDArray[np.float64]
-    ends: NDArray[np.float64]
+    starts: Array
+    ends: Array
     """Ends of the elements in m, shape (element, 2)."""
     rays: int = RAYS
     """Rays that leave each element, evenly over its length and the sine of their angle."""
 
-    def __post_init__(self) -> None:
-        shape = self.starts.shape
-        if len(shape) != 2 or shape[1] != 2 or shape[0] < 1 or self.ends.shape != shape:
-            raise ValueError(
-                f"exchange: starts and ends have shapes {shape} and {self.ends.shape}, "
-                "expected (elements, 2) of both"
-            )
-        if not (self.lengths > 0).all():
-            raise ValueError("exchange: an element has no length, expected over 0 m")
-        if self.rays < 1:
-            raise ValueError(f"exchange: rays is {self.rays!r}, expected 1 or more")
-
     @cached_property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Array:
         """Lengths of the elements in m."""
         return np.asarray(np.hypot(*(self.ends - self.starts).T), np.float64)
 
     @property
-    def middles(self) -> NDArray[np.float64]:
+    def middles(self) -> Array:
         """Middles of the elements in m, shape (element, 2)."""
         return (self.starts + self.ends) / 2
 
     @cached_property
-    def view_factors(self) -> NDArray[np.float64]:
+    def view_factors(self) -> Array:
         """Fraction of each element's diffuse radiation that first meets each other one.
 
         Shape (element, element + 1); the last column is what leaves to the surroundings, so that
         every row has the sum 1.
         """
-        paths, weights, first = self._first_hits
-        count = len(self.lengths)
-        factors = np.zeros((count, count + 1))
-        element = np.repeat(np.arange(count), np.diff(first))
-        np.add.at(factors, (element, paths[:, 0]), weights)  # −1, the open, is the last column
-        return factors
+        no_mirrors = np.zeros((1, len(self.lengths)))
+        return np.asarray(_factors(*self._first_hits, no_mirrors)[0])
 
     def incident(
         self,
@@ -91,7 +74,7 @@ class Exchange:
         surroundings: float = 0.0,
         mirror: ArrayLike = 0.0,
         eye: ArrayLike | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Array:
         """Return the irradiation over π of each element, shape (..., element).
 
         Of blackbodies' radiance (..., element), emissivities, the surroundings' radiance, and
@@ -107,23 +90,22 @@ class Exchange:
         shape, count = black.shape, len(self.lengths)
         own = (emissivities * black).reshape(-1, count)
         reflectance = (1.0 - emissivities).reshape(-1, count)
-        mirror_part = np.ascontiguousarray(mirrors.reshape(-1, count))
-        if not mirrors.any():
-            return self._diffuse(own, reflectance, surroundings).reshape(shape)
-        looked = np.zeros((0, 0), np.int16) if eye is None else self._mirrored(np.asarray(eye))
-        result, paths = np.empty_like(own), self._all_hits
-        scale = max(float(np.max(black, initial=0.0)), surroundings) * TOLERANCE
-        _solve(own, reflectance, mirror_part, *paths, looked, surroundings, scale, result)
-        return result.reshape(shape)
+        mirror_part = mirrors.reshape(-1, count)
+        specular, diffuse = reflectance * mirror_part, reflectance * (1.0 - mirror_part)
+        paths = self._all_hits if mirrors.any() else self._first_hits
 
-    def _diffuse(
-        self, own: NDArray[np.float64], reflectance: NDArray[np.float64], surroundings: float
-    ) -> NDArray[np.float64]:
-        """Irradiation without mirrors, case by case: H − F (1 − ε) H = F ε L + F_open L_env."""
-        to_elements, leaving = self.view_factors[:, :-1], self.view_factors[:, -1]
-        matrix = np.eye(len(leaving)) - to_elements * reflectance[:, None, :]
-        known = own @ to_elements.T + surroundings * leaving
-        return np.asarray(np.linalg.solve(matrix, known[..., None])[..., 0], np.float64)
+        def arriving(factors: Array, radiosity: Array) -> Array:
+            to_elements, leaving = factors[..., :-1], factors[..., -1]
+            return np.asarray((to_elements @ radiosity[..., None])[..., 0] + surroundings * leaving)
+
+        # H − F (1 − ε)(1 − s) H = F ε L + F_open L_env, case by case.
+        factors = _factors(*paths, specular)
+        matrix = np.eye(count) - factors[..., :-1] * diffuse[:, None, :]
+        result = np.linalg.solve(matrix, arriving(factors, own)[..., None])[..., 0]
+        if eye is not None and mirrors.any():
+            seen = _factors(*self._mirrored(np.asarray(eye)), specular)
+            result += mirror_part * (arriving(seen, own + diffuse * result) - result)
+        return np.asarray(result.reshape(shape))
 
     @cached_property
     def _first_hits(self) -> _Paths:
@@ -146,13 +128,13 @@ class Exchange:
             first.append(first[-1] + len(different))
         return np.concatenate(paths), np.concatenate(weights), np.array(first)
 
-    def _mirrored(self, eye: NDArray[np.float64]) -> NDArray[np.int16]:
-        """Paths that an eye sees in the elements' middles, shape (element, bounce)."""
+    def _mirrored(self, eye: Array) -> _Paths:
+        """Return what an eye sees in the elements' middles, a path each."""
         along = (self.ends - self.starts) / self.lengths[:, None]
         sine = -(along @ (eye / np.hypot(*eye)))
-        return np.stack(
-            [_trace_one(self.starts, self.ends, i, 0.5, sine[i], BOUNCES) for i in range(len(sine))]
-        )
+        number = np.arange(len(sine) + 1)
+        seen = [_trace_one(self.starts, self.ends, i, 0.5, sine[i], BOUNCES) for i in number[:-1]]
+        return np.stack(seen), np.ones(len(sine)), number
 
 
 @njit(cache=True)
@@ -199,43 +181,21 @@ def _trace_one(starts, ends, element, place, sine, bounces):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _along(path, radiosity, reflectance, mirror, surroundings):  # type: ignore[no-untyped-def]
-    """Radiance that arrives along a path."""
-    total, left = 0.0, 1.0
-    for hit in path:
-        if hit == _OPEN or left == 0.0:
-            break
-        total += left * radiosity[hit]
-        left *= reflectance[hit] * mirror[hit]
-    return total + left * surroundings
+def _factors(paths, weights, first, specular):  # type: ignore[no-untyped-def]
+    """Fractions of the radiosity of elements, and of the surroundings, that arrive at each element.
 
-
-@njit(cache=True)
-def _solve(  # type: ignore[no-untyped-def]
-    own, reflectance, mirror, paths, weights, first, looked, surroundings, tolerance, result
-):
-    """Irradiation of every element, or what an eye sees reflected, case by case."""
-    cases, elements = own.shape
-    incident = np.empty(elements)
-    radiosity = np.empty(elements)
+    Shape (case, element, element + 1), by the reflectance of mirrors (case, element) on the way.
+    """
+    cases, elements = specular.shape
+    result = np.zeros((cases, elements, elements + 1))
     for c in range(cases):
-        incident[:] = surroundings
-        radiosity[:] = own[c] + reflectance[c] * (1.0 - mirror[c]) * surroundings
-        for _ in range(_MOST_SWEEPS):
-            change = 0.0
-            for i in range(elements):
-                total = 0.0
-                for p in range(first[i], first[i + 1]):
-                    total += weights[p] * _along(
-                        paths[p], radiosity, reflectance[c], mirror[c], surroundings
-                    )
-                change = max(change, abs(total - incident[i]))
-                incident[i] = total
-                radiosity[i] = own[c, i] + reflectance[c, i] * (1.0 - mirror[c, i]) * total
-            if change <= tolerance:
-                break
         for i in range(elements):
-            result[c, i] = incident[i]
-            if len(looked) and mirror[c, i] > 0.0:
-                straight = _along(looked[i], radiosity, reflectance[c], mirror[c], surroundings)
-                result[c, i] += mirror[c, i] * (straight - incident[i])
+            for p in range(first[i], first[i + 1]):
+                left = weights[p]
+                for hit in paths[p]:
+                    if hit == _OPEN or left == 0.0:
+                        break
+                    result[c, i, hit] += left
+                    left *= specular[c, hit]
+                result[c, i, elements] += left
+    return result

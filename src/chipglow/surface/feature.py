@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from numba import njit
@@ -21,21 +21,16 @@ from chipglow.surface.blend import (
     STRAIN_OF_WORKPIECE,
     Textures,
     blend_row,
-    fraction_between,
+    in_blocks,
 )
-from chipglow.surface.blocks import in_blocks
-from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.surface import Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import EmissivityTrend, draw_text, drawn_trends
-from chipglow.surface.texture import Texture, padded
+from chipglow.surface.texture import Emissivity, Texture, padded
 
 UNDEFORMED_STRAIN: Final = 0.01
 """Plastic strain under which material is not affected by the cut."""
 
 FEATURES: Final = ("workpiece", "chip", "shear_band", "tool")
-_VOID, _TOOL = int(Material.VOID), int(Material.TOOL)
-
-
 _WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
 """The paper's Table 1."""
 
@@ -87,7 +82,12 @@ class FeatureSurface(Surface, Part):
         """Textures by the names of `FEATURES`; their ``standard_deviation`` is the realised one."""
         streams = np.random.SeedSequence(self.seed).spawn(len(FEATURES))
         return {
-            name: self._texture(getattr(self, name), np.random.default_rng(stream))
+            name: Texture.random(
+                getattr(self, name),
+                self.grain,
+                np.random.default_rng(stream),
+                restore_standard_deviation=self.restore_standard_deviation,
+            )
             for name, stream in zip(FEATURES, streams, strict=True)
         }
 
@@ -113,14 +113,12 @@ class FeatureSurface(Surface, Part):
                 "apart; expected a surface of another kind, such as {kind: uniform, emissivity: "
                 "0.5}"
             )
-        if self.follow == "mean" and "velocity_x" not in scene.fields:
+        needed = {"mean": ("velocity_x", "velocity"), "material": ("material_x", "coordinates")}
+        field, what = needed.get(self.follow, ("plastic_strain", ""))
+        if field not in scene.fields:
             raise ValueError(
-                "follow: the scene has no velocity for 'mean', expected 'material' or 'none'"
-            )
-        if self.follow == "material" and not scene.has_material_coordinates:
-            raise ValueError(
-                "follow: the scene has no material coordinates for 'material', expected 'mean' or "
-                "'none'"
+                f"follow: the scene has no {what} of the material for {self.follow!r}, expected "
+                "another of 'material', 'mean' and 'none'"
             )
         times, shifts = scene.times, np.zeros((len(scene.times), 3, 2))
         if self.follow == "mean":
@@ -136,22 +134,8 @@ class FeatureSurface(Surface, Part):
         return replace(self, seed=self.seed + number) if number else self
 
     def without_texture(self) -> Self:
-        """See `Surface.without_texture`."""
-        return replace(
-            self,
-            chip=Emissivity(self.chip.mean),
-            shear_band=Emissivity(self.shear_band.mean),
-            workpiece=Emissivity(self.workpiece.mean),
-            tool=Emissivity(self.tool.mean),
-        )
-
-    def _texture(self, emissivity: Emissivity, generator: np.random.Generator) -> Texture:
-        return Texture.random(
-            emissivity,
-            self.grain,
-            generator,
-            restore_standard_deviation=self.restore_standard_deviation,
-        )
+        means: Any = {name: Emissivity(getattr(self, name).mean) for name in FEATURES}
+        return replace(self, **means)
 
 
 CHIP_1: Final = FeatureSurface(chip=Emissivity(0.42, 0.07), shear_band=Emissivity(0.53, 0.05))
@@ -179,16 +163,8 @@ class Features:
         result: NDArray[np.float32] = self.emissivities(frame)[0]
         return result
 
-    def beside(self, others: Sequence[object]) -> "Features | None":
-        """Return the features with others after them; None if those move in another way."""
-        surfaces = list(self.surfaces)
-        for other in others:
-            if not (isinstance(other, Features) and self._moves_like(other)):
-                return None
-            surfaces += other.surfaces
-        return replace(self, surfaces=tuple(surfaces))
-
-    def _moves_like(self, other: "Features") -> bool:
+    def moves_like(self, other: "Features") -> bool:
+        """Whether textures of both are looked up at the same places."""
         names = ("grain", "follow", "restore_standard_deviation")
         one, two = self.surfaces[0], other.surfaces[0]
         alike = all(getattr(one, name) == getattr(two, name) for name in names)
@@ -264,8 +240,10 @@ class EmissivityStack:
     @cached_property
     def features(self) -> Features | None:
         """The features under all fields, if they move alike."""
-        first, *others = (field.bare for field in self.fields)
-        return first.beside(others) if isinstance(first, Features) else None
+        bare = [field.bare for field in self.fields if isinstance(field.bare, Features)]
+        if len(bare) < len(self.fields) or not all(one.moves_like(bare[0]) for one in bare):
+            return None
+        return replace(bare[0], surfaces=tuple(one.surfaces[0] for one in bare))
 
     @property
     def is_bare(self) -> bool:
@@ -377,20 +355,18 @@ def _mean_shifts(scene: Scene) -> NDArray[np.float64]:
 
 def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean velocity of workpiece, chip and shear band in m/s, shape (3, 2); NaN if not there."""
-    rows, rate = np.empty((len(height), 3, 3)), frame.plastic_strain_rate
-    fields = (
-        frame.material,
-        frame.needed("plastic_strain"),
-        np.zeros(frame.material.shape, np.float32) if rate is None else rate,
-        frame.needed("velocity_x"),
-        frame.needed("velocity_y"),
-    )
-    in_blocks(len(height), lambda begin, end: _sum_velocities(*fields, height, begin, end, rows))
-    sums = rows.sum(axis=0)
-    weight = np.where(sums[:, 2:] > 0, sums[:, 2:], np.nan)
-    velocity = sums[:, :2] / weight
+    strain, rate = frame.needed("plastic_strain"), frame.plastic_strain_rate
+    there = frame.material == Material.WORKPIECE
+    band = np.zeros(there.shape) if rate is None else shear_band_fraction(rate)
+    undeformed = strain < UNDEFORMED_STRAIN
+    formed = (strain >= STRAIN_OF_CHIP) & (band == 0) & (height > 0)[:, None]
+    velocity = np.full((3, 2), np.nan)
+    for k, weight in enumerate((undeformed * there, formed * there, band * there)):
+        if weight.any():
+            both = frame.needed("velocity_x"), frame.needed("velocity_y")
+            velocity[k] = [np.average(one, weights=weight) for one in both]
     velocity[0, 1] = 0.0  # the paper shifts the workpiece's map along the cut only
-    return np.asarray(velocity)
+    return velocity
 
 
 @njit(cache=True, nogil=True)
@@ -406,23 +382,3 @@ def _blend(  # type: ignore[no-untyped-def]
             material[r], strain[r], rate[r], x[r], y[r], shifts, textures, r, scratch, corner,
             result[:, r],
         )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)
-def _sum_velocities(  # type: ignore[no-untyped-def]
-    material, strain, rate, vx, vy, height, begin, end, sums
-):
-    """Weighted velocities and weights of the three features, summed along each of some rows."""
-    columns = material.shape[1]
-    for r in range(begin, end):
-        sums[r] = 0.0
-        for c in range(columns):
-            if material[r, c] == _VOID or material[r, c] == _TOOL:
-                continue
-            band = fraction_between(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
-            undeformed = strain[r, c] < UNDEFORMED_STRAIN
-            formed = strain[r, c] >= STRAIN_OF_CHIP and band == 0 and height[r] > 0
-            for k, weight in ((0, np.float32(undeformed)), (1, np.float32(formed)), (2, band)):
-                sums[r, k, 0] += weight * vx[r, c]
-                sums[r, k, 1] += weight * vy[r, c]
-                sums[r, k, 2] += weight

@@ -7,6 +7,7 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.regrid import Taps, taps
@@ -138,9 +139,7 @@ class MapSurface(Surface):
         np.divide(total, weight, out=result, where=weight > _KNOWN)
         return np.asarray(result, np.float32)
 
-    def _on(
-        self, image: NDArray[Any], raster: Raster
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _on(self, image: NDArray[Any], raster: Raster) -> tuple[Array, Array]:
         """Return the weighted sum of the known pixels about each sample, and their weight."""
         across = taps(self.raster.x, raster.spacing, raster.x)
         down = taps(-self.raster.y, raster.spacing, -raster.y)
@@ -149,7 +148,7 @@ class MapSurface(Surface):
         return total, _weighted(known.astype(np.float64), across, down)
 
 
-def _weighted(image: NDArray[np.float64], across: Taps, down: Taps) -> NDArray[np.float64]:
+def _weighted(image: Array, across: Taps, down: Taps) -> Array:
     """Return weighted sums over neighbouring columns, then over rows."""
     for first, weights in (across, down):
         result = np.zeros((len(image), first.size))

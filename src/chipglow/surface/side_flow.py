@@ -9,19 +9,25 @@ from typing import Annotated, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Family, Parameter
+from chipglow.quantities import Array, Family, Parameter
 from chipglow.quantities.units import ANGLE, LENGTH, POSITION
 from chipglow.radiometry import Band
-from chipglow.scene import Scene
-from chipglow.surface.cross_section import TOWARD_CAMERA, Reflections, Sections, SideElements
+from chipglow.scene import Frame, Material, Raster, Scene, Tool
 from chipglow.surface.directional import Direction
 from chipglow.surface.exchange import Exchange
 from chipglow.surface.spectral import known_band
-from chipglow.surface.surface import ModifiedSurface, Modifier, Surface
+from chipglow.surface.surface import Change, ModifiedSurface, Modifier, Surface
 
 REFLECTIONS: Final = Family("reflections")
 """Shapes of the side by their kind; other packages add theirs in ``chipglow.reflections``."""
 
+TOUCHING: Final = 3e-6
+"""Distance from the rake face in m within which chip counts as touching it."""
+
+TOWARD_CAMERA: Final = (0.0, 1.0)
+
+_INSIDE: Final = 0.75
+"""Depth in samples at which the sample that holds a point lies wholly on one side of a face."""
 
 _RAKE_ELEMENTS: Final = 16
 _SIDE_ELEMENTS: Final = 24
@@ -30,11 +36,102 @@ _FLAT_REACH: Final = 8.0
 """Length of a flat side that is looked at, in heights of what stands out beside it."""
 
 
+@dataclass(frozen=True, eq=False)
+class SideElements:
+    """Cross-section of the sides of tool and chip at the rake face, in elements.
+
+    Places are (depth, height) in m: depth from the rake face into the chip, height from the side of
+    the tool to the camera.
+    """
+
+    exchange: Exchange
+    """The elements: those of the tool's side, of the rake face, then of the chip's side."""
+    tool_side: int
+    rake_face: int
+    """Number of elements of the first two."""
+
+    @property
+    def depths(self) -> NDArray[np.float64]:
+        """Middles of the elements from the rake face into the chip in m; 0 on the face."""
+        return self.exchange.middles[:, 0]
+
+    @cached_property
+    def cosines(self) -> NDArray[np.float64]:
+        """Cosines of the angles between the elements' normals and the direction to the camera."""
+        along = self.exchange.ends - self.exchange.starts
+        return np.asarray(along[:, 0] / self.exchange.lengths, np.float64)
+
+    @property
+    def chip(self) -> slice:
+        """The elements of the chip."""
+        return slice(self.tool_side + self.rake_face, None)
+
+    @property
+    def face(self) -> slice:
+        """The elements of the rake face."""
+        return slice(self.tool_side, self.tool_side + self.rake_face)
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """Cross-sections at right angles to the rake face, one to a sample along it."""
+
+    rows: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    """Samples that the elements are seen in, shape (section, element)."""
+    probes: NDArray[np.intp]
+    """Rows and columns of the samples by which a section is touched, (2, section, height)."""
+    samples: NDArray[np.intp]
+    """Row, column, section and element of all samples beside the face, shape (4, sample)."""
+    weight: NDArray[np.float64]
+    """How far each sample is on the way from its element to the next one, 0 to 1."""
+
+    @classmethod
+    def of(cls, raster: Raster, tool: Tool, elements: SideElements) -> "Sections":
+        """Return the cross-sections of a scene."""
+        x, y = np.meshgrid(raster.x, raster.y)
+        along, depth = tool.face_coordinates(np.stack([x, y], axis=-1))
+        count = max(int(along.max() / raster.spacing) + 1, 0)
+        foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
+        step = raster.spacing / 2
+        heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
+        section = np.floor(along / raster.spacing).astype(np.intp)
+        beside = np.flatnonzero((section >= 0) & (section < count))
+        known, number, weight = _between(elements, depth.ravel()[beside])
+        beside = beside[known]
+        placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number)
+        return cls(
+            *_samples_at(raster, tool, foot, _looked_up(elements, raster.spacing)),
+            np.stack(_samples_at(raster, tool, foot, heights)),
+            np.stack(placed),
+            weight,
+        )
+
+    def touching(self, material: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Tell in which sections the chip touches the rake face and the tool is seen."""
+        rows, columns = self.probes
+        chip = (material[rows, columns] == Material.WORKPIECE).any(axis=1)
+        return np.asarray(chip & (material[self.rows, self.columns] == Material.TOOL).any(axis=1))
+
+    def seen(
+        self, touching: NDArray[np.bool_], material: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Return the `samples` in those sections, and their weights."""
+        rows, columns, section, _ = self.samples
+        there = touching[section] & (material[rows, columns] != Material.VOID)
+        return self.samples[:, there], self.weight[there]
+
+
 @dataclass(frozen=True)
 class SideShape(Modifier):
     """Reflections between the rake face and the chip's side: a class that adds `outline`.
 
-    See `Reflections`.
+    Samples seen in the camera's direction have the temperatures of the scene; the rake face has
+    that of the tool's side next to it. In each cross-section at right angles to the rake face that
+    the chip touches, all bounces are summed as if it went on alike (`Exchange`). What is seen is
+    ε L + (1 − ε) times the incident radiance. It is given as an effective emissivity, by which the
+    radiance of the blackbody (less that of the surroundings) is what is seen (less the same): over
+    1 where more is reflected than the sample would emit as a blackbody.
     """
 
     effect = "reflections"
@@ -102,24 +199,57 @@ class SideShape(Modifier):
 
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
-    ) -> Reflections:
+    ) -> Change:
         if scene.tool is None:
             raise ValueError(
                 "reflections: the scene does not state its tool, expected one, between whose rake "
                 "face and the chip light is reflected"
             )
-        band, cosines = known_band(self.effect, band), self.elements.cosines
+        black_in_band, cosines = known_band(self.effect, band).radiance, self.elements.cosines
+        surroundings = 0.0 if reflected is None else float(black_in_band(reflected))
         modifiers = surface.modifiers if isinstance(surface, ModifiedSurface) else ()
         directions = [one for one in modifiers if isinstance(one, Direction)]
-        return Reflections(
-            self.elements,
-            Sections.of(scene.raster, scene.tool, self.elements),
-            band,
-            0.0 if reflected is None else float(band.radiance(reflected)),
-            self.mirror,
-            self.rake_emissivity,
-            directions[-1].slope_ratio(cosines) if directions else np.ones(cosines.shape),
-        )
+        ratio = directions[-1].slope_ratio(cosines) if directions else np.ones(cosines.shape)
+        sections = Sections.of(scene.raster, scene.tool, self.elements)
+
+        def black(frame: Frame, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+            return np.asarray(black_in_band(frame.temperature[rows, columns].astype(np.float64)))
+
+        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+            touching = sections.touching(frame.material)
+            if not touching.any():
+                return emissivity
+            rows, columns = sections.rows[touching], sections.columns[touching]
+            # Where the chip ends there is nothing: what comes from there comes from the
+            # surroundings.
+            void = frame.material[rows, columns] == Material.VOID
+            values = emissivity[rows, columns].astype(np.float64)
+            if self.rake_emissivity is not None:
+                values[:, self.elements.face] = self.rake_emissivity
+            incident = np.full((len(touching), values.shape[1]), surroundings)
+            incident[touching] = self.elements.exchange.incident(
+                np.where(void, surroundings, black(frame, rows, columns)),
+                np.where(void, 1.0, values),
+                surroundings,
+                self.mirror,
+                TOWARD_CAMERA,
+            )
+            (rows, columns, section, element), weight = sections.seen(touching, frame.material)
+            slopes = (1 - weight) * ratio[element] + weight * ratio[element + 1]
+            added = (1 - weight) * incident[section, element]
+            added += weight * incident[section, element + 1]
+            own = np.minimum(emissivity[rows, columns] * slopes, 1.0)
+            gain = black(frame, rows, columns) - surroundings
+            # A sample just as warm as its surroundings shows neither itself nor what it reflects.
+            visible = np.abs(gain) > 1e-6 * surroundings
+            effective = own + (1.0 - own) * np.divide(
+                added - surroundings, gain, out=np.zeros_like(gain), where=visible
+            )
+            result = emissivity.copy()
+            result[rows, columns] = np.maximum(effective, 0.0)
+            return result
+
+        return changed
 
     def effective_emissivity(
         self, chip: float, tool: float, tool_radiance: float = 1.0, surroundings: float = 0.0
@@ -188,3 +318,43 @@ class Wedge(SideShape):
 def _graded(count: int) -> NDArray[np.float64]:
     """Ends of `count` elements from 0 to 1, shorter toward 0."""
     return np.linspace(0.0, 1.0, count + 1) ** 2
+
+
+def _looked_up(elements: SideElements, spacing: float) -> NDArray[np.float64]:
+    """Return the elements' depths, so far from the face that a sample is on their side of it.
+
+    The rake face has the temperature of the tool beside it.
+    """
+    inside = _INSIDE * spacing
+    depths = elements.depths
+    tool, chip = np.minimum(depths, -inside), np.maximum(depths, inside)
+    number = np.arange(depths.size)
+    return np.where(number < elements.chip.start, tool, chip)
+
+
+def _between(
+    elements: SideElements, depth: Array
+) -> tuple[NDArray[np.bool_], NDArray[np.intp], Array]:
+    """Return which depths are beside a side, the element before each of them, and the way on."""
+    middles, in_tool = elements.depths, depth < 0
+    first = np.where(in_tool, 0, elements.chip.start)
+    last = np.where(in_tool, elements.tool_side, middles.size) - 1
+    known = (first < last) & (depth != 0) & (depth >= middles[0]) & (depth <= middles[-1])
+    depth = depth[known]
+    number = np.searchsorted(middles, depth) - 1
+    number = np.clip(number, first[known], last[known] - 1)
+    weight = (depth - middles[number]) / (middles[number + 1] - middles[number])
+    return known, number, np.clip(weight, 0.0, 1.0)
+
+
+def _samples_at(
+    raster: Raster, tool: Tool, foot: NDArray[np.float64], depths: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of the samples at depths from points of the rake face.
+
+    Beyond the scene's border it goes on as at it.
+    """
+    points = foot[:, None] + depths[:, None] * np.array(tool.rake_normal)
+    rows = np.floor((raster.top - points[..., 1]) / raster.spacing).astype(np.intp)
+    columns = np.floor((points[..., 0] - raster.left) / raster.spacing).astype(np.intp)
+    return np.clip(rows, 0, raster.rows - 1), np.clip(columns, 0, raster.columns - 1)

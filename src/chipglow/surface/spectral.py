@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import c, epsilon_0, pi
+from scipy.interpolate import RegularGridInterpolator
 
-from chipglow.quantities import Family, Parameter
+from chipglow.quantities import Array, Family, Parameter
 from chipglow.quantities.units import (
     COLDEST,
     HOTTEST,
@@ -44,13 +45,10 @@ class SpectralSurface(Surface):
 
     @property
     def is_grey(self) -> bool:
-        """See `Surface.is_grey`."""
         return False
 
     @abstractmethod
-    def spectral_emissivity(
-        self, wavelength: NDArray[np.float64], temperature: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def spectral_emissivity(self, wavelength: Array, temperature: Array) -> Array:
         """Return the emissivity at wavelengths in m and temperatures in K, broadcast together."""
 
     def in_band(self, band: Band, reflected: float | None) -> TemperatureSurface:
@@ -88,39 +86,32 @@ class SpectralTable(SpectralSurface):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for *_, value in self.table:
-            if not 0.0 <= value <= 1.0:
-                raise ValueError(f"table: emissivity is {value!r}, expected 0 to 1")
-        wavelengths, temperatures, _ = self._grid
-        pairs = {row[:2] for row in self.table}
-        expected = wavelengths.size * temperatures.size
-        if not (len(self.table) == len(pairs) == expected > 0):
+        axes, values = self._axes, [row[2] for row in self.table]
+        if not all(0.0 <= value <= 1.0 for value in values):
             raise ValueError(
-                f"table: {len(self.table)} rows of {wavelengths.size} wavelengths and "
-                f"{temperatures.size} temperatures, expected each pair of them once"
+                f"table: emissivities from {min(values)} to {max(values)}, expected 0 to 1"
+            )
+        pairs = {row[:2] for row in self.table}
+        if not (len(values) == len(pairs) == axes[0].size * axes[1].size > 0):
+            raise ValueError(
+                f"table: {len(values)} rows of {axes[0].size} wavelengths and {axes[1].size} "
+                "temperatures, expected each pair of them once"
             )
 
     @property
-    def _grid(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Wavelengths, temperatures, and emissivities in their order."""
-        rows = np.array(sorted(self.table), np.float64).reshape(-1, 3)
-        return np.unique(rows[:, 0]), np.unique(rows[:, 1]), rows[:, 2]
+    def _axes(self) -> tuple[Array, Array]:
+        rows = np.array(self.table, np.float64).reshape(-1, 3)
+        return np.unique(rows[:, 0]), np.unique(rows[:, 1])
 
-    def spectral_emissivity(
-        self, wavelength: NDArray[np.float64], temperature: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """See `SpectralSurface.spectral_emissivity`."""
-        wavelengths, temperatures, values = self._grid
-        table = values.reshape(wavelengths.size, temperatures.size)
-        first, weight = _between(wavelengths, np.asarray(wavelength, np.float64))
-        lower, part = _between(temperatures, np.asarray(temperature, np.float64))
-        last, upper = (
-            np.minimum(at + 1, axis.size - 1)
-            for at, axis in ((first, wavelengths), (lower, temperatures))
+    def spectral_emissivity(self, wavelength: Array, temperature: Array) -> Array:
+        axes = self._axes
+        values = np.array([row[2] for row in sorted(self.table)])
+        table = RegularGridInterpolator(axes, values.reshape(axes[0].size, axes[1].size))
+        inside = (
+            np.clip(place, axis[0], axis[-1])
+            for place, axis in zip((wavelength, temperature), axes, strict=True)
         )
-        cold = (1 - weight) * table[first, lower] + weight * table[last, lower]
-        hot = (1 - weight) * table[first, upper] + weight * table[last, upper]
-        return np.asarray((1 - part) * cold + part * hot, np.float64)
+        return np.asarray(table(np.stack(np.broadcast_arrays(*inside), axis=-1)), np.float64)
 
 
 @SPECTRA.part
@@ -151,10 +142,7 @@ class HagenRubens(SpectralSurface):
         ),
     ] = 0.0
 
-    def spectral_emissivity(
-        self, wavelength: NDArray[np.float64], temperature: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """See `SpectralSurface.spectral_emissivity`."""
+    def spectral_emissivity(self, wavelength: Array, temperature: Array) -> Array:
         resistivity = self.resistivity * (1 + self.coefficient * (temperature - REFERENCE))
         # Under 20 °C a large coefficient would make it negative.
         resistivity = np.maximum(resistivity, 0.01 * self.resistivity)
@@ -205,12 +193,3 @@ def known_band(name: str, band: Band | None) -> Band:
     if band is None:
         raise ValueError(f"{name}: no band is given, expected that of a camera")
     return band
-
-
-def _between(
-    axis: NDArray[np.float64], values: NDArray[np.float64]
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return the entry before each value, and the way to the next, 0 to 1."""
-    place = np.interp(values, axis, np.arange(axis.size))
-    first = np.minimum(place.astype(np.intp), max(axis.size - 2, 0))
-    return first, place - first

@@ -154,7 +154,6 @@ class ModifiedSurface(Surface):
 
     @property
     def is_grey(self) -> bool:
-        """See `Surface.is_grey`."""
         return self.bare.is_grey and all(one.is_grey for one in self.modifiers)
 
     @property
@@ -187,6 +186,5 @@ class ModifiedSurface(Surface):
         return replace(self, bare=bare, modifiers=modifiers)
 
     def without_texture(self) -> Self:
-        """See `Surface.without_texture`."""
         bare = self.bare.without_texture()
         return self if bare is self.bare else replace(self, bare=bare)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.quantities import Parameter
+from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import TEMPERATURE, Temperature
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
@@ -70,12 +70,12 @@ class TemperatureSurface(HomogeneousSurface):
             raise ValueError(f"table: emissivities are {emissivities}, expected 0 to 1")
 
     @cached_property
-    def columns(self) -> NDArray[np.float64]:
+    def columns(self) -> Array:
         """Temperatures in K and emissivities, shape (2, row)."""
         return np.array(self.table, np.float64).reshape(-1, 2).T
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
-        values: NDArray[np.float64] = np.interp(temperature, *self.columns)
+        values: Array = np.interp(temperature, *self.columns)
         return values
 
 
@@ -109,7 +109,7 @@ class PhaseSurface(HomogeneousSurface):
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
         table = (self.solidus, self.liquidus), (self.solid, self.liquid)
-        values: NDArray[np.float64] = np.interp(temperature, *table)
+        values: Array = np.interp(temperature, *table)
         return values
 
 
@@ -134,14 +134,12 @@ class EmissivityTrend:
         return f"{self.emissivity:.4g} at {self.middle:.4g} K, changing by {self.slope:.4g} 1/K"
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Array:
         """Covariance of emissivity and slope, shape (2, 2)."""
         effects = np.array([*self.common, *self.own]).reshape(-1, 2)
         return np.asarray(effects.T @ effects, np.float64)
 
-    def drawn(
-        self, errors: NDArray[np.float64], generator: np.random.Generator
-    ) -> "EmissivityTrend":
+    def drawn(self, errors: Array, generator: np.random.Generator) -> "EmissivityTrend":
         """Return the line with these common errors of unit variance, and own ones drawn."""
         change = errors @ np.array(self.common).reshape(-1, 2)
         change += generator.standard_normal(len(self.own)) @ np.array(self.own).reshape(-1, 2)
@@ -150,7 +148,7 @@ class EmissivityTrend:
             self, emissivity=self.emissivity + by_emissivity, slope=self.slope + by_slope
         )
 
-    def at(self, temperature: Any) -> NDArray[np.float64]:
+    def at(self, temperature: Any) -> Array:
         """Return the emissivity at temperatures in K; not limited to 0 to 1."""
         away = np.asarray(temperature, np.float64) - self.middle
         return np.asarray(self.emissivity + self.slope * away, np.float64)

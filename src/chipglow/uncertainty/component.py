@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from chipglow.quantities import Array
+
 Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
 
 _MOST: Final = 200_000_000
@@ -38,24 +40,23 @@ class Cause:
     """Names of the errors in budgets, if each is to have a line of its own."""
 
     def __post_init__(self) -> None:
-        if not self.name.strip():
-            raise ValueError(f"component: its name is {self.name!r}, expected one")
-        if self.errors < 1:
-            raise ValueError(f"component {self.name}: has {self.errors} errors, expected 1 or more")
-        if not self.degrees_of_freedom > 0:
-            raise ValueError(
-                f"component {self.name}: degrees of freedom are {self.degrees_of_freedom!r}, "
-                "expected over 0"
-            )
-        if len(self.parts) not in (0, self.errors):
-            raise ValueError(
-                f"component {self.name}: has {len(self.parts)} parts, expected {self.errors}"
-            )
-        if self.distribution not in get_args(Distribution):
-            raise ValueError(
-                f"component {self.name}: distribution is {self.distribution!r}, expected one of "
-                f"{', '.join(get_args(Distribution))}"
-            )
+        known = get_args(Distribution)
+        rules = {
+            f"its name is {self.name!r}, expected one": self.name.strip(),
+            f"has {self.errors} errors, expected 1 or more": self.errors >= 1,
+            f"degrees of freedom are {self.degrees_of_freedom!r}, expected over 0": (
+                self.degrees_of_freedom > 0
+            ),
+            f"has {len(self.parts)} parts, expected {self.errors}": (
+                len(self.parts) in (0, self.errors)
+            ),
+            f"distribution is {self.distribution!r}, expected one of {', '.join(known)}": (
+                self.distribution in known
+            ),
+        }
+        for text, holds in rules.items():
+            if not holds:
+                raise ValueError(f"component {self.name}: {text}")
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -90,12 +91,12 @@ class Component:
             self.effects.setflags(write=False)
 
     @property
-    def variance(self) -> NDArray[np.float64]:
+    def variance(self) -> Array:
         """Contribution to the variance of each value, shape (values,)."""
         return np.asarray(_squared(self.effects).sum(axis=1), np.float64).ravel()
 
     @property
-    def fourth_moment(self) -> NDArray[np.float64]:
+    def fourth_moment(self) -> Array:
         """Sum of u⁴/ν in the formula of Welch and Satterthwaite, shape (values,)."""
         if self.cause.pooled or self.cause.errors == 1:
             return self.variance**2 / self.cause.degrees_of_freedom
@@ -120,7 +121,7 @@ class Component:
         cause = replace(self.cause, errors=len(errors), parts=())
         return Component(cause, self.effects[:, errors])
 
-    def scaled(self, factors: NDArray[np.float64]) -> Any:
+    def scaled(self, factors: Array) -> Any:
         """Return the effects on values that are multiplied by factors of shape (values,)."""
         if sparse.issparse(self.effects):
             found = self.effects.copy()
@@ -140,10 +141,6 @@ class Component:
                 f"values, expected {_MOST:.0e} at most: use chipglow.uncertainty.draw"
             )
         return Component(self.cause, self.effects[rows])
-
-    def through(self, matrix: Any) -> "Component":
-        """Return the component of linear combinations of the values, matrix (m, values)."""
-        return Component(self.cause, matrix @ self.effects)
 
 
 def _squared(effects: Any) -> Any:

@@ -14,9 +14,9 @@ from typing import Any, Final
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy import sparse
 
+from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.estimate import Estimate, factor
 
@@ -53,7 +53,7 @@ def to_xarray(
         for values, attributes in _parts(component, name):
             values = values.reshape(estimate.shape)
             label = _label(attributes, name, variables)
-            forms = _forms(attributes.pop("form"), dims)
+            forms = correlation_forms(dict.fromkeys(dims, attributes.pop("form")))
             variables[label] = (dims, values, {"units": units, **attributes, **forms})
     attributes = {"units": units, "unc_comps": list(variables)}
     for key in ("unevaluated", "warnings"):
@@ -86,7 +86,7 @@ def from_xarray(data: xr.Dataset, name: str) -> Estimate:
     return Estimate(variable.values, tuple(components), *remarks)
 
 
-def _parts(component: Component, name: str) -> Iterator[tuple[NDArray[np.float64], dict[str, Any]]]:
+def _parts(component: Component, name: str) -> Iterator[tuple[Array, dict[str, Any]]]:
     """Yield values and attributes of the uncertainty variables of a component."""
     if component.per_element:
         yield component.effects.diagonal(), {**_attributes(component.cause, 0), "form": _RANDOM}
@@ -142,13 +142,14 @@ def _label(attributes: Mapping[str, Any], name: str, others: Mapping[str, Any]) 
     return f"{label}_{count + 1}" if count else label
 
 
-def _forms(form: str, dims: Sequence[str]) -> dict[str, Any]:
-    forms: dict[str, Any] = {}
-    for number, dim in enumerate(dims, 1):
+def correlation_forms(forms: Mapping[str, str]) -> dict[str, Any]:
+    """Return the attributes of obsarray for the correlation of errors along dimensions."""
+    attributes: dict[str, Any] = {}
+    for number, (dim, form) in enumerate(forms.items(), 1):
         start = f"err_corr_{number}"
-        forms |= {f"{start}_dim": dim, f"{start}_form": form}
-        forms |= {f"{start}_params": [], f"{start}_units": []}
-    return forms
+        attributes |= {f"{start}_dim": dim, f"{start}_form": form}
+        attributes |= {f"{start}_params": [], f"{start}_units": []}
+    return attributes
 
 
 def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, int, Any]:
@@ -173,9 +174,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
     return cause, int(attributes.get("error", 0)), effects
 
 
-def _effects(
-    data: xr.Dataset, part: xr.DataArray, label: str, values: NDArray[np.float64]
-) -> tuple[Any, bool]:
+def _effects(data: xr.Dataset, part: xr.DataArray, label: str, values: Array) -> tuple[Any, bool]:
     """Return the effects of an uncertainty variable, and whether they are random."""
     form = dict.fromkeys(part.dims, _RANDOM)
     params: tuple[str, ...] = ()

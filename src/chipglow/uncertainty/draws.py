@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause
 from chipglow.uncertainty.estimate import Estimate, check_same
 
-_Sampler = Callable[[np.random.Generator, tuple[int, int]], NDArray[np.float64]]
+_Sampler = Callable[[np.random.Generator, tuple[int, int]], Array]
 
 _UNIT: Final[Mapping[str, _Sampler]] = {
     "normal": lambda generator, shape: generator.standard_normal(shape),
@@ -25,7 +26,7 @@ _UNIT: Final[Mapping[str, _Sampler]] = {
 
 def draw(
     estimates: Sequence[Estimate], count: int, generator: np.random.Generator
-) -> tuple[NDArray[np.float64], ...]:
+) -> tuple[Array, ...]:
     """Draw values of several estimates together: errors that they have in common are the same.
 
     Returns an array of shape (count, ...) for each estimate; a function of them has the
@@ -67,7 +68,7 @@ def _used(effects: Any) -> NDArray[np.intp]:
 
 def coverage_interval(
     draws: ArrayLike, level: float = 0.95, shortest: bool = False
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Return lower and upper end of the interval that holds a value with a probability.
 
     Of draws of shape (count, ...); with as much beyond one end as beyond the other, or the shortest
@@ -87,7 +88,7 @@ def coverage_interval(
     return low, high
 
 
-def _errors(cause: Cause, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+def _errors(cause: Cause, count: int, generator: np.random.Generator) -> Array:
     """Draw errors in standard uncertainties, shape (count, errors)."""
     found = _UNIT[cause.distribution](generator, (count, cause.errors))
     freedom = cause.degrees_of_freedom

@@ -1,17 +1,18 @@
 """The one type of a result with its uncertainty."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, cast
+from typing import Any, Literal
 from uuid import uuid4
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.special import stdtrit
 
+from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component, Distribution
 
 
@@ -44,7 +45,7 @@ class Estimate:
     they are the products of effects.
     """
 
-    values: NDArray[np.float64]
+    values: Array
     components: tuple[Component, ...] = ()
     unevaluated: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
@@ -64,18 +65,15 @@ class Estimate:
             raise ValueError(f"estimate: a component is there twice: {keys}, expected each once")
         known = np.isfinite(values).ravel()
         for component in self.components:
-            self._check(component, known)
-
-    def _check(self, component: Component, known: NDArray[np.bool_]) -> None:
-        name, effects = component.cause.name, component.effects
-        if effects.shape[0] != self.values.size:
-            raise ValueError(
-                f"component {name}: has effects on {effects.shape[0]} values, "
-                f"expected {self.values.size}"
-            )
-        numbers = effects.data if sparse.issparse(effects) else effects
-        if not np.isfinite(numbers).all() and not np.isfinite(component.variance[known]).all():
-            raise ValueError(f"component {name}: an effect is not finite, expected finite ones")
+            name, effects = component.cause.name, component.effects
+            if effects.shape[0] != values.size:
+                raise ValueError(
+                    f"component {name}: has effects on {effects.shape[0]} values, "
+                    f"expected {values.size}"
+                )
+            numbers = effects.data if sparse.issparse(effects) else effects
+            if not np.isfinite(numbers).all() and not np.isfinite(component.variance[known]).all():
+                raise ValueError(f"component {name}: an effect is not finite, expected finite ones")
 
     def with_component(
         self,
@@ -167,28 +165,28 @@ class Estimate:
         return tuple(dict.fromkeys((*known, *self.unevaluated)))
 
     @cached_property
-    def standard_uncertainty(self) -> NDArray[np.float64]:
+    def standard_uncertainty(self) -> Array:
         """Combined standard uncertainty (JCGM 100:2008, 5.1.2), of the shape of the values."""
         return np.sqrt(self._summed(component.variance for component in self.components))
 
     @cached_property
-    def degrees_of_freedom(self) -> NDArray[np.float64]:
+    def degrees_of_freedom(self) -> Array:
         """Effective number by Welch and Satterthwaite (JCGM 100:2008, G.4.1), of that shape."""
         parts = self._summed(component.fourth_moment for component in self.components)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(parts > 0, self.standard_uncertainty**4 / parts, np.inf)
 
-    def coverage_factor(self, level: float = 0.95) -> NDArray[np.float64]:
+    def coverage_factor(self, level: float = 0.95) -> Array:
         """Return Student's t of a level of confidence (JCGM 100:2008, G.3), of that shape."""
         if not 0 < level < 1:
             raise ValueError(f"level of confidence: is {level!r}, expected between 0 and 1")
         return np.asarray(stdtrit(self.degrees_of_freedom, (1 + level) / 2), np.float64)
 
-    def expanded_uncertainty(self, level: float = 0.95) -> NDArray[np.float64]:
+    def expanded_uncertainty(self, level: float = 0.95) -> Array:
         """Return coverage factor times standard uncertainty (JCGM 100:2008, 6.2.1)."""
         return self.coverage_factor(level) * self.standard_uncertainty
 
-    def contribution(self, name: str) -> NDArray[np.float64]:
+    def contribution(self, name: str) -> Array:
         """Return the standard uncertainty of one line of the budget; NaN if it is unevaluated."""
         found = self.of_line(name)
         if not found.components and name in self.unevaluated:
@@ -220,7 +218,7 @@ class Estimate:
         kept = tuple(one for one in self.components if one.cause.name != name)
         return replace(self, components=kept)
 
-    def effect(self, name: str) -> NDArray[np.float64]:
+    def effect(self, name: str) -> Array:
         """Return the signed effect of the systematic component of a name; 0 if there is none."""
         for component in self.components:
             if component.cause.key == (name, "") and component.cause.errors == 1:
@@ -233,27 +231,22 @@ class Estimate:
         ``standard_uncertainty``, ``fraction`` of the variance and ``degrees_of_freedom`` by
         ``cause``, and by value unless there is just one. Its `to_dataframe` is a table.
         """
-        lines = [self._line(name) for name in self.names]
+        shape = (len(self.names), *self.shape)
+        spread = np.reshape([self.contribution(name) for name in self.names], shape)
+        freedom = np.reshape([self.of_line(name).degrees_of_freedom for name in self.names], shape)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fraction = np.where(spread == 0, 0.0, (spread / self.standard_uncertainty) ** 2)
         dims = ("cause", *(f"dim_{axis}" for axis in range(self.values.ndim)))
-        columns = ("standard_uncertainty", "fraction", "degrees_of_freedom")
-        shape = (len(lines), *self.shape)
         return xr.Dataset(
             {
-                column: (dims, np.reshape([line[index] for line in lines], shape))
-                for index, column in enumerate(columns)
+                "standard_uncertainty": (dims, spread),
+                "fraction": (dims, fraction),
+                "degrees_of_freedom": (dims, np.where(np.isnan(spread), np.nan, freedom)),
             },
             {"cause": np.array(self.names, dtype=object)},
         )
 
-    def _line(self, name: str) -> tuple[NDArray[np.float64], ...]:
-        part = self.of_line(name)
-        spread = self.contribution(name)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            fraction = np.where(spread == 0, 0.0, (spread / self.standard_uncertainty) ** 2)
-        freedom = np.where(np.isnan(spread), np.nan, part.degrees_of_freedom)
-        return spread, fraction, freedom
-
-    def covariance(self) -> NDArray[np.float64]:
+    def covariance(self) -> Array:
         """Return the covariance of all values, flat: JCGM 100:2008, H.2.3."""
         total = np.zeros((self.values.size, self.values.size))
         for component in self.components:
@@ -261,38 +254,37 @@ class Estimate:
             total += product.toarray() if sparse.issparse(product) else product
         return total
 
-    def correlation(self) -> NDArray[np.float64]:
+    def correlation(self) -> Array:
         """Return the correlation of all values, flat; NaN with an exact one."""
         covariance = self.covariance()
         spread = np.sqrt(np.diag(covariance))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(covariance / np.outer(spread, spread))
 
-    def _summed(self, parts: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def _summed(self, parts: Iterable[Array]) -> Array:
         return sum(parts, np.zeros(self.values.size)).reshape(self.shape)
 
     def __getitem__(self, index: Any) -> "Estimate":
-        numbers = np.arange(self.values.size).reshape(self.shape)[index]
-        return self._of_rows(self.values[index], np.asarray(numbers))
+        return self._rearranged(lambda values: values[index])
 
     def reshape(self, *shape: int) -> "Estimate":
         """Return the values in another shape."""
         return replace(self, values=self.values.reshape(shape))
 
-    def _of_rows(self, values: Any, numbers: NDArray[np.intp]) -> "Estimate":
-        rows = numbers.ravel()
+    def _rearranged(self, change: Callable[[Any], Any]) -> "Estimate":
+        """Return the values that an index or a broadcast selects, some of them several times."""
+        rows = np.asarray(change(np.arange(self.values.size).reshape(self.shape))).ravel()
         components = tuple(one.taken(rows) for one in self.components)
-        return replace(self, values=values, components=components)
+        return replace(self, values=change(self.values), components=components)
 
     def _broadcast(self, shape: tuple[int, ...]) -> "Estimate":
         if shape == self.shape:
             return self
-        numbers = np.arange(self.values.size).reshape(self.shape)
-        return self._of_rows(np.broadcast_to(self.values, shape), np.broadcast_to(numbers, shape))
+        return self._rearranged(lambda values: np.broadcast_to(values, shape))
 
     def linear(self, matrix: Any) -> "Estimate":
         """Return linear combinations of the flat values, matrix of shape (m, values)."""
-        components = tuple(component.through(matrix) for component in self.components)
+        components = tuple(Component(one.cause, matrix @ one.effects) for one in self.components)
         return replace(self, values=matrix @ self.values.ravel(), components=components)
 
     def mean(self) -> "Estimate":
@@ -307,25 +299,18 @@ class Estimate:
     @classmethod
     def stack(cls, estimates: Sequence["Estimate"]) -> "Estimate":
         """Return several estimates of one shape as one, along a new first axis."""
-        blocks: dict[Cause, list[Any]] = {}
-        for number, one in enumerate(estimates):
-            for component in one.components:
-                blocks.setdefault(component.cause, [None] * len(estimates))
-                blocks[component.cause][number] = component.effects
+        effects = [{one.cause: one.effects for one in e.components} for e in estimates]
+        causes = dict.fromkeys(cause for of in effects for cause in of)
         size = estimates[0].values.size
-        components = [
-            Component(cause, _stacked(parts, (size, cause.errors)))
-            for cause, parts in blocks.items()
-        ]
-        return cls(
-            np.stack([one.values for one in estimates]), tuple(components), *remarks(estimates)
+        components = (
+            Component(cause, _stacked([of.get(cause) for of in effects], (size, cause.errors)))
+            for cause in causes
         )
+        values = np.stack([one.values for one in estimates])
+        return cls(values, tuple(components), *remarks(estimates))
 
     def __neg__(self) -> "Estimate":
         return self * -1.0
-
-    def __pos__(self) -> "Estimate":
-        return self
 
     def __add__(self, other: Any) -> "Estimate":
         one, two = self, as_estimate(other)
@@ -364,9 +349,9 @@ def as_estimate(value: Any) -> Estimate:
 
 
 def chain(
-    values: NDArray[np.float64],
+    values: Array,
     inputs: Sequence[Estimate],
-    partials: Sequence[NDArray[np.float64]],
+    partials: Sequence[Array],
 ) -> Estimate:
     """Return the estimate of values that were computed from inputs, element by element.
 
@@ -386,6 +371,47 @@ def chain(
     return Estimate(values, tuple(found.values()), *remarks(inputs))
 
 
+def propagate(
+    function: Callable[..., Any],
+    *inputs: Any,
+    derivatives: Sequence[Callable[..., Any]] | None = None,
+) -> Estimate:
+    """Return the estimate of a function of estimates or exact arrays, to first order.
+
+    Every element of the result depends on the same element of the inputs alone, which broadcast.
+    `derivatives` are functions of all inputs; by default they are half the difference of the
+    results on both sides, one standard uncertainty away. JCGM 100:2008, 5.1.2 and 5.2.2. Whether
+    the first order is enough, `draw` shows (JCGM 101:2008, clause 8).
+    """
+    estimates = [as_estimate(value) for value in inputs]
+    if derivatives is not None and len(derivatives) != len(estimates):
+        raise ValueError(
+            f"derivatives: {len(derivatives)} of a function of {len(estimates)} inputs, "
+            "expected one for each input"
+        )
+    places = [one.values for one in estimates]
+    values = np.asarray(function(*places), np.float64)
+    if derivatives is None:
+        partials = [_partial(function, estimates, index) for index in range(len(estimates))]
+    else:
+        partials = [np.asarray(one(*places), np.float64) for one in derivatives]
+    return chain(values, estimates, partials)
+
+
+def _partial(function: Callable[..., Any], estimates: Sequence[Estimate], index: int) -> Array:
+    """Return the slope over one standard uncertainty to both sides; 0 where an input is exact."""
+    places = [one.values for one in estimates]
+    step = estimates[index].standard_uncertainty
+    if not step.any():
+        return np.zeros(())
+    ends = []
+    for sign in (-1.0, 1.0):
+        moved = [*places[:index], places[index] + sign * step, *places[index + 1 :]]
+        ends.append(np.asarray(function(*moved), np.float64))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(step > 0, (ends[1] - ends[0]) / (2 * step), 0.0)
+
+
 def remarks(estimates: Iterable[Estimate]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the unevaluated causes and warnings of several estimates."""
     several = list(estimates)
@@ -395,7 +421,7 @@ def remarks(estimates: Iterable[Estimate]) -> tuple[tuple[str, ...], tuple[str, 
     )
 
 
-def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+def factor(covariance: Array, name: str) -> Array:
     """Return effects of independent errors that have a covariance, shape (values, errors)."""
     scale = np.sqrt(np.abs(np.diag(covariance)))
     scale[scale == 0.0] = 1.0
@@ -410,7 +436,7 @@ def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
             "direction, relative to the values' own, expected 0 or more"
         )
     effects = scale[:, None] * directions * np.sqrt(np.maximum(variances, 0.0))
-    return cast(NDArray[np.float64], effects)
+    return np.asarray(effects, np.float64)
 
 
 def check_same(one: Cause, other: Cause) -> None:
@@ -422,7 +448,7 @@ def check_same(one: Cause, other: Cause) -> None:
         )
 
 
-def _diagonal(values: NDArray[np.float64]) -> Any:
+def _diagonal(values: Array) -> Any:
     """Return a sparse array with values on its diagonal, those that are 0 too."""
     return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
 

@@ -13,7 +13,7 @@ from chipglow.camera.optics.psf import PointSpreadFunction
 from chipglow.camera.optics.sampling import line_weights
 from chipglow.quantities import Array
 from chipglow.scene import Raster
-from chipglow.surface.blocks import in_blocks
+from chipglow.surface.blend import in_blocks
 
 Beyond: TypeAlias = Literal["edge", "nothing"]
 """What is taken to be beyond the edges of a field."""

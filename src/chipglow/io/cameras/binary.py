@@ -1,6 +1,7 @@
 """What the readers of cameras' own formats share: bytes that are there, and frames chosen."""
 
-from collections.abc import Callable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,8 +11,11 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from chipglow.camera import Recording
+from chipglow.camera.recording import Quantity
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import check_samples
+from chipglow.quantities import Array
 from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes
 
@@ -45,21 +49,21 @@ class Binary:
         kind: np.dtype[Any] = np.dtype(dtype)
         return np.frombuffer(self.read(start, count * kind.itemsize), kind)
 
-    def record(self, start: int, dtype: DTypeLike) -> dict[str, Any]:
+    def record(self, start: int, dtype: np.dtype[Any]) -> dict[str, Any]:
         """Return the fields of one record of a structured type."""
-        row = self.numbers(start, 1, dtype)[0]
-        return {name: row[name].item() for name in row.dtype.names}
+        values = self.numbers(start, 1, dtype)[0].item()
+        return dict(zip(dtype.names or (), values, strict=True))
 
 
-def layout(size: int, **fields: tuple[str, int]) -> np.dtype[Any]:
-    """Return the structured type of a header of `size` bytes: kind and first byte of each field."""
+def layout(length: int, /, **fields: tuple[str, int]) -> np.dtype[Any]:
+    """Return the type of a header of `length` bytes: kind and first byte of each field."""
     kinds, places = zip(*fields.values(), strict=True)
     return np.dtype(
         {
             "names": list(fields),
             "formats": list(kinds),
             "offsets": list(places),
-            "itemsize": size,
+            "itemsize": length,
         }
     )
 
@@ -87,14 +91,121 @@ def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) ->
     return numbers
 
 
-def read_pictures(
-    chosen: range, shape: tuple[int, int], picture: Callable[[int], NDArray[Any]]
-) -> NDArray[np.uint16]:
-    """Return counts of the chosen frames, shape (frames, rows, columns)."""
-    signal = np.empty((len(chosen), *shape), np.uint16)
-    for position, number in enumerate(chosen):
-        signal[position] = picture(number)
-    return signal
+class CameraFile(ABC):
+    """An open file of a camera: a class that reads its headers when it is made, and adds the rest.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Rows and columns of a picture.
+    complete : int
+        Number of whole frames.
+    quantity : str
+        What was measured.
+    dtype : dtype
+        Type of the samples.
+    """
+
+    shape: tuple[int, int]
+    complete: int
+    quantity: Quantity = "counts"
+    dtype: DTypeLike = np.uint16
+
+    def __init__(self, binary: Binary, notes: Notes) -> None:
+        self.binary, self.path, self.notes = binary, binary.path, notes
+
+    @abstractmethod
+    def picture(self, number: int) -> NDArray[Any]:
+        """Return the samples of a frame."""
+
+    @abstractmethod
+    def times(self, chosen: range) -> Array:
+        """Return the times of frames in s, from the file's first one on."""
+
+    @abstractmethod
+    def facts(self, chosen: range) -> dict[str, Any]:
+        """Return the other fields of the `Recording` of some frames."""
+
+    @classmethod
+    def recording(
+        cls, path: Path, frames: slice | None = None, interval: float | None = None
+    ) -> Recording:
+        """Read frames; see `CameraFormat`."""
+        with opened(path) as binary:
+            file = cls(binary, notes := Notes())
+            rows, columns = file.shape
+            chosen = chosen_frames(path, frames, file.complete, rows * columns)
+            signal = np.empty((len(chosen), rows, columns), file.dtype)
+            for position, number in enumerate(chosen):
+                signal[position] = file.picture(number)
+            return Recording(
+                signal=signal,
+                quantity=file.quantity,
+                times=file.times(chosen) if interval is None else evenly(chosen, interval),
+                notes=notes,
+                **file.facts(chosen),
+            )
+
+    def stamped(self, chosen: range, stamps: Array | None, rate: float) -> Array:
+        """Return stamps in s after the first frame, or times by a frame rate in Hz.
+
+        The rate is used where the stamps do not ascend; it is 0 if it is not known.
+        """
+        if stamps is not None:
+            steps = np.diff(stamps) * np.sign(chosen.step)
+            if np.isfinite(stamps).all() and (steps > 0).all():
+                return stamps
+        if not (np.isfinite(rate) and rate > 0):
+            raise SourceError(
+                f"{self.path}: has neither time stamps that ascend nor a frame rate, give an "
+                "interval"
+            )
+        self.notes.assumed.append(
+            f"The frames are 1/{rate:g} s apart, as the file states; it has no ascending time "
+            "stamps."
+        )
+        return evenly(chosen, 1 / rate)
+
+    def note_truncation(self) -> None:
+        """Warn that a file ends with an incomplete frame, or lacks some that it states."""
+        self.notes.warnings.append(
+            f"The file is truncated: {self.complete} complete frames read; the rest is ignored."
+        )
+
+    def note_start(self, seconds: float) -> None:
+        """Note when frame 0 was taken, in s since 1970, unless the clock was not set."""
+        if _TEN_YEARS < seconds < 2**32:
+            when = datetime.fromtimestamp(seconds, UTC).isoformat(" ", "milliseconds")
+            self.notes.remarks.append(f"Frame 0 was taken at {when}.")
+
+    def common_exposure(self, exposures: Array) -> float | None:
+        """Return the integration time in s of all frames; None if they differ or it is 0."""
+        least, greatest = float(exposures.min()), float(exposures.max())
+        if least == greatest:
+            return least or None
+        self.notes.warnings.append(
+            f"The integration time varies from {least * 1e6:g} us to {greatest * 1e6:g} us."
+        )
+        return None
+
+    def object_parameters(self, **given: float | None) -> ObjectParameters:
+        """Return what was set in a camera of the object; what is impossible is noted only."""
+        known: dict[str, float] = {}
+        for name, value in given.items():
+            if value is None:
+                continue
+            try:
+                ObjectParameters(**{name: value})
+            except ValueError:
+                self.notes.remarks.append(f"Ignored {name} {value:g}: out of range.")
+            else:
+                known[name] = value
+        return ObjectParameters(**known)
+
+
+def evenly(chosen: range, interval: float) -> Array:
+    """Return times in s of frames that are as far apart, from the file's first one on."""
+    return np.asarray(chosen, np.float64) * interval
 
 
 def check_picture(path: Path, rows: int, columns: int, most: int = 65_535) -> None:
@@ -109,78 +220,3 @@ def text_of(raw: bytes) -> str:
     """Return the text up to the first zero, without what cannot be printed."""
     text = raw.split(b"\0")[0].decode("latin-1")
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-
-
-def first_moment(seconds: float) -> list[str]:
-    """Return a sentence on when frame 0 was taken, in s since 1970; none of a clock not set."""
-    if not _TEN_YEARS < seconds < 2**32:
-        return []
-    when = datetime.fromtimestamp(seconds, UTC).isoformat(" ", "milliseconds")
-    return [f"Frame 0 was taken at {when}."]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """When the frames that are read were taken; `interval` in s if the user says it."""
-
-    path: Path
-    frames: range
-    interval: float | None
-    notes: Notes
-
-    def even(self, interval: float) -> NDArray[np.float64]:
-        """Return times in s of frames that are as far apart, from the file's first one on."""
-        return np.asarray(self.frames, np.float64) * interval
-
-    def stamped(self, stamps: NDArray[np.float64] | None, rate: float) -> NDArray[np.float64]:
-        """Return stamps in s after the first frame, or times by a frame rate in Hz.
-
-        The rate is used where the stamps do not ascend; it is 0 if it is not known.
-        """
-        if stamps is not None:
-            steps = np.diff(stamps) * np.sign(self.frames.step)
-            if np.isfinite(stamps).all() and (steps > 0).all():
-                return stamps
-        if not (np.isfinite(rate) and rate > 0):
-            raise SourceError(
-                f"{self.path}: has neither time stamps that ascend nor a frame rate, give an "
-                "interval"
-            )
-        self.notes.assumed.append(
-            f"The frames are 1/{rate:g} s apart, as the file states; it has no ascending time "
-            "stamps."
-        )
-        return self.even(1 / rate)
-
-
-def note_truncation(notes: Notes, complete: int) -> None:
-    """Warn that a file ends with an incomplete frame, or lacks some that its header states."""
-    notes.warnings.append(
-        f"The file is truncated: {complete} complete frames read; the rest is ignored."
-    )
-
-
-def common_exposure(exposures: NDArray[np.float64], notes: Notes) -> float | None:
-    """Return the integration time in s that all frames have; None if they differ or it is 0."""
-    least, greatest = float(exposures.min()), float(exposures.max())
-    if least == greatest:
-        return least or None
-    notes.warnings.append(
-        f"The integration time varies from {least * 1e6:g} us to {greatest * 1e6:g} us."
-    )
-    return None
-
-
-def object_parameters(notes: Notes, **given: float | None) -> ObjectParameters:
-    """Return what was set in a camera of the object; impossible values are noted and left out."""
-    known: dict[str, float] = {}
-    for name, value in given.items():
-        if value is None:
-            continue
-        try:
-            ObjectParameters(**{name: value})
-        except ValueError:
-            notes.remarks.append(f"Ignored {name} {value:g}: out of range.")
-        else:
-            known[name] = value
-    return ObjectParameters(**known)

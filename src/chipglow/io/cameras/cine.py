@@ -1,27 +1,11 @@
 """Files of Vision Research's Phantom cameras, CINE."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Recording
-from chipglow.io.cameras.binary import (
-    Binary,
-    CutShortError,
-    Timing,
-    check_picture,
-    chosen_frames,
-    common_exposure,
-    first_moment,
-    layout,
-    note_truncation,
-    opened,
-    read_pictures,
-)
+from chipglow.io.cameras.binary import Binary, CameraFile, CutShortError, check_picture, layout
 from chipglow.io.sources import SourceError
 from chipglow.text import Notes
 
@@ -56,82 +40,113 @@ _TICK: Final = 2.0**-32
 _PACKED_10, _PACKED_12 = 256, 1024
 
 
-def is_cine(head: bytes) -> bool:
-    """Whether a file begins like one of Phantom's."""
-    return head[:4] == b"CI\x2c\0"
+class Cine(CameraFile):
+    """Phantom's CINE: pictures of 8 and 16 bits, and 10 and 12 bits packed, in grey.
 
+    Packed 10 bits are codes of a curve like that of Recommendation ITU-R BT.709 and become 12 bits
+    that are proportional to light.
+    """
 
-@dataclass(frozen=True)
-class _Pictures:
-    """How the pictures of a file are stored; `size` in bytes."""
-
-    height: int
-    width: int
-    size: int
-    unpack: Callable[[NDArray[np.uint8]], NDArray[np.uint16]]
-    upward: bool
-    bits: int
-
-    def image(self, raw: bytes) -> NDArray[np.uint16]:
-        """Return the counts of a picture, row 0 at the top."""
-        stored = np.frombuffer(raw, np.uint8).reshape(self.height, -1)
-        rows = self.unpack(stored)[:, : self.width]
-        return rows[::-1] if self.upward else rows
-
-
-@dataclass(frozen=True)
-class _Cine:
-    """A file and its headers."""
-
-    binary: Binary
-    header: dict[str, Any]
-    setup: dict[str, Any]
-    pictures: _Pictures
-
-    @classmethod
-    def of(cls, binary: Binary) -> "_Cine":
-        """Read the headers."""
-        header = binary.record(0, _FILE)
+    def __init__(self, binary: Binary, notes: Notes) -> None:
+        super().__init__(binary, notes)
+        header = self.header = binary.record(0, _FILE)
         if header["mark"] != b"CI":
-            raise SourceError(
-                f"{binary.path}: begins with {header['mark']!r}, expected 'CI' (CINE)"
-            )
-        setup = binary.record(header["setup"], _SETUP)
+            raise SourceError(f"{self.path}: begins with {header['mark']!r}, expected 'CI' (CINE)")
+        setup = self.setup = binary.record(header["setup"], _SETUP)
         if setup["mark"] != b"ST":
             raise SourceError(
-                f"{binary.path}: the camera's settings begin with {setup['mark']!r}, not 'ST'"
+                f"{self.path}: the camera's settings begin with {setup['mark']!r}, not 'ST'"
             )
-        return cls(binary, header, setup, _pictures(binary, header, setup))
+        self._choose_packing(binary.record(header["picture_header"], _PICTURE))
+        self.places = binary.numbers(header["places"], header["count"], "<i8")
+        self.complete = self._complete()
+        notes.remarks.append(f"Frame 0 is number {header['first']} of the recording.")
+        if self.complete < header["count"]:
+            self.note_truncation()
 
-    def start(self, place: int) -> int:
-        """Return where the image of a frame begins, behind its annotation."""
-        length = int(self.binary.numbers(place, 1, "<u4")[0])
-        size = int(self.binary.numbers(place + length - 4, 1, "<u4")[0]) if length >= 8 else 0
-        if size != self.pictures.size:
+    def _choose_packing(self, picture: dict[str, Any]) -> None:
+        height, width = abs(picture["height"]), picture["width"]
+        check_picture(self.path, height, width)
+        self.shape, self.packing = (height, width), picture["packing"]
+        bits = self.bits = picture["bits"]
+        if self.header["compression"] or self.setup["colours"] & 0xFFFFFF or bits in (24, 48):
             raise SourceError(
-                f"{self.binary.path}: is damaged, a frame has {size} bytes, expected "
-                f"{self.pictures.size}"
+                f"{self.path}: is compressed or in colours, expected plain grey pictures"
             )
-        return place + length
+        self.upward = False
+        packed = {_PACKED_10: (4, 10), _PACKED_12: (2, 12)}.get(self.packing)
+        if packed and width % packed[0] == 0:
+            self.size, self.bits = height * width * packed[1] // 8, 12
+            return
+        if self.packing != 0 or bits not in (8, 16):
+            raise SourceError(
+                f"{self.path}: has pictures of {bits} bits in packing {self.packing} of {width} "
+                "columns, expected 8 or 16 bits plain, or 10 or 12 bits packed"
+            )
+        self.size = height * (-(-width * bits // 32) * 4)  # as in Windows' bitmaps
+        self.upward = picture["height"] > 0
+        self.stored: str = "u1" if bits == 8 else "<u2"
+        if 8 <= self.setup["bits"] <= bits:
+            self.bits = self.setup["bits"]
 
-    def image(self, place: int) -> NDArray[np.uint16]:
-        """Return the counts of a frame."""
-        return self.pictures.image(self.binary.read(self.start(place), self.pictures.size))
-
-    def whole(self, places: NDArray[np.int64]) -> int:
+    def _complete(self) -> int:
         """Return how many frames, from the first on, are whole: a cut file lacks the last ones."""
-        beyond = np.flatnonzero(places + self.pictures.size > self.binary.size)
-        count = int(beyond[0]) if beyond.size else places.size
+        beyond = np.flatnonzero(self.places + self.size > self.binary.size)
+        count = int(beyond[0]) if beyond.size else self.places.size
         while count:
             try:
-                if self.start(int(places[count - 1])) + self.pictures.size <= self.binary.size:
+                if self._start(count - 1) + self.size <= self.binary.size:
                     break
             except CutShortError:
                 pass
             count -= 1
         return count
 
-    def of_frames(self, kind: int, dtype: str) -> NDArray[Any] | None:
+    def _start(self, number: int) -> int:
+        """Return where the image of a frame begins, behind its annotation."""
+        place = int(self.places[number])
+        length = int(self.binary.numbers(place, 1, "<u4")[0])
+        size = int(self.binary.numbers(place + length - 4, 1, "<u4")[0]) if length >= 8 else 0
+        if size != self.size:
+            raise SourceError(
+                f"{self.path}: is damaged, a frame has {size} bytes, expected {self.size}"
+            )
+        return place + length
+
+    def picture(self, number: int) -> NDArray[np.uint16]:
+        height, width = self.shape
+        stored = self.binary.numbers(self._start(number), self.size, "u1").reshape(height, -1)
+        if self.packing == _PACKED_10:
+            return _unpack_10(stored)
+        if self.packing == _PACKED_12:
+            return _unpack_12(stored)
+        rows = stored.view(self.stored).astype(np.uint16)[:, :width]
+        return rows[::-1] if self.upward else rows
+
+    def times(self, chosen: range) -> NDArray[np.float64]:
+        stamps = self._of_frames(_TIMES, "<u8")
+        if stamps is None:
+            return self.stamped(chosen, None, self.setup["rate"])
+        ticks = stamps >> 2 << 2  # the two lowest bits are flags
+        after = float(self.header["trigger"] - int(ticks[0])) * _TICK
+        self.note_start(float(ticks[0]) * _TICK)
+        self.notes.remarks.append(f"The trigger was at {after:.9g} s.")
+        since = (ticks[list(chosen)] - ticks[0]).astype(np.int64) * _TICK
+        return self.stamped(chosen, since, self.setup["rate"])
+
+    def facts(self, chosen: range) -> dict[str, Any]:
+        exposures = self._of_frames(_EXPOSURES, "<u4")
+        if exposures is None:
+            integration_time = self.setup["shutter"] * 1e-9 or None
+        else:
+            integration_time = self.common_exposure(exposures[list(chosen)] * _TICK)
+        return {
+            "camera": f"Phantom {self.setup['camera']}, serial number {self.setup['serial']}",
+            "integration_time": integration_time,
+            "saturation": 2.0**self.bits - 2,
+        }
+
+    def _of_frames(self, kind: int, dtype: str) -> NDArray[Any] | None:
         """Return the numbers of a tagged block before the frames, one a frame; None without it."""
         count = self.header["count"]
         size = _BLOCK.itemsize + count * np.dtype(dtype).itemsize
@@ -144,70 +159,6 @@ class _Cine:
                 break
             place += block["size"]
         return None
-
-
-def read_cine(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of Phantom's CINE as counts; see `CameraFormat`.
-
-    Pictures of 8 and 16 bits, and 10 and 12 bits packed, in grey. Packed 10 bits are codes of a
-    curve like that of Recommendation ITU-R BT.709 and become 12 bits that are proportional to
-    light.
-    """
-    with opened(path) as binary:
-        file = _Cine.of(binary)
-        header, setup, pictures = file.header, file.setup, file.pictures
-        places = binary.numbers(header["places"], header["count"], "<i8")
-        whole = file.whole(places)
-        chosen = chosen_frames(path, frames, whole, pictures.height * pictures.width)
-        signal = read_pictures(
-            chosen,
-            (pictures.height, pictures.width),
-            lambda number: file.image(int(places[number])),
-        )
-        notes = Notes(remarks=[f"Frame 0 is number {header['first']} of the recording."])
-        if whole < header["count"]:
-            note_truncation(notes, whole)
-        times = _times(file, Timing(path, chosen, interval, notes))
-        integration_time = _integration_time(file, chosen, notes)
-    return Recording(
-        signal=signal,
-        quantity="counts",
-        times=times,
-        camera=f"Phantom {setup['camera']}, serial number {setup['serial']}",
-        integration_time=integration_time,
-        saturation=2.0**pictures.bits - 2,
-        notes=notes,
-    )
-
-
-def _pictures(binary: Binary, header: dict[str, Any], setup: dict[str, Any]) -> _Pictures:
-    path = binary.path
-    picture = binary.record(header["picture_header"], _PICTURE)
-    height, width = abs(picture["height"]), picture["width"]
-    check_picture(path, height, width)
-    bits, packing = picture["bits"], picture["packing"]
-    if header["compression"] != 0 or setup["colours"] & 0xFFFFFF or bits in (24, 48):
-        raise SourceError(f"{path}: is compressed or in colours, expected plain grey pictures")
-    if packing == _PACKED_10 and width % 4 == 0:
-        return _Pictures(height, width, height * width * 5 // 4, _unpack_10, False, 12)
-    if packing == _PACKED_12 and width % 2 == 0:
-        return _Pictures(height, width, height * width * 3 // 2, _unpack_12, False, 12)
-    if packing != 0 or bits not in (8, 16):
-        raise SourceError(
-            f"{path}: has pictures of {bits} bits in packing {packing} of {width} columns, "
-            "expected 8 or 16 bits plain, or 10 or 12 bits packed"
-        )
-    line = -(-width * bits // 32) * 4  # as in Windows' bitmaps
-    real = setup["bits"] if 8 <= setup["bits"] <= bits else bits
-    kind = "u1" if bits == 8 else "<u2"
-    return _Pictures(
-        height,
-        width,
-        height * line,
-        lambda stored: stored.view(kind).astype(np.uint16),
-        picture["height"] > 0,
-        real,
-    )
 
 
 def _unpack_10(stored: NDArray[np.uint8]) -> NDArray[np.uint16]:
@@ -238,25 +189,3 @@ def _curve() -> NDArray[np.uint16]:
 
 
 _CURVE: Final = _curve()
-
-
-def _times(file: _Cine, timing: Timing) -> NDArray[np.float64]:
-    if timing.interval is not None:
-        return timing.even(timing.interval)
-    stamps = file.of_frames(_TIMES, "<u8")
-    if stamps is None:
-        return timing.stamped(None, file.setup["rate"])
-    ticks = stamps >> 2 << 2  # the two lowest bits are flags
-    after = float(int(file.header["trigger"]) - int(ticks[0])) * _TICK
-    remarks = timing.notes.remarks
-    remarks.extend(first_moment(float(ticks[0]) * _TICK))
-    remarks.append(f"The trigger was at {after:.9g} s.")
-    since = (ticks[list(timing.frames)] - ticks[0]).astype(np.int64) * _TICK
-    return timing.stamped(since, file.setup["rate"])
-
-
-def _integration_time(file: _Cine, chosen: range, notes: Notes) -> float | None:
-    exposures = file.of_frames(_EXPOSURES, "<u4")
-    if exposures is None:
-        return file.setup["shutter"] * 1e-9 or None
-    return common_exposure(exposures[list(chosen)] * _TICK, notes)

@@ -1,10 +1,13 @@
-"""Files of FLIR's cameras: FFF, SEQ and CSQ, and JPEG with the same records inside."""
+"""Files of FLIR's cameras: FFF, SEQ and CSQ, and JPEG with the same records inside.
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+The layout is that of ExifTool's documentation of FLIR's tags.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
-from math import exp, isfinite, sqrt
+from math import exp, isfinite, nan, sqrt
 from pathlib import Path
 from struct import calcsize, unpack_from
 from typing import Any, Final
@@ -12,47 +15,70 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import PlanckConversion, Recording
+from chipglow.camera import PlanckConversion
 from chipglow.io.cameras.binary import (
     Binary,
+    CameraFile,
     CutShortError,
-    Timing,
     check_picture,
-    chosen_frames,
-    first_moment,
-    note_truncation,
-    object_parameters,
+    layout,
     opened,
-    read_pictures,
     text_of,
 )
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.source import reading, required
-from chipglow.radiometry import ObjectParameters
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.text import Notes
 
 _MAGIC: Final = b"FFF\0"
 _JPEG: Final = b"\xff\xd8\xff"
 _JPEG_LS: Final = b"\xff\xf7"
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
-_PNG_END: Final = b"IEND\xaeB`\x82"
-_JPEG_END: Final = b"\xff\xd9"
-_HEADER_LENGTH: Final = 64
-_ENTRY: Final = "HHIIIIIII"
-_ENTRY_LENGTH: Final = calcsize(">" + _ENTRY)
+_ENDS: Final = {"PNG": b"IEND\xaeB`\x82", "JPEG-LS": b"\xff\xd9"}
+_HEADER: Final = layout(
+    64, magic=("S4", 0), version=("<u4", 20), place=("<u4", 24), count=("<u4", 28)
+)
+_ENTRY: Final = layout(32, kind=("<u2", 0), sort=("<u2", 2), offset=("<u4", 12), size=("<u4", 16))
 _MOST_RECORDS: Final = 1000
 _RAW, _CAMERA = 1, 32
 _RAW_HEADER: Final = 32
 _BIG_ENDIAN: Final = 1
 _MOST_PADDING: Final = 1 << 20
-_ZERO: Final = 273.15
 _LARGE: Final = 100.0
 """An exponent that is possible, and no transmittance."""
 
-
-def is_flir(head: bytes) -> bool:
-    """Whether a file begins like one of FLIR's; a JPEG may be anyone's."""
-    return head[:4] == _MAGIC or head[:3] == _JPEG
+_RAW_FIELDS: Final = {"width": ("H", 2), "height": ("H", 4)}
+_CAMERA_LENGTH: Final = 4096
+_CAMERA_FIELDS: Final = {
+    "emissivity": ("f", 0x20),
+    "distance": ("f", 0x24),
+    "reflected": ("f", 0x28),
+    "atmosphere": ("f", 0x2C),
+    "window_temperature": ("f", 0x30),
+    "window": ("f", 0x34),
+    "humidity": ("f", 0x3C),
+    "r1": ("f", 0x58),
+    "b": ("f", 0x5C),
+    "f": ("f", 0x60),
+    "alpha_1": ("f", 0x70),
+    "alpha_2": ("f", 0x74),
+    "beta_1": ("f", 0x78),
+    "beta_2": ("f", 0x7C),
+    "air_part": ("f", 0x80),
+    "hottest": ("f", 0x90),
+    "coldest": ("f", 0x94),
+    "model": ("32s", 0xD4),
+    "serial": ("16s", 0x104),
+    "lens": ("16s", 0x170),
+    "filter": ("16s", 0x1EC),
+    "o": ("i", 0x308),
+    "r2": ("f", 0x30C),
+    "least_count": ("H", 0x310),
+    "most_counts": ("H", 0x312),
+    "seconds": ("I", 0x384),
+    "milliseconds": ("I", 0x388),
+    "rate": ("H", 0x464),
+}
 
 
 @dataclass(frozen=True)
@@ -64,72 +90,187 @@ class _Frame:
     end: int
 
 
-@dataclass(frozen=True)
-class _Fields:
-    """Fields of a record, of which the later ones may not be there."""
-
-    raw: bytes
-
-    def number(self, place: int, kind: str) -> float:
-        """Return a number; NaN if it is not there."""
-        order = "<" if self.raw[:2] == b"\x02\0" else ">"
-        if place + calcsize(kind) > len(self.raw):
-            return float("nan")
-        return float(unpack_from(order + kind, self.raw, place)[0])
-
-    def text(self, place: int, length: int) -> str:
-        """Return a text; empty if it is not there."""
-        return text_of(self.raw[place : place + length])
+def _fields(raw: bytes, fields: Mapping[str, tuple[str, int]]) -> dict[str, Any]:
+    """Return fields of a record; NaN, or no text, for later ones that are not there."""
+    order = "<" if raw[:2] == b"\x02\0" else ">"
+    values: dict[str, Any] = {}
+    for name, (kind, place) in fields.items():
+        if kind.endswith("s"):
+            values[name] = text_of(raw[place : place + calcsize(kind)])
+        elif place + calcsize(kind) <= len(raw):
+            values[name] = unpack_from(order + kind, raw, place)[0]
+        else:
+            values[name] = nan
+    return values
 
 
-def read_flir(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of FLIR's radiometric JPEG, FFF, SEQ or CSQ as counts; see `CameraFormat`.
+class Flir(CameraFile):
+    """FLIR's radiometric JPEG, FFF, SEQ and CSQ: counts."""
 
-    The layout is that of ExifTool's documentation of FLIR's tags.
-    """
-    notes = Notes()
-    with _records(path) as binary:
-        places = _frames(binary, notes)
-        shape = _shape(binary, places[0])
-        chosen = chosen_frames(path, frames, len(places), shape[0] * shape[1])
-        signal = read_pictures(
-            chosen, shape, lambda number: _image(binary, places[number], number, shape)
+    def __init__(self, binary: Binary, notes: Notes) -> None:
+        super().__init__(_records(binary), notes)
+        self.frames = self._find_frames()
+        self.complete = len(self.frames)
+        self.shape = self._shape(0)
+        check_picture(self.path, *self.shape)
+        self.camera_fields = cache(self._camera_fields)
+
+    def _find_frames(self) -> list[_Frame]:
+        """Find all frames that are whole."""
+        found: list[_Frame] = []
+        place: int | None = 0
+        while place is not None:
+            try:
+                found.append(_frame(self.binary, place, len(found), self.notes))
+            except CutShortError:
+                if not found:
+                    raise
+                self.complete = len(found)
+                self.note_truncation()
+                break
+            place = self._next(found[-1].end)
+        return found
+
+    def _next(self, end: int) -> int | None:
+        """Find the next frame: there may be zeros or something else before it."""
+        size = self.binary.size
+        rest = self.binary.read(end, min(4, size - end))
+        if rest != _MAGIC:
+            rest = self.binary.read(end, min(_MOST_PADDING, size - end))
+        begin = rest.find(_MAGIC)
+        if begin >= 0:
+            return end + begin
+        if rest.strip(b"\0"):
+            self.notes.warnings.append(f"{size - end} bytes after the last frame are not a frame.")
+        return None
+
+    def _shape(self, number: int) -> tuple[int, int]:
+        place, _ = self.frames[number].records[_RAW]
+        fields = _fields(self.binary.read(place, _RAW_HEADER), _RAW_FIELDS)
+        return fields["height"], fields["width"]
+
+    def picture(self, number: int) -> NDArray[np.uint16]:
+        name, frame = f"{self.path}: frame {number}", self.frames[number]
+        rows, columns = self.shape
+        if self._shape(number) != self.shape:
+            raise SourceError(
+                f"{name} has another shape than frame 0, expected {columns} columns and {rows} rows"
+            )
+        stored = self.binary.read(*frame.records[_RAW])[_RAW_HEADER:]
+        packing = _packing(stored)
+        with reading(name):
+            if not packing:
+                order = ">u2" if frame.big_endian else "<u2"
+                return np.frombuffer(stored, order, rows * columns).reshape(rows, columns)
+            values = _unpacked(name, packing, stored)
+        if values.shape != self.shape or values.dtype != np.uint16:
+            raise SourceError(f"{name}: its {packing} is {values.dtype} of shape {values.shape}")
+        return _in_order(values)
+
+    def _camera_fields(self, number: int) -> dict[str, Any]:
+        place, length = self.frames[number].records.get(_CAMERA, (0, 0))
+        return _fields(self.binary.read(place, min(length, _CAMERA_LENGTH)), _CAMERA_FIELDS)
+
+    def _moment(self, number: int) -> float:
+        """Return the time of a frame in s since 1970; NaN if the file does not state it."""
+        fields = self.camera_fields(number)
+        seconds, milliseconds = fields["seconds"], fields["milliseconds"]
+        if not (seconds > 0 and isfinite(milliseconds)):
+            return nan
+        return float(seconds + (milliseconds & 0xFFFF) / 1000)
+
+    def times(self, chosen: range) -> NDArray[np.float64]:
+        if self.complete == 1:
+            return np.zeros(1)
+        stamps = np.array([self._moment(number) for number in chosen]) - self._moment(0)
+        return self.stamped(chosen, np.round(stamps, 3), self.camera_fields(chosen[0])["rate"])
+
+    def facts(self, chosen: range) -> dict[str, Any]:
+        fields = self.camera_fields(chosen[0])
+        self.note_start(self._moment(0))
+        model, serial = fields["model"], fields["serial"]
+        name = model if model.startswith("FLIR") else f"FLIR {model}".strip()
+        # Cameras without a range of counts state all 16 bits.
+        has_range = fields["least_count"] < fields["most_counts"] < 65_535
+        facts = {
+            "camera": f"{name}, serial number {serial}" if serial else name,
+            "saturation": float(fields["most_counts"]) if has_range else None,
+            "conversion": self._conversion(fields),
+            "object_parameters": self._object(fields),
+        }
+        for part in ("lens", "filter"):
+            if fields[part]:
+                self.notes.remarks.append(f"{part.capitalize()}: {fields[part]}.")
+        low, high = fields["coldest"], fields["hottest"]
+        if 0 < low < high < 10_000:
+            self.notes.remarks.append(
+                f"The camera was set to measure from {low - ZERO_CELSIUS:g} to "
+                f"{high - ZERO_CELSIUS:g} degC."
+            )
+        return facts
+
+    def _conversion(self, fields: dict[str, Any]) -> PlanckConversion | None:
+        try:
+            return PlanckConversion(**{name: fields[name] for name in ("r1", "b", "f", "o", "r2")})
+        except ValueError as error:
+            self.notes.remarks.append(
+                f"Ignored the impossible conversion to temperature in the file ({error})."
+            )
+            return None
+
+    def _object(self, fields: dict[str, Any]) -> Any:
+        distance, humidity, atmosphere, window = (
+            fields[name] for name in ("distance", "humidity", "atmosphere", "window")
         )
-        start = _moment(_camera_fields(binary, places[0]))
-        cameras = [_camera_fields(binary, places[number]) for number in chosen]
-    stamps = np.array([_moment(fields) - start for fields in cameras])
-    fields = cameras[0]
-    notes.remarks.extend(first_moment(start))
-    recording = Recording(
-        signal=signal,
-        quantity="counts",
-        times=_times(stamps, fields, len(places), Timing(path, chosen, interval, notes)),
-        camera=_camera(fields),
-        saturation=_saturation(fields),
-        conversion=_conversion(fields, notes),
-        object_parameters=_object(fields, notes),
-        notes=notes,
+        transmittance = window if 0 < window < np.inf else 1.0
+        if isfinite(distance) and isfinite(humidity) and isfinite(atmosphere):
+            fraction = humidity / 100 if humidity > 2 else humidity
+            self.notes.remarks.append(
+                f"Set in the camera: an object at {distance:g} m and a humidity of "
+                f"{fraction * 100:g} %."
+            )
+            transmittance *= _through_air(fields, distance, fraction, atmosphere)
+        if isfinite(window) and window != 1:
+            self.notes.remarks.append(
+                f"Set in the camera: a window that lets {window * 100:g} % pass, at "
+                f"{fields['window_temperature'] - ZERO_CELSIUS:g} degC; here it is as warm as the "
+                "air."
+            )
+        given = {name: fields[name] for name in ("emissivity", "reflected", "atmosphere")}
+        known = {name: value for name, value in given.items() if isfinite(value)}
+        return self.object_parameters(transmittance=transmittance, **known)
+
+
+def _through_air(
+    fields: dict[str, Any], distance: float, humidity: float, temperature: float
+) -> float:
+    """Return the transmission of the air by FLIR's formula, from the camera's constants.
+
+    Minkina and Dudzik, Infrared Thermography: Errors and Uncertainties (2009), Section 2.3.
+    """
+    names = ("alpha_1", "beta_1", "alpha_2", "beta_2", "air_part")
+    alpha_1, beta_1, alpha_2, beta_2, part = constants = [fields[name] for name in names]
+    celsius = temperature - ZERO_CELSIUS
+    known = isfinite(sum(constants)) and -100 < celsius < 100
+    if not known or not (0 <= distance < 1e6 and 0 <= humidity <= 1):
+        return 1.0
+    water = humidity * exp(
+        1.5587 + 6.939e-2 * celsius - 2.7816e-4 * celsius**2 + 6.8455e-7 * celsius**3
     )
-    notes.remarks.extend(_further(fields))
-    return recording
+    first, second = (
+        exp(min(_LARGE, -sqrt(distance) * (alpha + beta * sqrt(water))))
+        for alpha, beta in ((alpha_1, beta_1), (alpha_2, beta_2))
+    )
+    return float(part * first + (1 - part) * second)
 
 
 # Records
 
 
-@contextmanager
-def _records(path: Path) -> Iterator[Binary]:
-    """Open the file, or what of a JPEG is FLIR's."""
-    with opened(path) as binary:
-        if binary.read(0, min(3, binary.size)) != _JPEG:
-            yield binary
-            return
-        inside = _inside_jpeg(binary)
-    yield Binary(path, BytesIO(inside), len(inside))
-
-
-def _inside_jpeg(binary: Binary) -> bytes:
-    """Return FLIR's records, which lie in numbered segments of a JPEG."""
+def _records(binary: Binary) -> Binary:
+    """Return what of a JPEG is FLIR's, in numbered segments; another file as it is."""
+    if binary.read(0, min(3, binary.size)) != _JPEG:
+        return binary
     parts: dict[int, bytes] = {}
     last, place, marker = 0, 2, 0
     while marker != 0xFFDA:  # the picture itself
@@ -146,54 +287,25 @@ def _inside_jpeg(binary: Binary) -> bytes:
         raise SourceError(
             f"{binary.path}: has {len(parts)} parts of FLIR's records, expected {last + 1}"
         )
-    return b"".join(parts[number] for number in range(last + 1))
-
-
-def _frames(binary: Binary, notes: Notes) -> list[_Frame]:
-    """Find all frames that are whole."""
-    found: list[_Frame] = []
-    place: int | None = 0
-    while place is not None:
-        try:
-            found.append(_frame(binary, place, len(found), notes))
-        except CutShortError:
-            if not found:
-                raise
-            note_truncation(notes, len(found))
-            break
-        place = _next(binary, found[-1].end, notes)
-    return found
-
-
-def _next(binary: Binary, end: int, notes: Notes) -> int | None:
-    """Find the next frame: there may be zeros or something else before it."""
-    if binary.read(end, min(4, binary.size - end)) == _MAGIC:
-        return end
-    rest = binary.read(end, min(_MOST_PADDING, binary.size - end))
-    begin = rest.find(_MAGIC)
-    if begin >= 0:
-        return end + begin
-    if rest.strip(b"\0"):
-        notes.warnings.append(f"{binary.size - end} bytes after the last frame are not a frame.")
-    return None
+    inside = b"".join(parts[number] for number in range(last + 1))
+    return Binary(binary.path, BytesIO(inside), len(inside))
 
 
 def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
-    header = binary.read(start, _HEADER_LENGTH)
-    if header[:4] != _MAGIC:
-        raise SourceError(f"{binary.path}: begins with {header[:4]!r}, expected 'FFF' (FLIR)")
-    order = "<" if 100 <= unpack_from("<I", header, 20)[0] < 200 else ">"
-    place, count = unpack_from(order + "II", header, 24)
+    entry, header = _ENTRY, binary.record(start, _HEADER)
+    if header["magic"] != _MAGIC.rstrip(b"\0"):
+        raise SourceError(f"{binary.path}: begins with {header['magic']!r}, expected 'FFF' (FLIR)")
+    if not 100 <= header["version"] < 200:
+        entry, header = _ENTRY.newbyteorder(">"), binary.record(start, _HEADER.newbyteorder(">"))
+    count, place = header["count"], start + header["place"]
     if not 0 < count <= _MOST_RECORDS:
         raise SourceError(
             f"{binary.path}: frame {number} says {count} records, expected 1 to {_MOST_RECORDS}"
         )
-    length = count * _ENTRY_LENGTH
-    table = binary.read(start + place, length)
     records: dict[int, tuple[int, int]] = {}
-    big_endian, end = False, start + place + length
-    for entry in range(0, length, _ENTRY_LENGTH):
-        kind, sort, _, _, offset, size, *_ = unpack_from(order + _ENTRY, table, entry)
+    big_endian, end = False, place + count * _ENTRY.itemsize
+    entries = binary.numbers(place, count, entry)
+    for kind, sort, offset, size in entries.tolist():
         if kind == 0:
             continue
         missing = start + offset + size - binary.size
@@ -222,56 +334,27 @@ def _whole_picture(binary: Binary, place: int, length: int) -> bool:
         return False
     stored = binary.read(place, length)
     counts = stored[_RAW_HEADER:]
-    packing = _packing(counts)
-    if packing:
-        return counts.rstrip(b"\0").endswith(_PNG_END if packing == "PNG" else _JPEG_END)
-    fields = _Fields(stored[:_RAW_HEADER])
-    return len(counts) >= 2 * int(fields.number(2, "H")) * int(fields.number(4, "H")) > 0
+    if packing := _packing(counts):
+        return counts.rstrip(b"\0").endswith(_ENDS[packing])
+    fields = _fields(stored, _RAW_FIELDS)
+    return bool(len(counts) >= 2 * fields["width"] * fields["height"] > 0)
 
 
 # Counts
 
 
-def _shape(binary: Binary, frame: _Frame) -> tuple[int, int]:
-    fields = _Fields(binary.read(frame.records[_RAW][0], _RAW_HEADER))
-    width, height = (int(fields.number(place, "H")) for place in (2, 4))
-    check_picture(binary.path, height, width)
-    return height, width
-
-
-def packed_counts(path: Path) -> bool:
+def has_packed_counts(path: Path) -> bool:
     """Whether the counts of a file are packed as PNG or JPEG-LS, so that libraries unpack them."""
-    with _records(path) as binary:
-        place, length = _frame(binary, 0, 0, Notes()).records[_RAW]
-        return _packing(binary.read(place, length)[_RAW_HEADER:]) != ""
+    with opened(path) as file:
+        binary = _records(file)
+        stored = binary.read(*_frame(binary, 0, 0, Notes()).records[_RAW])
+        return _packing(stored[_RAW_HEADER:]) != ""
 
 
 def _packing(stored: bytes) -> str:
     if stored[:8] == _PNG:
         return "PNG"
     return "JPEG-LS" if stored[:3] == _JPEG and _JPEG_LS in stored[:256] else ""
-
-
-def _image(
-    binary: Binary, frame: _Frame, number: int, shape: tuple[int, int]
-) -> NDArray[np.uint16]:
-    name = f"{binary.path}: frame {number}"
-    if _shape(binary, frame) != shape:
-        raise SourceError(
-            f"{name} has another shape than frame 0, expected {shape[1]} columns and {shape[0]} "
-            "rows"
-        )
-    place, length = frame.records[_RAW]
-    stored = binary.read(place, length)[_RAW_HEADER:]
-    packing = _packing(stored)
-    with reading(name):
-        if not packing:
-            order = ">u2" if frame.big_endian else "<u2"
-            return np.frombuffer(stored, order, shape[0] * shape[1]).reshape(shape)
-        values = _unpacked(name, packing, stored)
-    if values.shape != shape or values.dtype != np.uint16:
-        raise SourceError(f"{name}: its {packing} is {values.dtype} of shape {values.shape}")
-    return _in_order(values)
 
 
 def _unpacked(name: str, packing: str, stored: bytes) -> NDArray[Any]:
@@ -297,115 +380,3 @@ def _in_order(values: NDArray[np.uint16]) -> NDArray[np.uint16]:
 def _roughness(values: NDArray[np.uint16]) -> int:
     wide = values.astype(np.int64)
     return int(np.abs(np.diff(wide, axis=0)).sum() + np.abs(np.diff(wide, axis=1)).sum())
-
-
-# What the camera knows
-
-
-def _camera_fields(binary: Binary, frame: _Frame) -> _Fields:
-    place, length = frame.records.get(_CAMERA, (0, 0))
-    return _Fields(binary.read(place, min(length, 4096)))
-
-
-def _moment(fields: _Fields) -> float:
-    """Return the time of a frame in s since 1970; NaN if it is not said."""
-    seconds, milliseconds = fields.number(0x384, "I"), fields.number(0x388, "I")
-    if not (seconds > 0 and isfinite(milliseconds)):
-        return float("nan")
-    return seconds + (int(milliseconds) & 0xFFFF) / 1000
-
-
-def _times(
-    stamps: NDArray[np.float64], fields: _Fields, count: int, timing: Timing
-) -> NDArray[np.float64]:
-    if timing.interval is not None or count == 1:
-        return timing.even(timing.interval or 0.0)
-    return timing.stamped(np.round(stamps, 3), fields.number(0x464, "H"))
-
-
-def _camera(fields: _Fields) -> str:
-    model, serial = fields.text(0xD4, 32), fields.text(0x104, 16)
-    name = model if model.startswith("FLIR") else f"FLIR {model}".strip()
-    return f"{name}, serial number {serial}" if serial else name
-
-
-def _saturation(fields: _Fields) -> float | None:
-    """Return the greatest count of the camera's range; cameras without it say all 16 bits."""
-    low, high = fields.number(0x310, "H"), fields.number(0x312, "H")
-    return high if low < high < 65_535 else None
-
-
-def _conversion(fields: _Fields, notes: Notes) -> PlanckConversion | None:
-    try:
-        return PlanckConversion(
-            r1=fields.number(0x58, "f"),
-            b=fields.number(0x5C, "f"),
-            f=fields.number(0x60, "f"),
-            o=fields.number(0x308, "i"),
-            r2=fields.number(0x30C, "f"),
-        )
-    except ValueError as error:
-        notes.remarks.append(
-            f"Ignored the impossible conversion to temperature in the file ({error})."
-        )
-        return None
-
-
-def _object(fields: _Fields, notes: Notes) -> ObjectParameters:
-    distance, humidity = _finite(fields, 0x24), _finite(fields, 0x3C)
-    atmosphere, window = _finite(fields, 0x2C), _finite(fields, 0x34)
-    transmittance = window if window is not None and window > 0 else 1.0
-    if distance is not None and humidity is not None and atmosphere is not None:
-        fraction = humidity / 100 if humidity > 2 else humidity
-        notes.remarks.append(
-            f"Set in the camera: an object at {distance:g} m and a humidity of "
-            f"{fraction * 100:g} %."
-        )
-        transmittance *= _through_air(fields, distance, fraction, atmosphere)
-    if window is not None and window != 1:
-        notes.remarks.append(
-            f"Set in the camera: a window that lets {window * 100:g} % pass, at "
-            f"{fields.number(0x30, 'f') - _ZERO:g} degC; here it is as warm as the air."
-        )
-    return object_parameters(
-        notes,
-        emissivity=_finite(fields, 0x20),
-        reflected=_finite(fields, 0x28),
-        transmittance=transmittance,
-        atmosphere=atmosphere,
-    )
-
-
-def _through_air(fields: _Fields, distance: float, humidity: float, temperature: float) -> float:
-    """Return the transmission of the air by FLIR's formula, from the camera's constants.
-
-    Minkina and Dudzik, Infrared Thermography: Errors and Uncertainties (2009), Section 2.3.
-    """
-    alpha, beta = ((fields.number(a, "f"), fields.number(a + 4, "f")) for a in (0x70, 0x78))
-    fraction = fields.number(0x80, "f")
-    celsius = temperature - _ZERO
-    known = isfinite(sum(alpha) + sum(beta) + fraction) and -100 < celsius < 100
-    if not known or not (0 <= distance < 1e6 and 0 <= humidity <= 1):
-        return 1.0
-    water = humidity * exp(
-        1.5587 + 6.939e-2 * celsius - 2.7816e-4 * celsius**2 + 6.8455e-7 * celsius**3
-    )
-    first, second = (
-        exp(min(_LARGE, -sqrt(distance) * (a + b * sqrt(water))))
-        for a, b in zip(alpha, beta, strict=True)
-    )
-    return fraction * first + (1 - fraction) * second
-
-
-def _finite(fields: _Fields, place: int) -> float | None:
-    value = fields.number(place, "f")
-    return value if isfinite(value) else None
-
-
-def _further(fields: _Fields) -> Iterator[str]:
-    for name, place in (("Lens", 0x170), ("Filter", 0x1EC)):
-        if text := fields.text(place, 16):
-            yield f"{name}: {text}."
-    low, high = _finite(fields, 0x94), _finite(fields, 0x90)
-    if low is not None and high is not None and 0 < low < high < 10_000:
-        yield f"The camera was set to measure from {low - _ZERO:g} to {high - _ZERO:g} degC."

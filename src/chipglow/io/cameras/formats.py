@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Final
 
 from chipglow.camera import Recording
-from chipglow.io.cameras.cine import is_cine, read_cine
-from chipglow.io.cameras.flir import is_flir, packed_counts, read_flir
-from chipglow.io.cameras.hcc import is_hcc, read_hcc
-from chipglow.io.cameras.ptw import is_ptw, read_ptw
+from chipglow.io.cameras.cine import Cine
+from chipglow.io.cameras.flir import Flir, has_packed_counts
+from chipglow.io.cameras.hcc import Hcc
+from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.io.sources import SourceError
@@ -65,20 +65,30 @@ def _starts(*beginnings: bytes) -> Begins:
     return lambda head: head.startswith(beginnings)
 
 
+def _is_hcc(head: bytes) -> bool:
+    """Whether a file begins with TC and a version that is no letter."""
+    return head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32
+
+
 _array: Final = partial(CameraFormat, in_subprocess=lambda path: True)
 _hdf5: Final = partial(_array, inside_hdf5=True)
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
 _TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_FLIR: Final = (".jpg", ".jpeg", ".fff", ".seq", ".csq")
 
 
 _OWN: Final[Mapping[str, CameraFormat]] = {
     "flir": CameraFormat(
-        "FLIR radiometric JPEG, FFF, SEQ, CSQ", _FLIR, is_flir, read_flir, packed_counts
+        "FLIR radiometric JPEG, FFF, SEQ, CSQ",
+        (".jpg", ".jpeg", ".fff", ".seq", ".csq"),
+        _starts(b"FFF\0", b"\xff\xd8\xff"),
+        Flir.recording,
+        has_packed_counts,
     ),
-    "ptw": CameraFormat("FLIR PTW (Cedip, Altair)", (".ptw",), is_ptw, read_ptw),
-    "hcc": CameraFormat("Telops HCC", (".hcc",), is_hcc, read_hcc),
-    "cine": CameraFormat("Phantom CINE", (".cine",), is_cine, read_cine),
+    "ptw": CameraFormat(
+        "FLIR PTW (Cedip, Altair)", (".ptw",), _starts(b"CED", b"AIO"), Ptw.recording
+    ),
+    "hcc": CameraFormat("Telops HCC", (".hcc",), _is_hcc, Hcc.recording),
+    "cine": CameraFormat("Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording),
     "tiff": _array("TIFF, a stack or a file a frame", (".tif", ".tiff"), _starts(*_TIFF)),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
     "npz": _array("NumPy arrays, zipped", (".npz",)),

@@ -10,17 +10,7 @@ from numpy.typing import NDArray
 from chipglow.camera import Recording
 from chipglow.camera.recording import Quantity
 from chipglow.io import atomic_path
-from chipglow.io.cameras.binary import (
-    Binary,
-    Timing,
-    check_picture,
-    chosen_frames,
-    common_exposure,
-    first_moment,
-    layout,
-    note_truncation,
-    opened,
-)
+from chipglow.io.cameras.binary import Binary, CameraFile, check_picture, layout
 from chipglow.io.sources import SourceError
 from chipglow.text import Notes
 
@@ -63,120 +53,102 @@ _GREATEST: Final = 1e30
 _LEAST_EXPONENT: Final = -100
 
 
-def is_hcc(head: bytes) -> bool:
-    """Whether a file begins like one of Telops: TC, and a version that is no letter."""
-    return head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32
-
-
-def read_hcc(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of Telops' HCC; see `CameraFormat`.
+class Hcc(CameraFile):
+    """Telops' HCC.
 
     Raw and corrected samples are counts. Calibrated ones are temperature or in-band radiance,
     sample · 2^DataExp + DataOffset, frame by frame.
     """
-    with opened(path) as binary:
-        first = binary.record(0, _HEADER)
+
+    def __init__(self, binary: Binary, notes: Notes) -> None:
+        super().__init__(binary, notes)
+        first = self.first = binary.record(0, _HEADER)
         if first["signature"] != b"TC":
-            raise SourceError(f"{path}: begins with {first['signature']!r}, expected 'TC' (Telops)")
-        check_picture(path, first["height"], first["width"])
+            raise SourceError(
+                f"{self.path}: begins with {first['signature']!r}, expected 'TC' (Telops)"
+            )
+        self.shape = first["height"], first["width"]
+        check_picture(self.path, *self.shape)
         label, quantity = _MODES.get(first["mode"], (f"mode {first['mode']}", None))
         if quantity is None:
             raise SourceError(
-                f"{path}: holds {label}, expected counts, temperature or in-band radiance"
+                f"{self.path}: holds {label}, expected counts, temperature or in-band radiance"
             )
-        frame = _frame(_header_length(binary, first), first["height"], first["width"])
-        whole, rest = divmod(binary.size, frame.itemsize)
-        chosen = chosen_frames(path, frames, whole, first["height"] * first["width"])
-        stored = np.empty(len(chosen), frame)
-        for position, number in enumerate(chosen):
-            stored[position] = binary.numbers(number * frame.itemsize, 1, frame)[0]
-    headers = stored["header"]
-    _check_alike(path, headers, first, chosen)
-    version = f"Telops header {first['major']}.{first['minor']}"
-    notes = Notes(remarks=[f"The samples are {label} ({version})."])
-    if rest:
-        note_truncation(notes, whole)
-    return Recording(
-        signal=_signal(stored, quantity, path),
-        quantity=quantity,
-        times=_times(headers, first, Timing(path, chosen, interval, notes)),
-        camera=f"Telops, serial number {first['serial']}" if first["serial"] else "Telops",
-        integration_time=_integration_time(headers, notes),
-        saturation=_saturation(first),
-        notes=notes,
-    )
+        self.quantity = quantity
+        self.dtype = np.uint16 if quantity == "counts" else np.float32
+        self.header_length = self._header_length()
+        self.stride = self.header_length + 2 * first["height"] * first["width"]
+        self.complete, rest = divmod(binary.size, self.stride)
+        version = f"Telops header {first['major']}.{first['minor']}"
+        notes.remarks.append(f"The samples are {label} ({version}).")
+        if rest:
+            self.note_truncation()
 
+    def _header_length(self) -> int:
+        """Return the length of a frame's header: two lines of the picture, or as it states."""
+        first, size = self.first, self.binary.size
+        pixels = 2 * first["width"] * first["height"]
+        stated = (4 * first["width"], first["header_length"])
+        lengths = [length for length in stated if length >= _HEADER.itemsize]
+        # A file without a frame that is cut tells it by its size, else the second header does.
+        lengths.sort(key=lambda length: size % (length + pixels) != 0)
+        for length in lengths:
+            rest = size - length - pixels
+            if rest >= 0 and b"TC".startswith(self.binary.read(length + pixels, min(2, rest))):
+                return int(length)
+        raise SourceError(
+            f"{self.path}: is cut short or damaged, it has {size} bytes and no whole frame of "
+            f"{first['width']} columns and {first['height']} rows with a second one behind it"
+        )
 
-def _frame(header_length: int, height: int, width: int) -> np.dtype[Any]:
-    rest = header_length - _HEADER.itemsize
-    return np.dtype([("header", _HEADER), ("", f"V{rest}"), ("image", "<u2", (height, width))])
+    def _headers(self, chosen: range) -> NDArray[Any]:
+        return np.concatenate([self.binary.numbers(n * self.stride, 1, _HEADER) for n in chosen])
 
-
-def _header_length(binary: Binary, first: dict[str, Any]) -> int:
-    """Return the length of a frame's header: two lines of the picture, or what the header says."""
-    pixels = 2 * first["width"] * first["height"]
-    said: list[int] = [4 * first["width"], first["header_length"]]
-    lengths = [length for length in said if length >= _HEADER.itemsize]
-    # A file without a frame that is cut tells it by its size, else the second header does.
-    lengths.sort(key=lambda length: binary.size % (length + pixels) != 0)
-    for length in lengths:
-        second = length + pixels
-        rest = binary.size - second
-        if rest >= 0 and b"TC".startswith(binary.read(second, min(2, rest))):
-            return length
-    raise SourceError(
-        f"{binary.path}: is cut short or damaged, it has {binary.size} bytes and no whole frame of "
-        f"{first['width']} columns and {first['height']} rows with a second one behind it"
-    )
-
-
-def _check_alike(path: Path, headers: NDArray[Any], first: dict[str, Any], chosen: range) -> None:
-    for name in ("signature", "width", "height", "mode"):
-        wrong = np.flatnonzero(headers[name] != first[name])
-        if wrong.size:
+    def picture(self, number: int) -> NDArray[Any]:
+        header = self.binary.record(number * self.stride, _HEADER)
+        for name in ("signature", "width", "height", "mode"):
+            if header[name] != self.first[name]:
+                raise SourceError(
+                    f"{self.path}: frame {number}: {name} is {header[name]}, expected "
+                    f"{self.first[name]} as in the first frame"
+                )
+        start = number * self.stride + self.header_length
+        image = self.binary.numbers(start, self.shape[0] * self.shape[1], "<u2").reshape(self.shape)
+        if self.quantity == "counts":
+            return image
+        scale: float = 2.0 ** header["data_exponent"]
+        offset: float = header["data_offset"]
+        greatest = _MOST * scale + abs(offset)
+        if not greatest < np.finfo(np.float32).max:
             raise SourceError(
-                f"{path}: frame {chosen[wrong[0]]}: {name} is {headers[name][wrong[0]]}, expected "
-                f"{first[name]} as in the first frame"
+                f"{self.path}: DataOffset and DataExp give {greatest:g}, expected less"
             )
+        return image * scale + offset
 
+    def times(self, chosen: range) -> NDArray[np.float64]:
+        first, headers = self.first, self._headers(chosen)
+        rate = first["rate"] * _RATE
+        if first["major"] < _WITH_TIME or not headers["seconds"].any():
+            return self.stamped(chosen, None, rate)
+        self.note_start(first["seconds"] + _SUBSECOND * first["subseconds"])
+        # Whole seconds first: their difference is exact.
+        stamps = (
+            headers["seconds"].astype(np.int64)
+            - first["seconds"]
+            + _SUBSECOND * (headers["subseconds"].astype(np.int64) - first["subseconds"])
+        )
+        return self.stamped(chosen, stamps, rate)
 
-def _signal(stored: NDArray[Any], quantity: Quantity, path: Path) -> NDArray[Any]:
-    if quantity == "counts":
-        return np.ascontiguousarray(stored["image"])
-    headers = stored["header"]
-    scale = np.exp2(headers["data_exponent"].astype(np.float64))[:, None, None]
-    offset = headers["data_offset"].astype(np.float64)[:, None, None]
-    greatest = _MOST * scale + np.abs(offset)
-    if not (greatest < np.finfo(np.float32).max).all():
-        raise SourceError(f"{path}: DataOffset and DataExp give {greatest.max():g}, expected less")
-    return np.asarray(stored["image"] * scale + offset, np.float32)
-
-
-def _times(headers: NDArray[Any], first: dict[str, Any], timing: Timing) -> NDArray[np.float64]:
-    rate = first["rate"] * _RATE
-    if timing.interval is not None:
-        return timing.even(timing.interval)
-    if first["major"] < _WITH_TIME or not headers["seconds"].any():
-        return timing.stamped(None, rate)
-    timing.notes.remarks.extend(first_moment(first["seconds"] + _SUBSECOND * first["subseconds"]))
-    # Whole seconds first: their difference is exact.
-    stamps = (
-        headers["seconds"].astype(np.int64)
-        - first["seconds"]
-        + _SUBSECOND * (headers["subseconds"].astype(np.int64) - first["subseconds"])
-    )
-    return timing.stamped(stamps, rate)
-
-
-def _integration_time(headers: NDArray[Any], notes: Notes) -> float | None:
-    if len(np.unique(headers["filter_position"])) > 1:
-        notes.warnings.append("The filter wheel turned between frames.")
-    return common_exposure(headers["exposure"] * _EXPOSURE, notes)
-
-
-def _saturation(first: dict[str, Any]) -> float | None:
-    raw = first["mode"] in (0, 255)
-    return 2.0 ** first["resolution"] - 2 if raw and 8 <= first["resolution"] <= 16 else None
+    def facts(self, chosen: range) -> dict[str, Any]:
+        first, headers = self.first, self._headers(chosen)
+        if len(np.unique(headers["filter_position"])) > 1:
+            self.notes.warnings.append("The filter wheel turned between frames.")
+        is_raw = first["mode"] in (0, 255) and 8 <= first["resolution"] <= 16
+        return {
+            "camera": f"Telops, serial number {first['serial']}" if first["serial"] else "Telops",
+            "integration_time": self.common_exposure(headers["exposure"] * _EXPOSURE),
+            "saturation": 2.0 ** first["resolution"] - 2 if is_raw else None,
+        }
 
 
 def write_hcc(path: str | Path, recording: Recording) -> None:
@@ -212,9 +184,8 @@ def write_hcc(path: str | Path, recording: Recording) -> None:
     headers["data_exponent"], headers["data_offset"] = exponent, offset
     with atomic_path(target) as unfinished, unfinished.open("wb") as stream:
         for header, image in zip(headers, samples, strict=True):
-            frame = np.zeros(1, _frame(4 * width, height, width))
-            frame["header"], frame["image"] = header, image
-            stream.write(frame.tobytes())
+            stream.write(header.tobytes().ljust(4 * width, b"\0"))
+            stream.write(image.astype("<u2").tobytes())
 
 
 def _samples(path: Path, recording: Recording) -> tuple[NDArray[np.uint16], int, float]:

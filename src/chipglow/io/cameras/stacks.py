@@ -1,7 +1,7 @@
 """Frames in files of arrays, which do not say what was measured: the user does."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
-from chipglow.io.cameras.binary import check_picture, chosen_frames
+from chipglow.io.cameras.binary import check_picture, chosen_frames, evenly
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
@@ -29,33 +29,18 @@ from chipglow.io.sources.layout import (
     read_frames,
     read_list,
 )
-from chipglow.quantities.units import SI
+from chipglow.quantities.units import CELSIUS, SI, Unit, parse_unit
 from chipglow.text import Notes
 
-RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
-    "counts": ("counts", 0.0),
-    "W/m2/sr": ("radiance", 0.0),
-    "K": ("temperature", 0.0),
-    "degC": ("temperature", 273.15),
+RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, Unit]]] = {
+    "counts": ("counts", SI),
+    "W/m2/sr": ("radiance", SI),
+    "K": ("temperature", SI),
+    "degC": ("temperature", CELSIUS),
 }
-"""Units of the samples: which quantity has them, and what to add for that of a `Recording`."""
+"""Units of the samples: which quantity has them, and how they become those of a `Recording`."""
 
-_SPELLINGS: Final = {
-    "count": "counts",
-    "dn": "counts",
-    "dl": "counts",
-    "adu": "counts",
-    "w m-2 sr-1": "W/m2/sr",
-    "w/(m2 sr)": "W/m2/sr",
-    "w/(m^2 sr)": "W/m2/sr",
-    "w/m^2/sr": "W/m2/sr",
-    "kelvin": "K",
-    "c": "degC",
-    "°c": "degC",
-    "celsius": "degC",
-    "degrees_celsius": "degC",
-    "degree_celsius": "degC",
-}
+_COUNTS: Final = ("count", "counts", "dn", "dl", "adu")
 
 
 class MissingError(SourceError):
@@ -117,11 +102,11 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
         signal = _signal(one, axes, chosen)
     if skipped := one.attributes.get("lines_of_text"):
         notes.remarks.append(f"Ignored {skipped} lines of text before the numbers.")
-    quantity, offset = RECORDING_UNITS[unit]
+    quantity, known = unit
     if quantity != "counts":
         # 32 bits hold temperature to 1e-4 K, where the file does not hold more.
         precision = np.float32 if signal.dtype.itemsize <= 4 else np.float64
-        signal = (signal.astype(np.float64) + offset).astype(precision)
+        signal = (signal.astype(np.float64) * known.scale + known.offset).astype(precision)
     return Recording(signal=signal, quantity=quantity, times=times, camera="unknown", notes=notes)
 
 
@@ -144,19 +129,26 @@ def _may_be_pictures(array: FileArray) -> bool:
     return len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
 
 
-def _unit(one: FileArray, stated: Stated) -> str | None:
-    """Return the unit of the samples, as the user or the file says; None if neither does."""
+def _unit(one: FileArray, stated: Stated) -> tuple[Quantity, Unit] | None:
+    """Return quantity and unit of the samples, as the user or the file says; None if neither."""
     if stated.unit is not None:
-        return stated.unit
-    said = one.unit or ""
-    unit = said if said in RECORDING_UNITS else _SPELLINGS.get(said.strip().lower())
-    if unit is None and stated.quantity in ("counts", "radiance"):
-        unit = "counts" if stated.quantity == "counts" else "W/m2/sr"
-    if unit is None:
-        return None
-    if stated.quantity is not None and RECORDING_UNITS[unit][0] != stated.quantity:
-        raise SourceError(f"{one}: is in {said}, which is no unit of {stated.quantity}")
-    return unit
+        return RECORDING_UNITS[stated.unit]
+    found = _unit_of(one.unit or "")
+    if found is None and stated.quantity in ("counts", "radiance"):
+        found = RECORDING_UNITS["counts" if stated.quantity == "counts" else "W/m2/sr"]
+    if found is not None and stated.quantity not in (None, found[0]):
+        raise SourceError(f"{one}: is in {one.unit}, which is no unit of {stated.quantity}")
+    return found
+
+
+def _unit_of(text: str) -> tuple[Quantity, Unit] | None:
+    if text.strip().lower() in _COUNTS:
+        return RECORDING_UNITS["counts"]
+    bases: tuple[tuple[Quantity, str], ...] = (("temperature", "K"), ("radiance", "W/m^2/sr"))
+    for quantity, base in bases:
+        with suppress(ValueError):
+            return quantity, parse_unit(text, base, quantity)
+    return None
 
 
 def _times(
@@ -169,7 +161,7 @@ def _times(
 ) -> NDArray[np.float64] | None:
     """Return times of the chosen frames in s; None if neither the user nor the file says them."""
     if stated.interval is not None:
-        return np.asarray(chosen, np.float64) * stated.interval
+        return evenly(chosen, stated.interval)
     count = one.shape[axes.index("time")] if "time" in axes else 1
     if count == 1:
         return np.zeros(1)

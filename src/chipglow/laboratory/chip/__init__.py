@@ -10,7 +10,6 @@ from chipglow.laboratory.chip.band_ridge import (
     find_band as find_band,
 )
 from chipglow.laboratory.chip.command_inputs import (
-    ChosenTool as ChosenTool,
     chosen_tool as chosen_tool,
     load_tool as load_tool,
     read_curve as read_curve,

@@ -1,6 +1,6 @@
 """Temperature along the shear band of a measurement, and how far the band has developed."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
-from chipglow.laboratory.chip.frames import budget_columns, frame_numbers, unit_table
+from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
 from chipglow.laboratory.chip.ridge import (
     NoShearBandError,
     across_curve,
@@ -119,14 +119,12 @@ class BandProfile:
 
     def to_frame(self) -> pd.DataFrame:
         """Return every point of each frame's band; one row each."""
-        budget = budget_columns(self.estimate, BAND_BUDGET)
-        data = self.to_dataset().assign({name: (_DIMS, part) for name, part in budget.items()})
         names = {
             **{"time": "time_us", "stage": "stage", "distance": "distance_um"},
             **{"x": "x_um", "y": "y_um", "temperature": "radiance_temperature_degC"},
-            **{name: name for name in budget},
         }
-        return unit_table(data, names).dropna(subset="x_um", ignore_index=True)
+        table = budget_table(self.to_dataset(), names, self.estimate, BAND_BUDGET)
+        return table.dropna(subset="x_um", ignore_index=True)
 
     def to_dataset(self) -> xr.Dataset:
         """Return every point of each frame's band as arrays in SI units."""
@@ -221,8 +219,15 @@ def band_profile(
         if not (isfinite(value) and value >= 0):
             raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
     numbers = frame_numbers(frames, measurement.times.size)
-    reader = _Reader(measurement, tool, width, position)
-    found, reason = reader.bands(numbers)
+    image = cache(partial(ThermalImage.of, measurement))
+    found: list[Line | None] = []
+    reason = ""
+    for number in numbers.tolist():
+        try:
+            found.append(find_band(image(number), tool))
+        except NoShearBandError as error:
+            found.append(None)
+            reason = str(error)
     notes, lines = Notes(), found
     if measurement.calibration_errors is None:
         notes.warnings.append(CALIBRATION_UNKNOWN)
@@ -234,22 +239,25 @@ def band_profile(
     elif any(found):
         distance = _common(found, pitch)
         if reference is None:
-            base = reader.developed(found, numbers, notes)
+            base = _developed(measurement, found, numbers, notes)
     else:
         several = f"shear band: none is found in any of {numbers.size} frames; in the last: "
         raise NoShearBandError(several * (numbers.size > 1) + reason)
     if reference is not None:
         frame_numbers([reference], measurement.times.size)
-        base = find_band(reader.image(reference), tool)
+        base = find_band(image(reference), tool)
     points = np.stack([_laid(line, distance) for line in lines])
     moves = np.zeros((0, 2))
     if uncertainty is not None:
         moves = uncertainty.displacements(tool, tool.edge_point)
-    read = [
-        reader(int(k), p, _toward(moves, line, tool))
-        for k, p, line in zip(numbers, points, lines, strict=True)
-    ]
-    temperature, calibration, off, edge = map(np.stack, zip(*read, strict=True))
+    rows = np.stack(
+        [
+            _read(image, measurement, k, p, width, position, _toward(moves, line, tool))
+            for k, p, line in zip(numbers.tolist(), points, lines, strict=True)
+        ]
+    )
+    temperature, by_position = rows[:, 0], rows[:, 1]
+    edge, calibration = rows[:, 2 : 2 + len(moves)], rows[:, 2 + len(moves) :]
     if not np.isfinite(temperature).any():
         raise ValueError(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
@@ -259,8 +267,8 @@ def band_profile(
         notes.warnings.extend(_joined(temperature, measurement.times[numbers]))
     estimate = measurement.estimate(temperature, calibration)
     known = np.isfinite(temperature)
-    off = np.where(known, off, nan)
-    estimate = estimate.with_component(POSITION, off, independent="per element")
+    by_position = np.where(known, by_position, nan)
+    estimate = estimate.with_component(POSITION, by_position, independent="per element")
     if uncertainty is not None:
         effects = np.where(known, np.swapaxes(edge, 0, 1), nan)
         component = uncertainty.component(tool, effects)
@@ -347,94 +355,81 @@ def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
     return np.asarray(moves @ way / np.hypot(*way))
 
 
-class _Reader:
-    """Reader of means across a curve, and of their uncertainty, in one frame after another."""
+def _developed(
+    measurement: Measurement,
+    found: Sequence[Line | None],
+    numbers: NDArray[np.int64],
+    notes: Notes,
+) -> Line:
+    """Choose the fully developed one of the bands found."""
 
-    def __init__(self, measurement: Measurement, tool: Tool, width: float, position: float) -> None:
-        self.measurement, self.tool, self.position = measurement, tool, position
-        self.image = cache(partial(ThermalImage.of, measurement))
-        self.pitch = measurement.raster.spacing
-        count = max(round(width / self.pitch * _FINE), 1)
-        self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
-
-    def bands(self, numbers: NDArray[np.int64]) -> tuple[list[Line | None], str]:
-        """Find the ridge of every frame, and the reason why the last one without has none."""
-        lines: list[Line | None] = []
-        reason = ""
-        for number in numbers.tolist():
-            try:
-                lines.append(find_band(self.image(number), self.tool))
-            except NoShearBandError as error:
-                lines.append(None)
-                reason = str(error)
-        return lines, reason
-
-    def developed(
-        self, found: Sequence[Line | None], numbers: NDArray[np.int64], notes: Notes
-    ) -> Line:
-        """Choose the fully developed one of the bands found."""
-        bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
-        near = [band for band in bands if band[0].distance[0] < NEAR_THE_EDGE * self.pitch]
-        if not near:
-            notes.warnings.append(
-                "No band begins near the cutting edge, so all may have moved; the stages are "
-                "judged against the hottest and longest one."
-            )
-        line, number = max(near or bands, key=lambda band: self._heat(*band))
-        if len(bands) == 1:
-            notes.warnings.append("Only one frame has a band; its stage cannot be judged.")
-        elif near:
-            notes.assumed.append(
-                f"The band at {self.measurement.times[number] * 1e6:.6g} µs is fully developed: "
-                "it is the hottest and longest of those that begin near the cutting edge."
-            )
-        return line
-
-    def _heat(self, line: Line, number: int) -> float:
+    def heat(line: Line, number: int) -> float:
         """Integrate the temperature over the lower range limit along a line in K m."""
-        data, raster = self.measurement.data, self.measurement.raster
-        frame = data["radiance_temperature"][number].values
-        lower_limit = float(data.attrs.get("lower_limit", np.nanmin(frame)))
-        values = np.nan_to_num(sample(frame, raster, line.points) - lower_limit)
+        frame = measurement.data["radiance_temperature"][number].values
+        lower_limit = float(measurement.data.attrs.get("lower_limit", np.nanmin(frame)))
+        values = np.nan_to_num(sample(frame, measurement.raster, line.points) - lower_limit)
         return float(scipy.integrate.trapezoid(values, line.distance))
 
-    def __call__(self, number: int, points: Array, nearer: Array) -> tuple[Array, ...]:
-        """Return the temperature at points of a frame, NaN beyond the ends of its curve.
-
-        Then its changes by each error of the calibration, shape (errors, n), by the place of the
-        curve, (n,), and by an edge that is nearer to the curve by each of `nearer` in m, (k, n).
-        """
-        effects = self.measurement.calibration_effects(number)
-        size = len(points)
-        temperature, position = np.full(size, nan), np.zeros(size)
-        calibration, edge = np.zeros((len(effects), size)), np.zeros((nearer.size, size))
-        there = np.isfinite(points[:, 0])
-        if there.sum() >= 2:
-            curve = points[there]
-            places = across_curve(curve, self.offsets)
-            frame = self.measurement.data["radiance_temperature"][number].values
-            temperature[there] = self._mean(frame, places)
-            for error, image in enumerate(effects):
-                calibration[error, there] = self._mean(image, places)
-            position[there] = self._position(number, curve)
-            normal = normals_of(curve)
-            tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-            for step, changes in zip(nearer, edge, strict=True):
-                changes[there] = contribution(self.image(number), curve, step * tangent)
-        return temperature, calibration, position, edge
-
-    def _mean(self, image: NDArray[np.floating], places: Array) -> Array:
-        return np.asarray(sample(image, self.measurement.raster, places).mean(axis=-1))
-
-    def _position(self, number: int, curve: Array) -> Array:
-        image, u = self.image(number), self.position
-        slopes: Any = np.gradient(image.temperature, self.pitch)
-        down, right = (replace(image, temperature=slope).read(curve) for slope in slopes)
-        behind, here, ahead = (
-            image.read(curve + self.pitch * k * normals_of(curve)) for k in (-1, 0, 1)
+    bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
+    limit = NEAR_THE_EDGE * measurement.raster.spacing
+    near = [band for band in bands if band[0].distance[0] < limit]
+    if not near:
+        notes.warnings.append(
+            "No band begins near the cutting edge, so all may have moved; the stages are "
+            "judged against the hottest and longest one."
         )
-        bend = (behind - 2 * here + ahead) / self.pitch**2
-        return np.asarray(np.sqrt((down**2 + right**2) * u**2 + 0.75 * bend**2 * u**4))
+    line, number = max(near or bands, key=lambda band: heat(*band))
+    if len(bands) == 1:
+        notes.warnings.append("Only one frame has a band; its stage cannot be judged.")
+    elif near:
+        notes.assumed.append(
+            f"The band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
+            "it is the hottest and longest of those that begin near the cutting edge."
+        )
+    return line
+
+
+def _read(
+    image: Callable[[int], ThermalImage],
+    measurement: Measurement,
+    number: int,
+    points: Array,
+    width: float,
+    position: float,
+    nearer: Array,
+) -> Array:
+    """Return the temperature at points of a frame and its changes, NaN beyond the curve's ends.
+
+    Rows: temperature; change by the place of the curve; by an edge that is nearer to the curve by
+    each of `nearer` in m; by each error of the calibration.
+    """
+    effects, pitch = measurement.calibration_effects(number), measurement.raster.spacing
+    rows = np.full((2 + nearer.size + len(effects), len(points)), nan)
+    there = np.isfinite(points[:, 0])
+    if there.sum() < 2:
+        return rows
+    curve = points[there]
+    normal = normals_of(curve)
+    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    count = max(round(width / pitch * _FINE), 1)
+    places = across_curve(curve, width * ((np.arange(count) + 0.5) / count - 0.5))
+    frame = measurement.data["radiance_temperature"][number].values
+    mean, *calibration = (
+        sample(one, measurement.raster, places).mean(axis=-1) for one in (frame, *effects)
+    )
+    edge = [contribution(image(number), curve, step * tangent) for step in nearer]
+    rows[:, there] = [mean, _by_position(image(number), curve, position), *edge, *calibration]
+    return rows
+
+
+def _by_position(image: ThermalImage, curve: Array, u: float) -> Array:
+    """Return the standard uncertainty in K by a place of the curve that is uncertain by u in m."""
+    pitch = image.raster.spacing
+    slopes: Any = np.gradient(image.temperature, pitch)
+    down, right = (replace(image, temperature=slope).read(curve) for slope in slopes)
+    behind, here, ahead = (image.read(curve + pitch * k * normals_of(curve)) for k in (-1, 0, 1))
+    bend = (behind - 2 * here + ahead) / pitch**2
+    return np.asarray(np.sqrt((down**2 + right**2) * u**2 + 0.75 * bend**2 * u**4))
 
 
 def _offset(line: Line | None, reference: Line) -> float:

@@ -1,7 +1,7 @@
 """Tools and curves as commands name them: in a file, or found in the image."""
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import degrees, hypot
 from pathlib import Path
 from typing import Annotated, Final
@@ -57,30 +57,21 @@ def read_curve(path: str | os.PathLike[str]) -> Array:
     return curve
 
 
-@dataclass(frozen=True)
-class ChosenTool:
-    """A tool, its uncertainty and its notes."""
-
-    tool: Tool
-    """The tool in the measurement's coordinates."""
-    notes: Notes = field(default_factory=Notes)
-    """Assumptions, warnings and, as remarks, what was found."""
-    uncertainty: ToolUncertainty | None = None
-    """Uncertainty of its place, if it was found and no option gives one."""
-
-
 def chosen_tool(
     measurement: Measurement, tool: str | None, position: float | None = None
-) -> ChosenTool:
-    """Return the tool that an option ``--tool`` chooses."""
+) -> tuple[Tool, ToolUncertainty | None, Notes]:
+    """Return the tool that an option ``--tool`` chooses.
+
+    With the uncertainty of its place, if it was found and no option gives one.
+    """
     if tool is None:
-        return ChosenTool(tool_of(measurement, None))
+        return tool_of(measurement, None), None, Notes()
     if tool != "found":
         given = load_tool(tool)
-        return ChosenTool(given, Notes(warnings=_contradictions(measurement, given)))
+        return given, None, Notes(warnings=_contradictions(measurement, given))
     found = find_tool(measurement)
     used = found.uncertainty if position is None else None
-    return ChosenTool(found.tool, found.notes + Notes(remarks=_found(found, position)), used)
+    return found.tool, used, found.notes + Notes(remarks=_found(found, position))
 
 
 def _contradictions(measurement: Measurement, given: Tool) -> list[str]:

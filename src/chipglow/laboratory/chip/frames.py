@@ -101,17 +101,20 @@ def unit_table(data: xr.Dataset, names: Mapping[str, str]) -> pd.DataFrame:
     return table[[*names.values()]]
 
 
-def budget_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, Array]:
-    """Return columns with the standard uncertainty of temperatures in K and its part by cause.
+def budget_table(
+    data: xr.Dataset, names: Mapping[str, str], estimate: Estimate, causes: Sequence[str]
+) -> pd.DataFrame:
+    """Return `unit_table` with the standard uncertainty of temperatures in K and its parts.
 
     NaN of a cause that is not in the budget, or of which nothing is known.
     """
-    known = np.isfinite(estimate.values)
-    columns = {"standard_uncertainty_K": known_uncertainty(estimate)}
+    known, dims = np.isfinite(estimate.values), data[[*names][-1]].dims
+    budget = {"standard_uncertainty_K": known_uncertainty(estimate)}
     for cause in causes:
         part = estimate.contribution(cause) if cause in estimate.names else np.nan
-        columns[f"{cause.replace(' ', '_')}_uncertainty_K"] = np.where(known, part, np.nan)
-    return columns
+        budget[f"{cause.replace(' ', '_')}_uncertainty_K"] = np.where(known, part, np.nan)
+    data = data.assign({name: (dims, part) for name, part in budget.items()})
+    return unit_table(data, {**names, **{name: name for name in budget}})
 
 
 def known_uncertainty(estimate: Estimate) -> Array:

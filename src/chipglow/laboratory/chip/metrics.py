@@ -7,10 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.laboratory.chip.ridge import NoShearBandError
-from chipglow.laboratory.chip.segment import contact_length
+from chipglow.laboratory.chip.segment import contact_length, shear_band
 from chipglow.laboratory.chip.segmentation import segmentation
-from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
+from chipglow.laboratory.chip.shear_band import ShearBand
 from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
@@ -124,20 +123,18 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
         raise ValueError("scene: it does not state its tool, which the rake face needs")
     if feed is not None and not feed > 0:
         raise ValueError(f"feed is {feed!r}, expected over 0 m")
-    frames = _frame_numbers(scene)
-    looks = [_Look.at(scene.frame(i), scene.raster, tool) for i in frames]
-    if feed is None:
-        feed = _median([look.feed for look in looks])
+    block = scene.longest_block
+    even = np.linspace(block[0], block[-1], min(len(block), _MOST_FRAMES))
+    frames = even.round().astype(int).tolist()
+    heights = _heights(scene.raster, tool)
+    seen = [_measured(scene.frame(k), scene.raster, tool, heights) for k in frames]
+    profiles, contacts, feeds, speeds = map(np.array, zip(*seen, strict=True))
+    feed = _median(feeds) if feed is None else feed
     forces = _forces(scene)
-    period, speed = forces["period"], _median([look.speed for look in looks])
-    time = np.array([look.time for look in looks])
-    row = _scan_row(looks, feed)
-    height = nan if row is None else float(_heights(scene.raster, tool)[row])
-    thickness = np.array([nan if row is None else look.profile[row] for look in looks])
-    scan = ChipScan(height, time, thickness)
-    contacts = np.array([look.contact for look in looks])
+    period, speed = forces["period"], _median(speeds)
+    scan = _scan(scene.times[frames], profiles, heights, tool, feed)
     segments, passing = _passing(scene, tool, frames, scan, period)
-    bands = _developed_bands(scene, tool, frames[::_FRAMES_A_BAND])
+    bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
     return ChipMetrics(
         **forces,
         **passing,
@@ -159,32 +156,28 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     )
 
 
-@dataclass(frozen=True)
-class _Look:
-    """What one frame shows: profile of the chip over the heights on the rake face, in m."""
+def _measured(
+    frame: Frame, raster: Raster, tool: Tool, heights: Array
+) -> tuple[Array, float, float, float]:
+    """Return the chip's thickness at the heights in m, its contact, feed and cutting speed."""
+    solid = frame.material == Material.WORKPIECE
+    contact = contact_length(raster, solid, tool, _TOUCHING)
+    end = tool.rake_point(contact + 3 * raster.spacing) + _TOUCHING * np.array(tool.rake_normal)
+    return (
+        _profile(solid, raster, tool, heights),
+        contact if _inside(raster, end) else nan,
+        _feed(frame, solid, raster),
+        _speed(frame, solid, raster),
+    )
 
-    time: float
-    profile: Array
-    exit_height: Array
-    contact: float
-    feed: float
-    speed: float
 
-    @classmethod
-    def at(cls, frame: Frame, raster: Raster, tool: Tool) -> "_Look":
-        solid = frame.material == Material.WORKPIECE
-        heights = _heights(raster, tool)
-        profile = _profile(frame, raster, tool, heights)
-        contact = contact_length(raster, solid, tool, _TOUCHING)
-        end = tool.rake_point(contact + 3 * raster.spacing) + _TOUCHING * np.array(tool.rake_normal)
-        return cls(
-            time=frame.time,
-            profile=profile,
-            exit_height=tool.rake_point(heights)[:, 1] + profile * tool.rake_normal[1],
-            contact=contact if _inside(raster, end) else nan,
-            feed=_feed(frame, solid, raster),
-            speed=_speed(frame, solid, raster),
-        )
+def _scan(time: Array, profiles: Array, heights: Array, tool: Tool, feed: float) -> ChipScan:
+    """Return the thickness at the lowest height where every frame shows the free surface."""
+    surface = tool.rake_point(heights)[:, 1] + profiles * tool.rake_normal[1]
+    rows = np.flatnonzero((surface > _CHIP_OVER_FEED * feed).all(axis=0))
+    if not rows.size:
+        return ChipScan(nan, time, np.full(time.size, nan))
+    return ChipScan(float(heights[rows[0]]), time, profiles[:, rows[0]])
 
 
 def _passing(
@@ -219,12 +212,6 @@ def _passing(
     }
 
 
-def _frame_numbers(scene: Scene) -> list[int]:
-    frames = scene.longest_block
-    even = np.linspace(frames[0], frames[-1], min(len(frames), _MOST_FRAMES))
-    return [int(number) for number in even.round()]
-
-
 def _heights(raster: Raster, tool: Tool) -> Array:
     """Return heights on the rake face in the view, at steps of two samples."""
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
@@ -240,7 +227,7 @@ def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
     return across & (y > bottom + rim) & (y < top - rim)
 
 
-def _profile(frame: Frame, raster: Raster, tool: Tool, heights: Array) -> Array:
+def _profile(solid: NDArray[np.bool_], raster: Raster, tool: Tool, heights: Array) -> Array:
     """Return the distance from the rake face to the chip's free surface; NaN outside the view.
 
     The chip is the longest stretch of material on the line: it may have lifted off the face.
@@ -248,7 +235,7 @@ def _profile(frame: Frame, raster: Raster, tool: Tool, heights: Array) -> Array:
     step = raster.spacing / 2
     distance = step * (np.arange(2 * (raster.rows + raster.columns)) + 0.5)
     places = tool.rake_point(heights)[:, None] + distance[:, None] * np.array(tool.rake_normal)
-    read = nearest(frame.material == Material.WORKPIECE, raster, places)
+    read = nearest(solid, raster, places)
     index = np.arange(distance.size)
     void = np.maximum.accumulate(np.where(read == 1, -1, index), axis=1)
     last = (index - void).argmax(axis=1)
@@ -276,13 +263,6 @@ def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
     return float(np.median(frame.needed("velocity_x")[still])) if still.any() else nan
 
 
-def _scan_row(looks: list[_Look], feed: float) -> int | None:
-    """Return the lowest height at which every frame shows the chip's free surface."""
-    chip = [look.exit_height > _CHIP_OVER_FEED * feed for look in looks]
-    seen = np.flatnonzero(np.all(chip, axis=0))
-    return int(seen[0]) if seen.size else None
-
-
 def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     """Return whole periods, the last at the end of the scene; without a period the scene."""
     if np.isnan(period):
@@ -303,20 +283,13 @@ def _forces(scene: Scene) -> dict[str, float]:
     return {name: getattr(history, name) for name in _FORCES}
 
 
-def _developed_bands(scene: Scene, tool: Tool, frames: list[int]) -> list[ShearBand]:
+def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
     """Find the bands that reach the free surface with half the largest rate or more."""
-    found = [band for number in frames if (band := _band(scene, tool, number)) is not None]
-    greatest = max((band.middle_rate for band in found), default=0.0)
-    return [band for band in found if band.middle_rate >= _DEVELOPED * greatest]
-
-
-def _band(scene: Scene, tool: Tool, number: int) -> ShearBand | None:
-    rate, material = (scene.field(name, number) for name in ("plastic_strain_rate", "material"))
-    try:
-        band = find_shear_band(scene.raster, rate, material == Material.WORKPIECE, tool)
-    except NoShearBandError:
-        return None
-    return band if band.reaches_surface else None
+    fields = ("plastic_strain_rate", "material")
+    bands = [shear_band(scene, *(scene.field(name, k) for name in fields)) for k in frames]
+    free = [band for band in bands if band and band.reaches_surface]
+    greatest = max((band.middle_rate for band in free), default=0.0)
+    return [band for band in free if band.middle_rate >= _DEVELOPED * greatest]
 
 
 def _angle(band: ShearBand) -> float:
@@ -327,8 +300,8 @@ def _angle(band: ShearBand) -> float:
     return float(np.arctan2(-direction[1] * np.sign(direction[0]), abs(direction[0])))
 
 
-def _median(values: list[float]) -> float:
-    known = np.array(values)[np.isfinite(values)]
+def _median(values: Array) -> float:
+    known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else nan
 
 

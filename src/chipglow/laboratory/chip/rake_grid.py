@@ -16,12 +16,11 @@ from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.laboratory.chip.frames import (
     FRAMES,
-    budget_columns,
+    budget_table,
     frame_mean,
     frame_numbers,
     frame_scatter,
     known_uncertainty,
-    unit_table,
 )
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
@@ -33,7 +32,7 @@ from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.text import Notes
-from chipglow.uncertainty import Component, Estimate, to_xarray
+from chipglow.uncertainty import Estimate, to_xarray
 
 PIXELS: Final = 3.0
 """Side of the paper's squares in pixels."""
@@ -117,14 +116,11 @@ class RakeGrid:
 
     def to_frame(self) -> pd.DataFrame:
         """Return every square of every frame; one row each."""
-        budget = budget_columns(self.estimate, RAKE_BUDGET)
-        data = self.to_dataset().assign({name: (_DIMS, part) for name, part in budget.items()})
         names = {
             **{"time": "time_us", "depth": "depth_um", "along": "along_um", "mean": "mean_degC"},
             **{"standard_deviation": "standard_deviation_K", "count": "usable_pixels"},
-            **{name: name for name in budget},
         }
-        return unit_table(data, names)
+        return budget_table(self.to_dataset(), names, self.estimate, RAKE_BUDGET)
 
     def to_dataset(self) -> xr.Dataset:
         """Return every square of every frame as arrays in SI units."""
@@ -221,12 +217,18 @@ def rake_grid(
     (JCGM 100, 5.1.3). Unusable pixels are filled for this as in `ThermalImage`.
     """
     tool, raster = tool_of(measurement, tool), measurement.raster
-    size = _checked_size(pixels, depth, raster)
+    size = pixels * raster.spacing
+    if not (isfinite(pixels) and pixels >= 1):
+        raise ValueError(f"rake grid: pixels is {pixels!r}, expected 1 or more")
+    if not (isfinite(depth) and depth >= size * (1 - _ROUNDING)):
+        raise ValueError(
+            f"rake grid: depth is {depth!r} m, expected a square's {size:.4g} m or more"
+        )
     numbers = frame_numbers(frames, measurement.times.size)
     rows = int(depth / size + _ROUNDING)
     whole = _whole(raster, tool, size, rows)
     columns = whole.shape[1]
-    squares = _Squares.of(raster, tool, size, whole)
+    squares = _Squares(raster, tool, size, whole)
     temperatures, flags = measurement.data["radiance_temperature"], measurement.data["flags"]
     read = [
         squares.statistics(
@@ -245,80 +247,59 @@ def rake_grid(
         [squares.mean(effect) for effect in measurement.calibration_effects(int(number))]
         for number in numbers
     ]
-    grid = RakeGrid(
-        along=size * (np.arange(columns, dtype=np.float64) + 0.5),
-        depth=size * (np.arange(rows, dtype=np.float64) + 0.5),
-        estimate=measurement.estimate(mean, effects),
+    estimate = measurement.estimate(mean, effects)
+    along, deep = (size * (np.arange(count, dtype=np.float64) + 0.5) for count in (columns, rows))
+    if uncertainty is not None:
+        middles = tool.rake_point(along) + deep[:, None, None] * np.array(tool.rake_normal)
+        places = middles[:, :, None] + _within_square(tool, size, raster.spacing)
+        displacements = uncertainty.displacements(tool, places)
+        changes = np.full((len(displacements), *mean.shape), np.nan)
+        for index in np.flatnonzero(np.isfinite(mean).any(axis=(1, 2))):
+            image = ThermalImage.of(measurement, int(numbers[index]))
+            for change, displacement in zip(changes, displacements, strict=True):
+                change[index] = contribution(image, places, displacement).mean(axis=-1)
+        component = uncertainty.component(tool, np.where(np.isfinite(mean), changes, np.nan))
+        estimate = replace(estimate, components=(*estimate.components, component))
+    return RakeGrid(
+        along=along,
+        depth=deep,
+        estimate=estimate,
         standard_deviation=standard_deviation,
         count=count,
         size=size,
         tool=tool,
         times=measurement.times[numbers],
     )
-    if uncertainty is None:
-        return grid
-    component = _from_tool(measurement, grid, numbers, uncertainty)
-    known = (*grid.estimate.components, component)
-    return replace(grid, estimate=replace(grid.estimate, components=known))
 
 
-def _from_tool(
-    measurement: Measurement,
-    grid: RakeGrid,
-    numbers: NDArray[np.int64],
-    uncertainty: ToolUncertainty,
-) -> Component:
-    """Return the changes of the means by the uncertainties of the tool's place."""
-    places = _places_in_squares(grid, measurement.raster.spacing)
-    displacements = uncertainty.displacements(grid.tool, places)
-    found = np.zeros((len(displacements), *grid.mean.shape))
-    for index in np.flatnonzero(grid.usable.any(axis=(1, 2))):
-        image = ThermalImage.of(measurement, int(numbers[index]))
-        for kind, displacement in enumerate(displacements):
-            found[kind, index] = contribution(image, places, displacement).mean(axis=-1)
-    return uncertainty.component(grid.tool, np.where(grid.usable, found, np.nan))
+def _within_square(tool: Tool, size: float, pitch: float) -> Array:
+    """Return places spread evenly over a square, about one a pixel, from its middle, (k, 2)."""
+    count = round(size / pitch)
+    steps = size * ((np.arange(count) + 0.5) / count - 0.5)
+    normal, direction = np.array(tool.rake_normal), np.array(tool.rake_direction)
+    return np.asarray((steps[:, None, None] * direction + steps[:, None] * normal).reshape(-1, 2))
 
 
-def _places_in_squares(grid: RakeGrid, pitch: float) -> Array:
-    """Return places spread evenly over each square, about one a pixel, shape (m, n, k, 2)."""
-    count = round(grid.size / pitch)
-    steps = grid.size * ((np.arange(count) + 0.5) / count - 0.5)
-    normal, direction = np.array(grid.tool.rake_normal), np.array(grid.tool.rake_direction)
-    within = (steps[:, None, None] * direction + steps[:, None] * normal).reshape(-1, 2)
-    middles = grid.tool.rake_point(grid.along) + grid.depth[:, None, None] * normal
-    return np.asarray(middles[:, :, None] + within)
-
-
-@dataclass(frozen=True)
 class _Squares:
-    """Pixels of each square, and their weights."""
+    """Flat numbers of the pixels in the grid and of their squares, and their weights."""
 
-    shape: tuple[int, int]
-    whole: NDArray[np.bool_]
-    """Which squares are whole inside the image, flat."""
-    pixel: NDArray[np.int64]
-    square: NDArray[np.int64]
-    """Flat numbers of the pixels in the grid and of their squares, shape (k,)."""
-    weight: Array
-    """Weights, of sum 1 in each square, shape (k,)."""
-
-    @classmethod
-    def of(cls, raster: Raster, tool: Tool, size: float, whole: NDArray[np.bool_]) -> "_Squares":
+    def __init__(self, raster: Raster, tool: Tool, size: float, whole: NDArray[np.bool_]) -> None:
         rows, columns = whole.shape
+        self.whole = whole
         middles = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
         along, across = tool.face_coordinates(middles)
         column = np.floor(along / size + _ROUNDING).astype(np.int64)
         row = np.floor(across / size + _ROUNDING).astype(np.int64)
         inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-        square = (row * columns + column)[inside]
+        self.square = (row * columns + column)[inside]
         off = np.stack([along - size * (column + 0.5), across - size * (row + 0.5)], axis=-1)
-        weight = _centred_weights(off[inside], square, rows * columns)
-        return cls(whole.shape, whole.ravel(), np.flatnonzero(inside), square, weight)
+        self.weight = _centred_weights(off[inside], self.square, whole.size)
+        self.pixel = np.flatnonzero(inside)
 
     def statistics(
         self, values: Array, usable: NDArray[np.bool_]
     ) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Compute mean, standard deviation and number of usable pixels, each of `shape`."""
+        """Compute mean, standard deviation and number of usable pixels, shape (rows, columns)."""
         good = usable.ravel()[self.pixel]
         value = np.where(good, values.ravel()[self.pixel], 0.0)
         number = self._sum(np.ones(good.size))
@@ -326,31 +307,17 @@ class _Squares:
         left_out = (kept < number) | (number == 0) | ~self.whole
         mean = np.where(left_out, np.nan, self._sum(self.weight * value))
         plain = _ratio(self._sum(value), number)
-        away = value - plain[self.square]
+        away = value - plain.ravel()[self.square]
         deviation = np.sqrt(_ratio(self._sum(away**2), number - 1))
-        deviation = np.where(left_out, np.nan, deviation)
-        count = kept.astype(np.int64)
-        return mean.reshape(self.shape), deviation.reshape(self.shape), count.reshape(self.shape)
+        return mean, np.where(left_out, np.nan, deviation), kept.astype(np.int64)
 
     def mean(self, values: Array) -> Array:
-        """Compute the mean of values of all pixels, NaN counting as 0, of `shape`."""
-        good = np.nan_to_num(values.ravel()[self.pixel])
-        return self._sum(self.weight * good).reshape(self.shape)
+        """Compute the mean of values of all pixels, NaN counting as 0, shape (rows, columns)."""
+        return self._sum(self.weight * np.nan_to_num(values.ravel()[self.pixel]))
 
     def _sum(self, values: NDArray[np.generic]) -> Array:
         total = np.bincount(self.square, values.astype(np.float64), minlength=self.whole.size)
-        return np.asarray(total, dtype=np.float64)
-
-
-def _checked_size(pixels: float, depth: float, raster: Raster) -> float:
-    if not (isfinite(pixels) and pixels >= 1):
-        raise ValueError(f"rake grid: pixels is {pixels!r}, expected 1 or more")
-    size = pixels * raster.spacing
-    if not (isfinite(depth) and depth >= size * (1 - _ROUNDING)):
-        raise ValueError(
-            f"rake grid: depth is {depth!r} m, expected a square's {size:.4g} m or more"
-        )
-    return size
+        return np.asarray(total, np.float64).reshape(self.whole.shape)
 
 
 def _corners(tool: Tool, size: float, rows: int, columns: int) -> Array:

@@ -6,8 +6,8 @@ from math import ceil, pi, radians
 from typing import Final
 
 import numpy as np
+import scipy  # its signal part is slow to import, and loaded at its first use
 from numba import njit
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from chipglow.quantities import Array
@@ -167,17 +167,7 @@ def even_steps(points: Array, step: float) -> Array:
     window = min(2 * round(_SMOOTHING / step / 2) + 1, (even.size - 1) // 2 * 2 + 1)
     if window < 5:
         return resampled
-    return local_parabolas(resampled, window)
-
-
-def local_parabolas(values: Array, window: int) -> Array:
-    """Smooth as `scipy.signal.savgol_filter` does, whose package takes half a second to import."""
-    half = window // 2
-    powers = np.vander(np.arange(-half, half + 1.0), 3)
-    fitted = powers @ np.linalg.pinv(powers)
-    first, last = fitted[:half] @ values[:window], fitted[half + 1 :] @ values[-window:]
-    middle = sliding_window_view(values, window, axis=0) @ fitted[half]
-    return np.concatenate([first, middle, last])
+    return np.asarray(scipy.signal.savgol_filter(resampled, window, 2, axis=0), np.float64)
 
 
 def arc_length(points: Array) -> Array:

@@ -80,7 +80,7 @@ class Instant:
         """Find the band during an exposure."""
         indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
         rate = _mean(scene, "plastic_strain_rate", indices, weights)
-        band = _band(scene, rate, scene.field("material", indices[len(indices) // 2]))
+        band = shear_band(scene, rate, scene.field("material", indices[len(indices) // 2]))
         if band is None:
             return cls(start, None, np.zeros(0))
         temperature = _mean(scene, "temperature", indices, weights)
@@ -128,7 +128,7 @@ class Segment:
             tool=scene.tool,
             band=instant.band,
             contact_length=contact_length(scene.raster, workpiece, scene.tool, touching),
-            momentary_band=_band(scene, frame.needed("plastic_strain_rate"), frame.material),
+            momentary_band=shear_band(scene, frame.needed("plastic_strain_rate"), frame.material),
             sweep=_sweep(scene, indices, instant.band),
         )
 
@@ -140,9 +140,10 @@ def _mean(scene: Scene, field_name: str, indices: range, weights: Array) -> Arra
     return total
 
 
-def _band(
+def shear_band(
     scene: Scene, rate: NDArray[np.floating], material: NDArray[np.integer]
 ) -> ShearBand | None:
+    """Find the shear band in a strain rate of a scene; None without one."""
     assert scene.tool is not None
     try:
         return find_shear_band(scene.raster, rate, material == Material.WORKPIECE, scene.tool)

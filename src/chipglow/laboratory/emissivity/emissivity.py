@@ -38,7 +38,7 @@ BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
 LABORATORY: Final = 293.0
 """Temperature in K of the paper's laboratory, which surfaces reflect."""
 
-CONSTANT: Final = np.array([[1.0], [0.0]])
+_CONSTANT: Final = np.array([[1.0], [0.0]])
 """Design of a line from its constant."""
 
 _CLEARLY: Final = 5.0
@@ -257,15 +257,8 @@ class RegionEmissivity:
     @property
     def line(self) -> "EmissivityLine":
         """The emissivity as a constant line over the temperature."""
-        return EmissivityLine(
-            self.name,
-            self.feature,
-            self.estimate.linear(CONSTANT),
-            (self.heating,),
-            (self.mean,),
-            (float(self.estimate.standard_uncertainty),),
-            standard_deviation=self.standard_deviation,
-        )
+        spread = self.standard_deviation
+        return EmissivityLine.measured(self.name, self.feature, self.heating, self.estimate, spread)
 
 
 @dataclass(frozen=True)
@@ -296,7 +289,22 @@ class EmissivityLine:
                 f"emissivity: standard uncertainty is {standard_uncertainty!r}, expected 0 or more"
             )
         value = Estimate(np.array(mean)).with_component("emissivity", standard_uncertainty)
-        return cls("", "", value.linear(CONSTANT))
+        return cls("", "", value.linear(_CONSTANT))
+
+    @classmethod
+    def measured(
+        cls, name: str, feature: str, heating: Heating, mean: Estimate, standard_deviation: float
+    ) -> "EmissivityLine":
+        """Return the emissivity of an area at one temperature as a constant line."""
+        return cls(
+            name,
+            feature,
+            mean.linear(_CONSTANT),
+            (heating,),
+            (float(mean.values),),
+            (float(mean.standard_uncertainty),),
+            standard_deviation=standard_deviation,
+        )
 
     @property
     def temperatures(self) -> tuple[float, ...]:

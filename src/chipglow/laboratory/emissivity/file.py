@@ -17,7 +17,6 @@ from chipglow.io.measurement_file import Made, read_dataset
 from chipglow.laboratory.emissivity.emissivity import (
     BUDGET,
     COMMON,
-    CONSTANT,
     EmissivityLine,
     Heating,
     RegionEmissivity,
@@ -31,6 +30,7 @@ from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import SURFACES, EmissivityTrend, MapSurface, Surface, TrendSurface
 from chipglow.uncertainty import Cause, Component, Estimate
+from chipglow.uncertainty.dataset import correlation_forms
 
 _KIND: Final = "emissivity map"
 _FIELDS: Final[Mapping[str, str]] = {
@@ -50,54 +50,55 @@ _HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty"
 
 def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) -> None:
     """Write emissivity maps and their regions to a NetCDF-4 file."""
-    maps, rows = found.maps, found.rows
-    raster = maps[0].raster
-    images: dict[str, Any] = {
-        "emissivity": np.stack([one.emissivity for one in maps]),
-        "standard_uncertainty": np.stack([one.estimate.standard_uncertainty for one in maps]),
-        "flags": np.stack([one.flags for one in maps]),
-    }
-    table = found.to_frame().loc[:, "pixels":"expanded_uncertainty"].astype(float)
-    tables: dict[str, Any] = {
-        f"region_{name}": table[name].to_numpy().reshape(len(maps), -1) for name in table
-    }
+    maps, rows = found.maps, [row for of in found.rows for row in of]
+    estimates = [row.estimate for row in rows]
+    frame = found.to_frame().loc[:, "pixels":"expanded_uncertainty"].astype(float)
+    columns: dict[str, Any] = {name: frame[name].to_numpy() for name in frame}
     for cause in BUDGET:
         effect = Estimate.effect if cause in COMMON else Estimate.contribution
-        tables[f"region_{cause}_uncertainty"] = [
-            [float(effect(row.estimate, cause)) for row in of] for of in rows
-        ]
-    tables["region_random_degrees_of_freedom"] = [
-        [float(row.estimate.only(RANDOM).degrees_of_freedom) for row in of] for of in rows
-    ]
-    names = np.array([row.name for row in rows[0]], dtype=object)
+        columns[f"{cause}_uncertainty"] = np.array([float(effect(e, cause)) for e in estimates])
+    columns["random_degrees_of_freedom"] = np.array(
+        [float(one.only(RANDOM).degrees_of_freedom) for one in estimates]
+    )
+    columns["warnings"] = np.array(["\n".join(one.warnings) for one in estimates], object)
+    image, table = ("reference", "y", "x"), ("reference", "region")
+    shape, kelvins = (len(maps), -1), {"units": "K"}
+    names = np.array([row.name for row in found.rows[0]], dtype=object)
     data = xr.Dataset(
         {
-            **{name: (("reference", "y", "x"), image) for name, image in images.items()},
-            **{name: (("reference", "region"), np.array(table)) for name, table in tables.items()},
+            "emissivity": (image, np.stack([one.emissivity for one in maps])),
+            "standard_uncertainty": (
+                image,
+                np.stack([one.estimate.standard_uncertainty for one in maps]),
+            ),
+            "flags": (image, np.stack([one.flags for one in maps])),
+            **{f"region_{name}": (table, of.reshape(shape)) for name, of in columns.items()},
             "region_covariance": (
-                ("reference", "region", "other_region"),
-                np.stack([emissivity_covariance(of) for of in rows]),
+                (*table, "other_region"),
+                np.stack([emissivity_covariance(of) for of in found.rows]),
             ),
             **{
-                name: ("reference", [getattr(one.heating, name) for one in maps], {"units": "K"})
+                name: ("reference", [getattr(one.heating, name) for one in maps], kelvins)
                 for name in _HEATING
             },
-            "region_warnings": (
-                ("reference", "region"),
-                np.array([["\n".join(row.estimate.warnings) for row in of] for of in rows], object),
-            ),
             "observations": ("reference", np.array([one.identity for one in maps], dtype=object)),
-            "feature": ("region", np.array([row.feature for row in rows[0]], dtype=object)),
+            "feature": ("region", np.array([row.feature for row in found.rows[0]], dtype=object)),
         },
         coords={
-            **raster_coordinates(raster, np.zeros(1)),
-            "reference": ("reference", [one.heating.reference for one in maps], {"units": "K"}),
+            **raster_coordinates(maps[0].raster, np.zeros(1)),
+            "reference": ("reference", [one.heating.reference for one in maps], kelvins),
             "other_region": ("other_region", names),
             "region": ("region", names),
         },
-        attrs={"kind": _KIND, "pitch": raster.spacing},
+        attrs={"kind": _KIND, "pitch": maps[0].raster.spacing},
     ).drop_vars("time")
-    _say_correlations(data)
+    parts = {cause: data[f"region_{cause}_uncertainty"] for cause in _FORMS}
+    for cause, part in parts.items():
+        forms = correlation_forms(dict(zip(table, _FORMS[cause], strict=True)))
+        part.attrs |= {"pdf_shape": "gaussian", **forms}
+    data["region_mean"].attrs["unc_comps"] = [
+        part.name for part in parts.values() if np.isfinite(part.values).all()
+    ]
     for variable in data.data_vars.values():
         variable.attrs.setdefault("units", "1")
     write_dataset(data, path)
@@ -110,21 +111,6 @@ _FORMS: Final = {
     "noise": ("random", "random"),
 }
 """Correlation of the regions' errors along reference and region, as obsarray names it."""
-
-
-def _say_correlations(data: xr.Dataset) -> None:
-    """Add the attributes of obsarray to the regions' means."""
-    known = []
-    for cause, forms in _FORMS.items():
-        part = data[f"region_{cause}_uncertainty"]
-        part.attrs["pdf_shape"] = "gaussian"
-        for number, (dim, form) in enumerate(zip(("reference", "region"), forms, strict=True), 1):
-            start = f"err_corr_{number}"
-            part.attrs |= {f"{start}_dim": dim, f"{start}_form": form}
-            part.attrs |= {f"{start}_params": [], f"{start}_units": []}
-        if np.isfinite(part.values).all():
-            known.append(part.name)
-    data["region_mean"].attrs["unc_comps"] = known
 
 
 def read_emissivity_lines(path: str | os.PathLike[str]) -> dict[str, EmissivityLine]:
@@ -163,15 +149,9 @@ def _constant(row: xr.Dataset) -> EmissivityLine:
         unevaluated=tuple(cause for cause in BUDGET if np.isnan(parts[cause])),
         warnings=tuple(str(row["region_warnings"].values).splitlines()),
     )
-    return EmissivityLine(
-        name,
-        str(row["feature"].values),
-        estimate.linear(CONSTANT),
-        (Heating(float(row["reference"]), reflected, *spreads),),
-        (float(estimate.values),),
-        (float(estimate.standard_uncertainty),),
-        standard_deviation=float(row["region_standard_deviation"]),
-    )
+    heating = Heating(float(row["reference"]), reflected, *spreads)
+    spread = float(row["region_standard_deviation"])
+    return EmissivityLine.measured(name, str(row["feature"].values), heating, estimate, spread)
 
 
 def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = None) -> MapSurface:

@@ -1,6 +1,5 @@
 """Description of regions in a file: named polygons, rectangles and circles of an image."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final, Literal
@@ -10,7 +9,6 @@ from pydantic import PlainValidator
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.scene import Circle, Polygon, Region
-from chipglow.scene.regions import Point
 from chipglow.text import load_described
 
 _SHAPES: Final = ("polygon", "rectangle", "circle")
@@ -63,14 +61,12 @@ class RegionSection(Part):
     def region(self, name: str) -> Region:
         """Return the region that this section describes."""
         if self.circle is not None:
-            centre, radius = self.circle.centre, self.circle.radius
-            unit = _unit([*centre, radius])
-            return Region(name, Circle(_point(centre), _number(radius)), self.feature, unit)
-        corners = self.polygon if self.rectangle is None else self.rectangle
-        assert corners is not None
-        points = tuple(_point(corner) for corner in corners)
+            (*centre, radius), unit = _numbers(*self.circle.centre, self.circle.radius)
+            return Region(name, Circle((centre[0], centre[1]), radius), self.feature, unit)
+        corners = self.polygon or self.rectangle or ()
+        numbers, unit = _numbers(*(coordinate for corner in corners for coordinate in corner))
+        points = tuple(zip(numbers[::2], numbers[1::2], strict=True))
         shape = Polygon(points) if self.rectangle is None else Polygon.rectangle(*points)
-        unit = _unit(coordinate for corner in corners for coordinate in corner)
         return Region(name, shape, self.feature, unit)
 
 
@@ -93,20 +89,13 @@ class RegionsDescription(Part):
         return tuple(section.region(name) for name, section in self.regions.items())
 
 
-def _number(coordinate: float | str) -> float:
-    """Return a coordinate in pixels or in m."""
-    return POSITION.parse(coordinate) if isinstance(coordinate, str) else coordinate
-
-
-def _point(place: PointField) -> Point:
-    return _number(place[0]), _number(place[1])
-
-
-def _unit(coordinates: Iterable[float | str]) -> Literal["pixel", "m"]:
+def _numbers(*coordinates: float | str) -> tuple[list[float], Literal["pixel", "m"]]:
+    """Return coordinates in pixels or in m, and which of these it is."""
     kinds = {isinstance(coordinate, str) for coordinate in coordinates}
     if len(kinds) > 1:
         raise ValueError("pixels and lengths are mixed, expected all of one kind")
-    return "m" if True in kinds else "pixel"
+    numbers = [POSITION.parse(one) if isinstance(one, str) else one for one in coordinates]
+    return numbers, "m" if True in kinds else "pixel"
 
 
 def load_regions(path: str | Path) -> tuple[Region, ...]:

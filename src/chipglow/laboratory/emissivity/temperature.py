@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from math import inf, isnan, sqrt
-from typing import Any, Final
+from typing import Final
 from uuid import uuid4
 
 import numpy as np
@@ -131,23 +132,27 @@ def true_temperature(
     mean = float(values.mean())
     reflecting = _surroundings(emissivity) if surroundings is None else surroundings
     room = float(reflecting.values)
+    if not mean > float(band.radiance(np.array(room))):
+        raise ValueError(
+            f"region {area.name}: is darker than what it reflects at {room - ZERO_CELSIUS:.6g} °C, "
+            "expected a hotter object"
+        )
     value = _emissivity_of_area(emissivity, area.name, mean, room, band)
-    slope = emissivity.slope if len(emissivity.heatings) > 1 else 0.0
-    equation = _Equation(float(value.values), room, band, slope)
-    derivatives = equation.derivatives(area.name, mean)
-    at = float(equation.temperature(np.array(mean)))
+    temperature = partial(_temperature, float(value.values), room, band)
+    at = float(temperature(np.array(mean)))
+    derivatives = _derivatives(area.name, emissivity, float(value.values), at, room, band)
     correlation = _correlation(emissivity, at, mean, calibration, band)
     shared = (correlation or 0.0) if emissivity.heatings else 1.0
     stated = stated_calibration(measurements)
     error = 0.0 if stated is None else float(stated[used.mask].mean())
     estimate = propagate(
-        lambda _, seen, __: equation.temperature(seen),
+        lambda _, seen, __: temperature(seen),
         value.renamed(RANDOM, "emissivity"),
         _mean_radiance(values, error, shared, drift, len(measurements)),
         reflecting,
         derivatives=[lambda *_, value=value: np.array(value) for value in derivatives],
     )
-    pixels = equation.temperature(values.mean(axis=0))
+    pixels = temperature(values.mean(axis=0))
     mean_of_pixels = float(pixels.mean())
     warnings = [f"Emissivity: {warning}" for warning in estimate.warnings]
     warnings = used.warnings() + warnings + _warnings(area.name, estimate, mean_of_pixels)
@@ -313,58 +318,33 @@ def _warnings(name: str, found: Estimate, mean_of_pixels: float) -> list[str]:
     ]
 
 
-@dataclass(frozen=True)
-class _Equation:
-    """Equation 2 for an emissivity and the temperature in K of what is reflected."""
+def _temperature(emissivity: float, reflected: float, band: Band, radiance: Array) -> Array:
+    """Return the true temperature in K by apparent radiance in W/(m² sr): Equation 2."""
+    room = float(band.radiance(np.array(reflected)))
+    own = (radiance - (1 - emissivity) * room) / emissivity
+    return np.asarray(band.temperature(own), np.float64)
 
-    emissivity: float
-    reflected: float
-    band: Band
-    slope: float = 0.0
-    """Change of the emissivity with the object's temperature in 1/K."""
 
-    @property
-    def reflected_radiance(self) -> float:
-        """Radiance of a blackbody at the surroundings' temperature in W/(m² sr)."""
-        return float(self.band.radiance(np.array(self.reflected)))
+def _derivatives(
+    name: str, line: EmissivityLine, emissivity: float, at: float, reflected: float, band: Band
+) -> tuple[float, float, float]:
+    """Derive the temperature by emissivity, radiance and temperature of the surroundings."""
 
-    def own(self, radiance: Any) -> Any:
-        """Return the radiance in W/(m² sr) of a blackbody at the object's temperature."""
-        return (radiance - (1 - self.emissivity) * self.reflected_radiance) / self.emissivity
-
-    def temperature(self, radiance: Array) -> Array:
-        """Return the true temperature in K by apparent radiance in W/(m² sr)."""
-        return np.asarray(self.band.temperature(self.own(radiance)), np.float64)
-
-    def derivatives(self, name: str, radiance: float) -> tuple[float, float, float]:
-        """Derive the temperature by emissivity, radiance and temperature of the surroundings."""
-        own = float(self.own(radiance))
-        if not own > self.reflected_radiance:
-            raise _too_dark(name, self.reflected)
-        value = float(self.band.temperature(np.array(own)))
-        rise = self.emissivity * self._slope(value)
-        rise += self.slope * (own - self.reflected_radiance)
-        if not rise > 0:
-            raise ValueError(
-                f"region {name}: by the line of its emissivity the radiance does not rise with "
-                f"the temperature at {value - ZERO_CELSIUS:.6g} °C, expected an emissivity that "
-                "falls less"
-            )
-        by_radiance = 1 / rise
-        by_environment = -(1 - self.emissivity) * self._slope(self.reflected) * by_radiance
-        return -(own - self.reflected_radiance) * by_radiance, by_radiance, by_environment
-
-    def _slope(self, temperature: float) -> float:
+    def rise(temperature: float) -> float:
         """Return dL/dT in W/(m² sr K) at any temperature: `Band.slope` ends with its table."""
-        ends = self.band.radiance(np.array([temperature - _STEP, temperature + _STEP]))
+        ends = band.radiance(np.array([temperature - _STEP, temperature + _STEP]))
         return float(ends[1] - ends[0]) / (2 * _STEP)
 
-
-def _too_dark(name: str, reflected: float) -> ValueError:
-    return ValueError(
-        f"region {name}: is darker than what it reflects at {reflected - ZERO_CELSIUS:.6g} °C, "
-        "expected a hotter object"
-    )
+    room, own = band.radiance(np.array([reflected, at])).tolist()
+    whole = emissivity * rise(at)
+    if len(line.heatings) > 1:
+        whole += line.slope * (own - room)
+    if not whole > 0:
+        raise ValueError(
+            f"region {name}: by the line of its emissivity the radiance does not rise with the "
+            f"temperature at {at - ZERO_CELSIUS:.6g} °C, expected an emissivity that falls less"
+        )
+    return -(own - room) / whole, 1 / whole, -(1 - emissivity) * rise(reflected) / whole
 
 
 def _emissivity_of_area(
@@ -379,8 +359,6 @@ def _emissivity_of_area(
         value = float(line.at(temperature).values)
         return value * (float(band.radiance(np.array(temperature))) - room) - (radiance - room)
 
-    if not radiance > room:
-        raise _too_dark(name, reflected)
     temperatures = np.geomspace(reflected, HOTTEST, _STEPS).tolist()
     for colder, hotter in pairwise(temperatures):
         if excess(hotter) > 0:

@@ -1,4 +1,4 @@
-"""The command ``chipglow rake``: the analysis grid on the rake face."""
+"""The commands ``chipglow rake`` and ``shearband``: the chip of a measurement."""
 
 from functools import partial
 from pathlib import Path
@@ -40,15 +40,15 @@ def rake(
 
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
-    chosen = chosen_tool(measured, tool, position)
-    given = chosen.uncertainty if position is None else ToolUncertainty(position, position)
-    grid = rake_grid(measured, chosen.tool, pixels, depth, frames, given)
+    chosen, known, notes = chosen_tool(measured, tool, position)
+    given = known if position is None else ToolUncertainty(position, position)
+    grid = rake_grid(measured, chosen, pixels, depth, frames, given)
     _print_squares(grid)
     screen = current()
     screen.budget("budget", grid.frame_estimate, "Standard uncertainty of the squares' means")
-    screen.remarks(chosen.notes + grid.notes)
+    screen.remarks(notes + grid.notes)
     finish(
-        measured.notes + chosen.notes + grid.notes,
+        measured.notes + notes + grid.notes,
         (out, partial(write_result, grid)),
         (plot, figure(draw_rake_grid, measured, grid)),
     )
@@ -82,3 +82,69 @@ def _print_squares(grid: "RakeGrid") -> None:
         columns[f"{depth:.4g} µm deep"] = f"mean_degC_{n} ± standard_deviation_K_{n}"
     title = f"radiance temperature / °C ± standard deviation {over}"
     current().table("squares", pd.DataFrame(squares), columns, title, columns.values())
+
+
+def shearband(
+    measurement: opt.MeasurementFile,
+    curve: Annotated[
+        str,
+        opt.value(
+            "FILE|found",
+            "Curve to read along: a CSV file with header x_um,y_um, from the cutting edge outward; "
+            "or 'found', the ridge of the radiance temperature in each frame.",
+        ),
+    ] = "found",
+    at: Annotated[
+        list[float] | None,
+        opt.time("Frame nearest to this time, e.g. '400 us'. Repeatable. Default: all."),
+    ] = None,
+    tool: opt.ToolChoice = None,
+    reference: opt.ReferenceFrame = None,
+    width: Annotated[
+        float | None, opt.length("Averaging width across the curve. Default: one pixel.")
+    ] = None,
+    position: Annotated[
+        float | None,
+        opt.length(
+            "Standard uncertainty of the curve's position. Default: that of a pixel, its side / "
+            "√12, and that of the edge of a found tool.",
+        ),
+    ] = None,
+    out: Annotated[Path | None, opt.table("Write the temperatures along the band")] = None,
+    plot: Annotated[
+        Path | None, opt.picture("Draw the curves on the image and the profiles")
+    ] = None,
+    settings: opt.Settings = None,
+) -> None:
+    """Read the radiance temperature along the shear band (the paper's Figure 9)."""
+    from chipglow.drawing.scales import shown_frame
+    from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
+    from chipglow.laboratory.chip.figures import draw_band_profile
+    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_result
+
+    measured = load_measurement(measurement, settings or ())
+    times = measured.times
+    chosen, known, notes = chosen_tool(measured, tool, position)
+    profile = band_profile(
+        measured,
+        chosen,
+        frames=sorted({shown_frame(times, time, option="--at: ") for time in at}) if at else None,
+        curve=None if curve == "found" else read_curve(curve),
+        reference=None
+        if reference is None
+        else shown_frame(times, reference, option="--reference: "),
+        width=width,
+        position=position,
+        uncertainty=known,
+    )
+    screen = current()
+    title = f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm"
+    screen.table("stages", profile.stage_frame(), title=title, unbroken=("stage",))
+    screen.budget("budget", profile.estimate, "Standard uncertainty of the points along the band")
+    screen.remarks(notes)
+    finish(
+        measured.notes + notes + profile.notes,
+        (out, partial(write_result, profile)),
+        (plot, figure(draw_band_profile, measured, chosen, profile)),
+    )

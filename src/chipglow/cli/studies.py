@@ -1,0 +1,224 @@
+"""The commands of a study: the whole of it, its cut alone, its camera alone, its wavelengths."""
+
+import sys
+from collections.abc import Iterable
+from contextlib import nullcontext
+from functools import partial
+from math import floor, isfinite, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from chipglow.cli import options as opt
+from chipglow.cli.screen import current, figure, finish
+
+if TYPE_CHECKING:
+    from chipglow.laboratory.chip import Inertia
+
+PAPER_FOLDER: Final = Path("chipglow-paper")
+ERROR_FOLDER: Final = Path("chipglow-error")
+_INERTIA: Final = {
+    "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
+    "force_fraction": "momentum flux {:.2%} of the mean cutting force",
+}
+
+ResultFolder = Annotated[Path, opt.folder("Results folder; earlier results are replaced.")]
+
+
+def reproduce(
+    quick: Annotated[
+        bool, opt.flag("--quick", "Use coarse cells and samples; takes about a minute.")
+    ] = False,
+    steady_tool: Annotated[
+        bool,
+        opt.flag(
+            "--steady-tool",
+            "Also run the study with a steady-state tool temperature; doubles the run time.",
+        ),
+    ] = False,
+    out: ResultFolder = PAPER_FOLDER,
+    force: opt.Force = False,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
+) -> None:
+    """Reproduce the paper's study and compare the results with the published values."""
+    from chipglow.cli.results import write_results
+    from chipglow.report import QUICK
+    from chipglow.study import Study
+
+    study, remarks = (Study.quick(), [QUICK]) if quick else (Study(), [])
+    write_results(study, out, force, resume, yes, remarks, steady_tool)
+
+
+def run(
+    study: opt.StudyFile,
+    out: ResultFolder,
+    force: opt.Force = False,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
+) -> None:
+    """Run a study: cut, measure, analyse and report."""
+    from chipglow.cli.results import write_results
+    from chipglow.study import load_study
+
+    write_results(load_study(study), out, force, resume, yes)
+
+
+def error(
+    scene: opt.SceneFile,
+    study: Annotated[
+        Path | None,
+        opt.value(
+            "STUDY",
+            "Study file defining surface, camera and places; omitted settings default to the "
+            "paper's.",
+        ),
+    ] = None,
+    emissivity: Annotated[
+        float | None, opt.value("NUMBER", "Uniform emissivity, instead of the study's surface.")
+    ] = None,
+    out: ResultFolder = ERROR_FOLDER,
+    force: opt.Force = False,
+) -> None:
+    """Compute the measurement error for any scene (cut, weld, melt pool, plate, ...)."""
+    from chipglow.cli.results import write_results
+    from chipglow.quantities import changed
+    from chipglow.study import Study, errors, load_study
+    from chipglow.surface import UniformSurface
+
+    if not scene.is_file():
+        raise FileNotFoundError(f"{scene}: no such file")
+    loaded = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
+    if emissivity is not None:
+        loaded = changed(loaded, {"surface": UniformSurface(emissivity)})
+    write_results(loaded, out, force, compute=errors)
+
+
+def cut(
+    study: opt.StudyFile,
+    out: Annotated[Path, opt.file("Scene to write, NetCDF.")],
+    preview: Annotated[
+        Path | None,
+        opt.file(
+            "Movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of the "
+            "whole cut; with --resume, of the rest; of a cached cut, of the recorded part.",
+            ".mp4",
+            ".gif",
+        ),
+    ] = None,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
+) -> None:
+    """Run only the cutting simulation of a study."""
+    from shutil import copyfile
+
+    from chipglow.cli.progress import confirm_cost, progress_bars
+    from chipglow.io import atomic_path, open_scene
+    from chipglow.laboratory.chip import inertia, resolution_warnings
+    from chipglow.study import cut as compute, load_study, preview_raster
+
+    loaded = load_study(study)
+    movie: Any = nullcontext()
+    if preview is not None:
+        from chipglow.report import cut_movie
+
+        movie = cut_movie(preview, preview_raster(loaded), loaded.cutting.simulation())
+    with atomic_path(out) as temporary, movie as on_preview:
+        confirm_cost(loaded, resume, yes)
+        with progress_bars() as progress:
+            copyfile(compute(loaded, progress, resume, on_preview), temporary)
+    scene = open_scene(out)
+    say_of_cut(inertia(scene), resolution_warnings(scene))
+    scene.data.close()
+    for path in filter(None, (out, preview)):
+        current().file(path)
+
+
+def say_of_cut(inertia: "Inertia | None", warnings: Iterable[str] = ()) -> None:
+    """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
+    from chipglow.text import Notes
+
+    fractions = {name: getattr(inertia, name, nan) for name in _INERTIA}
+    known = {name: fraction for name, fraction in fractions.items() if isfinite(fraction)}
+    if known:
+        texts = ", ".join(_INERTIA[name].format(fraction) for name, fraction in known.items())
+        current().say(f"Scaled mass after the build-up: {texts}.", known, sys.stderr)
+    own = [inertia.warning] if inertia and inertia.warning else []
+    current().notes(Notes(warnings=[*own, *warnings]))
+
+
+def measure(
+    scene: opt.SceneFile,
+    study: Annotated[Path, opt.value("STUDY", "Study file defining surface and camera.")],
+    out: Annotated[Path, opt.file("Measurement to write, NetCDF.")],
+    start: Annotated[
+        float | None,
+        opt.time("Start of the first exposure, e.g. '400 us'. Default: that of the scene."),
+    ] = None,
+    chip: Annotated[
+        str | None, opt.value("NAME", "One of the study's chips. Default: the first.")
+    ] = None,
+) -> None:
+    """Measure a scene with a study's camera."""
+    from chipglow.camera import Measurement
+    from chipglow.cli.progress import progress_bars
+    from chipglow.io import open_scene, write_measurement
+    from chipglow.study import fit, load_study
+
+    loaded = load_study(study)
+    fitted = fit(loaded, open_scene(scene))
+    seen, surfaces = fitted.scene, fitted.surfaces
+    camera = loaded.camera.on(seen.raster, loaded.seed)
+    name = next(iter(surfaces)) if chip is None else chip
+    if name not in surfaces:
+        raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
+    first = float(seen.times[0]) if start is None else start
+    left = float(seen.times[-1]) + seen.frame_spacing - first - camera.frame_duration(seen.raster)
+    starts = camera.frame_times(first, max(floor(left * camera.frame_rate) + 1, 1))
+    with progress_bars() as progress:
+        progress("measurement", 0.0)
+        try:
+            measured = camera.measure(seen, surfaces[name], starts).data.assign_attrs(surface=name)
+        except ValueError as error:
+            raise ValueError(f"{scene}: {error}") from None
+        progress("measurement", 1.0)
+    measurement = Measurement(measured)
+    finish(fitted.notes + measurement.notes, (out, partial(write_measurement, measurement)))
+
+
+def wavelengths(
+    study: opt.StudyFile,
+    out: Annotated[
+        Path | None, opt.file("Write every band and pair at every place, .csv.", ".csv")
+    ] = None,
+    plot: Annotated[
+        Path | None, opt.picture("Draw the error of all bands and pairs, and its causes")
+    ] = None,
+    resume: opt.Resume = False,
+    yes: opt.Yes = False,
+) -> None:
+    """Compare spectral bands and two-band ratios: the error of the true temperature."""
+    from chipglow.analysis import wavelengths_frame
+    from chipglow.cli.progress import confirm_cost, progress_bars
+    from chipglow.laboratory.result_file import write_frame
+    from chipglow.report.wavelength_figure import draw_wavelengths
+    from chipglow.study import load_study, wavelengths as compare
+    from chipglow.text import Notes
+
+    loaded = load_study(study)
+    if loaded.scene is None:
+        confirm_cost(loaded, resume, yes)
+    with progress_bars() as progress:
+        errors = compare(loaded, progress, resume)
+    frame = wavelengths_frame(errors)
+    columns = ["first_um", "second_um", "total_K", "error_K ± standard_deviation_K"]
+    columns += ["misregistration_K", "noise_K", "emissivity_uncertainty_K"]
+    for place, rows in frame.groupby("place", sort=False):
+        truth, draws = rows.truth_degC.iloc[0], rows.draws.iloc[0]
+        title = f"{place}: {truth:.0f} °C on average over {draws} draws; the smallest total first"
+        current().table("bands", rows.sort_values("total_K"), columns, title, columns[:2])
+        current().heading()
+    finish(
+        Notes.from_attrs(errors.attrs),
+        (out, partial(write_frame, frame)),
+        (plot, figure(draw_wavelengths, errors)),
+    )
