@@ -25,7 +25,7 @@ from dual_spectrum import DualSpectrum
 
 from chipglow import fit_points
 from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
-from chipglow.laboratory.registration.input_files import write_blink
+from chipglow.laboratory.registration.files import write_blink
 
 pair = DualSpectrum()
 seen = pair.infrared

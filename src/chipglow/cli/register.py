@@ -80,7 +80,7 @@ def register(
     from chipglow.laboratory.chip import load_tool
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
-    from chipglow.laboratory.registration.input_files import PICTURE_SUFFIXES, write_blink
+    from chipglow.laboratory.registration.files import PICTURE_SUFFIXES, write_blink
     from chipglow.laboratory.result_file import write_frame
 
     if pairs is not None and align is None:

@@ -15,7 +15,7 @@ from chipglow.cli.screen import current, figure, finish
 from chipglow.drawing.scales import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
-from chipglow.laboratory.measurement import MeasurementSummary, measurement_summary
+from chipglow.laboratory.measurement import flag_fractions
 from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
 
@@ -86,8 +86,7 @@ def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
 def say_measurement(measurement: Measurement, time: float | None = None) -> None:
     """Print the contents of a measurement."""
     screen = current()
-    summary = measurement_summary(measurement, time)
-    screen.facts("measurement", _measurement_facts(measurement, summary))
+    screen.facts("measurement", _measurement_facts(measurement, time))
     screen.values(_raster_values(measurement.raster, measurement.times))
     _show_attributes(measurement.data.attrs, _PRINTED_APART)
 
@@ -188,18 +187,17 @@ def microseconds(time: float) -> str:
     return f"{time * 1e6:.7g} µs"
 
 
-def _measurement_facts(
-    measurement: Measurement, summary: MeasurementSummary
-) -> Iterator[tuple[str, str]]:
-    data = measurement.data
+def _measurement_facts(measurement: Measurement, time: float | None) -> _Rows:
+    data, kelvins = measurement.data, measurement.radiance_temperature()
+    index = shown_frame(measurement.times, time, "measurement")
     yield from _where_and_when("pixels", measurement.raster, measurement.times)
     if "integration_time" in data.attrs:
         yield "integration time", microseconds(float(data.attrs["integration_time"]))
     if "lower_limit" in data.attrs:
         yield "lower range limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
     if {"netd", "netd_temperature"} <= set(data.attrs):
-        netd, kelvins = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
-        yield "NETD", f"{1e3 * netd:.3g} mK at {kelvins - 273.15:.4g} °C, half of the range filled"
+        netd, at = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
+        yield "NETD", f"{1e3 * netd:.3g} mK at {at - 273.15:.4g} °C, half of the range filled"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band, shape = measurement.band, ""
         if band.response is not None:
@@ -210,21 +208,25 @@ def _measurement_facts(
         yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
     if measurement.tool is not None:
         yield "tool", _tool_text(measurement.tool)
-    yield "radiance temperature", _celsius(summary.overall)
-    yield f"at {microseconds(measurement.times[summary.index])}", _celsius(summary.now)
-    if summary.uncertainty is None:
+    yield "radiance temperature", _celsius(kelvins)
+    yield f"at {microseconds(measurement.times[index])}", _celsius(kelvins[index])
+    uncertainty = measurement.calibration_uncertainty
+    if uncertainty is None or not np.isfinite(kelvins).any():
         yield "its calibration", "uncertainty not known"
     else:
-        least, greatest = summary.uncertainty
+        uncertainty = uncertainty / measurement.band.slope(kelvins)
+        least, greatest = float(np.nanmin(uncertainty)), float(np.nanmax(uncertainty))
         yield "its calibration", f"standard uncertainty {least:.2g} K to {greatest:.2g} K"
-    yield "usable pixels", f"{100 * summary.usable:.4g} %"
+    yield "usable pixels", f"{100 * np.mean(measurement.usable):.4g} %"
+    fractions = flag_fractions(measurement)
     for flag, name in _FLAG_NAMES.items():
-        if summary.fractions[flag]:
-            yield name, f"{100 * summary.fractions[flag]:.3g} %"
+        if fractions[flag]:
+            yield name, f"{100 * fractions[flag]:.3g} %"
 
 
-def _celsius(kelvins: tuple[float, float, float] | None) -> str:
-    if kelvins is None:
+def _celsius(kelvins: NDArray[np.float64]) -> str:
+    known = kelvins[np.isfinite(kelvins)] - 273.15
+    if known.size == 0:
         return "none: no pixel is usable"
-    least, median, greatest = (f"{value - 273.15:.1f} °C" for value in kelvins)
+    least, median, greatest = (f"{one:.1f} °C" for one in np.quantile(known, (0.0, 0.5, 1.0)))
     return f"{least} to {greatest}, median {median}"

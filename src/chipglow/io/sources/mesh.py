@@ -27,10 +27,10 @@ from chipglow.io.sources.source import (
     required,
     span_of,
 )
+from chipglow.io.sources.triangles import NOTHING, rasterise
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
-from chipglow.scene.rasterise import NOTHING, rasterise
 from chipglow.text import Notes
 
 MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {

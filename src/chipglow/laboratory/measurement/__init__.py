@@ -28,7 +28,3 @@ from chipglow.laboratory.measurement.radiometric_calibration import (
     flag_fractions as flag_fractions,
     repaired_signal as repaired_signal,
 )
-from chipglow.laboratory.measurement.summary import (
-    MeasurementSummary as MeasurementSummary,
-    measurement_summary as measurement_summary,
-)

@@ -15,11 +15,11 @@ from chipglow.laboratory.psf.file import (
     load_edge as load_edge,
     write_psf as write_psf,
 )
-from chipglow.laboratory.psf.kernel import psf_kernel as psf_kernel
 from chipglow.laboratory.psf.knife_edge import (
     EdgeResult as EdgeResult,
     KnifeEdge as KnifeEdge,
     knife_edge as knife_edge,
+    psf_kernel as psf_kernel,
 )
 from chipglow.laboratory.psf.psf_fit import ModelFit as ModelFit
 from chipglow.laboratory.psf.radial_psf import RadialPSF as RadialPSF

@@ -13,6 +13,7 @@ from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.laboratory.psf.psf_models import GaussianModel
 from chipglow.quantities import Array
+from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -80,23 +81,30 @@ def edge_image(
         If the region is not within the image.
     """
     attributes = measurement.data.attrs
-    band = measurement.band if "band_lower" in attributes else None
-    image = _mean_image(measurement.radiance, measurement.flags, measurement.raster, name, region)
-    notes, below = _notes(measurement), image.below
-    if below.any() and np.isfinite(image.radiance[below]).all():
-        # An edge needs radiance, which the optics add up, and no temperature.
-        notes.assumed.append(
-            f"{100 * np.mean(below):.2g} % of the pixels of {name} are below the range of the "
-            "camera or its calibration; their radiance is used as it is."
-        )
-        below = np.zeros_like(below)
-    return replace(
-        image,
-        below=below,
-        footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
-        wavelength=(band.lower + band.upper) / 2 if band else None,
-        notes=notes,
+    image = _mean_image(
+        measurement.radiance,
+        measurement.flags,
+        measurement.raster,
+        name,
+        region,
+        attributes.get("fill_factor"),
+        measurement.band if "band_lower" in attributes else None,
+        measurement.notes,
     )
+    assumed, below = image.notes.assumed, image.below
+    if attributes.get("psf_order") == "detector":
+        assumed.append(
+            "Each pixel's square acts once; this camera was simulated with psf_order pixel, "
+            "where it acts twice, and the second time is counted as optics."
+        )
+    if not below.any() or not np.isfinite(image.radiance[below]).all():
+        return image
+    # An edge needs radiance, which the optics add up, and no temperature.
+    assumed.append(
+        f"{100 * np.mean(below):.2g} % of the pixels of {name} are below the range of the "
+        "camera or its calibration; their radiance is used as it is."
+    )
+    return replace(image, below=np.zeros_like(below))
 
 
 def counts_image(
@@ -115,24 +123,15 @@ def counts_image(
     raster = Raster(0.0, 0.0, recording.pitch, *signal.shape[1:])
     # No camera counts less than nothing: there, the dark side is cut off.
     cut = np.where(recording.signal <= 0, Flag.UNDER_RANGE, 0).astype(np.uint8)
-    image = _mean_image(signal, flags | cut, raster, name, region)
-    notes = recording.notes + Notes(
-        ["The counts are linear in the radiance: an edge needs no calibration."]
-    )
-    if recording.fill_factor is None:
-        notes.assumed.append(_WHOLE_SQUARE)
+    assumed = ["The counts are linear in the radiance: an edge needs no calibration."]
     if recording.saturation is None:
-        notes.assumed.append(
+        assumed.append(
             "No pixel is saturated: neither the file nor the description states the limit."
         )
-    band = recording.band
-    return replace(
-        image,
-        footprint=image.pitch * sqrt(recording.fill_factor or 1.0),
-        wavelength=(band.lower + band.upper) / 2 if band else None,
-        unit="counts",
-        notes=notes,
-    )
+    notes = recording.notes + Notes(assumed)
+    optics = recording.fill_factor, recording.band
+    image = _mean_image(signal, flags | cut, raster, name, region, *optics, notes)
+    return replace(image, unit="counts")
 
 
 def _mean_image(
@@ -141,6 +140,9 @@ def _mean_image(
     raster: Raster,
     name: str,
     region: tuple[slice, slice] | None,
+    fill_factor: float | None,
+    band: Band | None,
+    notes: Notes,
 ) -> EdgeImage:
     """Return the mean and flags of a region of frames."""
     part = region or np.s_[:, :]
@@ -158,22 +160,11 @@ def _mean_image(
         ((found & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
         (found & Flag.SATURATED) != 0,
         (found & Flag.UNDER_RANGE) != 0,
-        raster.spacing,
-        None,
+        raster.spacing * sqrt(fill_factor or 1.0),
+        (band.lower + band.upper) / 2 if band else None,
         name,
+        notes=notes if fill_factor else notes + Notes([_WHOLE_SQUARE]),
     )
-
-
-def _notes(measurement: Measurement) -> Notes:
-    notes = measurement.notes
-    if "fill_factor" not in measurement.data.attrs:
-        notes.assumed.append(_WHOLE_SQUARE)
-    if measurement.data.attrs.get("psf_order") == "detector":
-        notes.assumed.append(
-            "Each pixel's square acts once; this camera was simulated with psf_order pixel, "
-            "where it acts twice, and the second time is counted as optics."
-        )
-    return notes
 
 
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:

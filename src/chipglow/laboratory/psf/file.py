@@ -20,8 +20,7 @@ from chipglow.laboratory.measurement import (
     repaired_signal,
 )
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
-from chipglow.laboratory.psf.kernel import psf_kernel
-from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
+from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, psf_kernel
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH

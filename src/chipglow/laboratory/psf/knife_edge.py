@@ -4,7 +4,7 @@ All is done on radiance. Light is spread and added up by the optics, so that rad
 with the point spread function; temperature, a bent function of it, is not.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import degrees, exp, sqrt
@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtri
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
+from chipglow.camera.optics.kernel import normalised
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
 from chipglow.laboratory.psf.edge_spread import BINS_PER_PITCH, edge_curves
 from chipglow.laboratory.psf.psf_fit import (
@@ -38,12 +39,20 @@ from chipglow.laboratory.psf.psf_models import (
     MoffatModel,
     PSFModel,
 )
-from chipglow.laboratory.psf.radial_psf import RadialPSF, radial_psf
+from chipglow.laboratory.psf.radial_psf import FIT, RadialPSF, kernel_component, radial_psf
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
+from chipglow.quantities import Array
 from chipglow.text import Notes
+from chipglow.uncertainty.estimate import factor
 
 RADIAL: Final = "radial"
 """Name of the point spread function without a model."""
+
+MODEL: Final = "psf model"
+"""Name of the component that the choice among the models makes."""
+
+UNEXPLAINED: Final = "psf unexplained"
+"""Name of the component that is made by what no model explains."""
 
 _ROUGHLY: Final = 1e-6
 _NOISE_ALONE: Final = 1.6
@@ -57,6 +66,10 @@ _ALIGNED: Final = np.pi / 9
 _NUMBERS: Final = {1: "one orientation", 2: "two orientations"}
 _SEED: Final = 12233
 _SUBSAMPLES: Final = 9
+_SAMPLES_PER_WIDTH: Final = 10
+_NO_WEIGHT: Final = 1e-6
+
+_Kernel = Callable[[PointSpreadFunction], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -386,3 +399,66 @@ def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
     # A mean over squares of sum 1 leaves rounding below 0 where there is no light.
     weights = np.maximum(uniform_filter(kernel, _SUBSAMPLES, mode="constant"), 0)
     return MeasuredPSF(weights, spacing, includes=("footprint",))
+
+
+def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
+    """Return the kernel of the optics with the components of its uncertainty.
+
+    `FIT` has an error for each direction of the covariance of the model's parameters; of the one
+    without a model it is that of `RadialPSF`. `MODEL` has one for each other model: its difference
+    by the root of its weight. `UNEXPLAINED`, where the best model leaves more than noise does, is
+    the difference of the point spread function without a model. They are the parts of
+    `KnifeEdge.fwhm_uncertainty`.
+    """
+    psf = knife.psf(model=model)
+    if model == RADIAL:
+        assert isinstance(psf, MeasuredPSF)
+        return psf
+    fit = knife.best if model is None else knife.fit(model)
+    spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
+    middle = normalised(psf.kernel(spacing))
+
+    def kernel(other: PointSpreadFunction) -> Array:
+        return _of_side(normalised(other.kernel(spacing)), len(middle))
+
+    parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: _of_the_model(knife, fit, kernel)}
+    if knife.unexplained:
+        radial = knife.radial
+        parts[UNEXPLAINED] = [kernel(radial.psf()) - kernel(radial.model_psf())]
+    components = [kernel_component(name, effects) for name, effects in parts.items() if effects]
+    return MeasuredPSF(middle, spacing, tuple(components))
+
+
+def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
+    """Return the changes of the kernel by each independent error of the model's parameters."""
+    pixels = knife.edges[0].pixels
+    low, high = (np.array(ends) for ends in fit.model.bounds(pixels.pitch, pixels.reach))
+    unit = np.where(fit.uncertainties > 0, fit.uncertainties, 1.0)
+    effects = []
+    for error in factor(fit.covariance, FIT).T:
+        if not error.any():
+            continue
+        ends = [np.clip(fit.values + sign * error, low, high) for sign in (-1.0, 1.0)]
+        behind, ahead = (kernel(fit.model.psf(values)) for values in ends)
+        # Less than two errors lie between them where a parameter is at the end of its range.
+        errors = np.linalg.norm((ends[1] - ends[0]) / unit) / np.linalg.norm(error / unit)
+        effects.append((ahead - behind) / errors)
+    return effects
+
+
+def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
+    """Return the changes of the kernel by each other model, by the root of its weight."""
+    here = kernel(fit.psf())
+    return [
+        np.sqrt(weight) * (kernel(other.psf()) - here)
+        for other, weight in zip(knife.fits, knife.weights, strict=True)
+        if other is not fit and weight > _NO_WEIGHT
+    ]
+
+
+def _of_side(kernel: Array, side: int) -> Array:
+    """Return the middle of a kernel, or the kernel amid zeros."""
+    more = (side - len(kernel)) // 2
+    if more >= 0:
+        return np.pad(kernel, more)
+    return kernel[-more:more, -more:more]

@@ -345,12 +345,12 @@ class _Problem:
         for edge in self.edges:
             response = _response(self.model, values, edge.line, edge)
             fractions = response(edge.line.distance(edge.x, edge.y))
-            linear = _straight_line(fractions, edge.radiance, edge.sigma)
-            parts.append(np.array([*linear, edge.line.position, edge.line.normal]))
+            step, background = np.polyfit(fractions, edge.radiance, 1, w=1 / edge.sigma)
+            parts.append(np.array([background, step, edge.line.position, edge.line.normal]))
         if self.apertures is not None:
             signals = self.apertures
-            line = _straight_line(self._fractions(values), signals.radiance, signals.sigma)
-            parts.append(np.clip(line, self.low[-2:], self.high[-2:]))
+            line = np.polyfit(self._fractions(values), signals.radiance, 1, w=1 / signals.sigma)
+            parts.append(np.clip(line[::-1], self.low[-2:], self.high[-2:]))
         return np.concatenate(parts)
 
     def _bounds(self) -> tuple[Array, Array]:
@@ -421,15 +421,6 @@ def _response_along(
         footprint,
         reach,
     )
-
-
-def _straight_line(x: Array, y: Array, sigma: Array) -> tuple[float, float]:
-    """Return the value at x = 0 and slope of the straight line through points, by least squares."""
-    weight = sigma**-2.0
-    middle = float(weight @ x / weight.sum()), float(weight @ y / weight.sum())
-    off = x - middle[0]
-    slope = float(weight @ (off * (y - middle[1]))) / max(float(weight @ off**2), 1e-300)
-    return middle[1] - slope * middle[0], slope
 
 
 def orientations(edges: Sequence[EdgePixels]) -> list[float]:

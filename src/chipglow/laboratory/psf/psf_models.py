@@ -8,9 +8,8 @@ from math import ceil, cos, exp, inf, pi, sin, sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.optimize import brentq
 from scipy.special import chndtr, gamma, j0, j1, kve, ndtr
 
@@ -313,35 +312,21 @@ class EllipticalModel(PSFModel):
 
 @dataclass(frozen=True, eq=False)
 class EdgeResponse:
-    """Edge-spread function of optics and pixel, a curve through even samples."""
+    """Edge-spread function of optics and pixel."""
 
-    spacing: float
-    """Distance of the samples in m; the one in the middle is on the edge."""
-    edge: Array
+    edge: CubicHermiteSpline
+    """Edge-spread function over the distance in m, from 0 on the dark side to 1."""
     line: Array
-    """Edge-spread function, from 0 on the dark side to 1 on the bright one, and its derivative,
-    the line-spread function in 1/m, shape (n,), n odd.
-    """
+    """Its derivative, the line-spread function in 1/m, at the nodes."""
 
     def __call__(self, distance: Array) -> Array:
-        """Return the edge-spread function at distances in m (Hermite's cubic)."""
-        k, t = self._place(distance)
-        rise = self.edge[k + 1] - self.edge[k]
-        first, last = self.spacing * self.line[k], self.spacing * self.line[k + 1]
-        bend, twist = 3 * rise - 2 * first - last, first + last - 2 * rise
-        return self.edge[k] + t * (first + t * (bend + t * twist))
+        """Return the edge-spread function at distances in m."""
+        nodes = self.edge.x
+        return np.asarray(self.edge(np.clip(distance, nodes[0], nodes[-1])))
 
     def slope(self, distance: Array) -> Array:
         """Return the line-spread function at distances in m, in 1/m, by straight lines."""
-        k, t = self._place(distance)
-        return self.line[k] + t * (self.line[k + 1] - self.line[k])
-
-    def _place(self, distance: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return the sample before each distance, and how far on the way to the next one it is."""
-        last = self.edge.size - 1
-        place = np.clip(np.asarray(distance) / self.spacing + last // 2, 0.0, last)
-        before = np.minimum(place.astype(np.int64), last - 1)
-        return before, place - before
+        return np.interp(distance, self.edge.x, self.line)
 
 
 def edge_response(
@@ -361,7 +346,8 @@ def edge_response(
     half = min(ceil(reach / step) + 2, count // 2 - 1)
     index = np.arange(-half, half + 1)
     # The series is that of an edge less a ramp over the whole period.
-    return EdgeResponse(step, 0.5 + edge[index] + index / count, line[index])
+    whole = 0.5 + edge[index] + index / count
+    return EdgeResponse(CubicHermiteSpline(step * index, whole, line[index]), line[index])
 
 
 @lru_cache(maxsize=16)

@@ -6,13 +6,11 @@ from chipglow.laboratory.registration.dots import (
     find_dots as find_dots,
     fit_dots as fit_dots,
 )
-from chipglow.laboratory.registration.file import (
+from chipglow.laboratory.registration.files import (
     load_registration as load_registration,
-    write_registration as write_registration,
-)
-from chipglow.laboratory.registration.input_files import (
     read_pictures as read_pictures,
     read_points as read_points,
+    write_registration as write_registration,
 )
 from chipglow.laboratory.registration.mutual_information import (
     ImageFit as ImageFit,

@@ -110,8 +110,6 @@ def _draw_tool(
     axes: Axes, registration: Registration, tool: Tool | None, shape: tuple[int, ...]
 ) -> None:
     if tool is not None:
-        line = registration.pixels(tool.outline(_FACE))
-        axes.plot(*line.T, color="white", linewidth=2.2)
-        axes.plot(*line.T, color="black", linewidth=1.0)
+        drawing.draw_line(axes, registration.pixels(tool.outline(_FACE)), "black", factor=1.0)
     axes.set_xlim(-0.5, shape[1] - 0.5)
     axes.set_ylim(shape[0] - 0.5, -0.5)

@@ -62,8 +62,6 @@ class ImageFit:
     registration: Registration
     information: float
     """Mutual information of the images as they lie on each other, in bits a pixel."""
-    common_edges: float
-    """How well their edges lie on each other: what the registration makes as great as it can."""
     placement: float
     """Mutual information times common edges of the best of many placements, at a quarter of the
     resolution.
@@ -124,7 +122,7 @@ def fit_images(
     starts = _surveyed(fine, frame, candidates[0])
     starts += [other for other in candidates[1:] if _apart(other, starts[0], fine, frame) > _FAR]
     fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=itemgetter(1))
-    matrix, _ = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity")[0], model)
+    matrix = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity"), model)
     basis = _scaled_basis(fine, frame, matrix, model)
     spread, flat = _sandwich(fine, frame, matrix, basis)
     full, covariance = frame.undone(matrix, basis @ spread @ basis.T)
@@ -137,7 +135,6 @@ def fit_images(
     return ImageFit(
         replace(found, notes=Notes([_NOT_MIRRORED], warnings)),
         _information(fine, frame, matrix),
-        _common_edges(fine, frame, matrix, basis)[0],
         score,
         chance,
     )
@@ -177,10 +174,6 @@ class _Level:
     @cached_property
     def directions(self) -> Array:
         return np.ascontiguousarray(self.lines[..., :2])
-
-    @property
-    def count(self) -> int:
-        return len(self.places)
 
 
 def _levels(
@@ -289,9 +282,9 @@ def _placements(level: _Level, frame: NormalisedFrame) -> list[Array]:
         matrix[:2, :2] = scale * np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
         scores = _shifted_scores(level, frame, matrix, level.bins, level.edges)
         found += [(score, _shifted(matrix, shift)) for score, shift in scores]
-    if not found:
-        raise ValueError("images: they do not lie on each other, expected views of one thing")
     found.sort(key=itemgetter(0), reverse=True)
+    if found[0][0] == 0.0:
+        raise ValueError("images: they do not lie on each other, expected views of one thing")
     kept: list[Array] = []
     for _, matrix in found:
         if all(_apart(matrix, other, level, frame) > _APART for other in kept):
@@ -313,16 +306,14 @@ def _shifted_scores(
     reach = int(_REACH * level.bin_image.shape[1])
     for across, down in product(range(-reach, reach + 1), repeat=2):
         shift = across * _sample(level, frame), down * _sample(level, frame)
-        score = _score(level, pixels + np.array(shift) * frame.pixel_scale, bins, edges)
-        if score is not None:
-            yield score, shift
+        yield _score(level, pixels + np.array(shift) * frame.pixel_scale, bins, edges), shift
 
 
-def _score(level: _Level, pixels: Array, bins: NDArray[np.int64], edges: Array) -> float | None:
-    """Return mutual information times common edges at pixels; None if too few overlap."""
+def _score(level: _Level, pixels: Array, bins: NDArray[np.int64], edges: Array) -> float:
+    """Return mutual information times common edges at pixels; 0 if too few overlap."""
     here, place = _seen(level, pixels)
     if here.mean() < _LEAST_OVERLAP:
-        return None
+        return 0.0
     joint = np.bincount(bins[here] * _BINS + level.codes[place], None, _BINS**2) / here.size
     along = (edges[here] * level.directions[place]).sum(axis=1)
     return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
@@ -349,8 +340,7 @@ def _against_chance(level: _Level, frame: NormalisedFrame, matrix: Array) -> tup
     linear[:2, 2] = 0.0
 
     def best(bins: NDArray[np.int64], edges: Array) -> float:
-        scores = _shifted_scores(level, frame, linear, bins, edges)
-        return max((score for score, _ in scores), default=0.0)
+        return max(score for score, _ in _shifted_scores(level, frame, linear, bins, edges))
 
     generator = np.random.default_rng(2010)
     chance = []
@@ -388,8 +378,7 @@ def _settled(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[Arra
         return matrix + (basis @ parameters).reshape(3, 3)
 
     def loss(parameters: Array) -> float:
-        pixels = _pixels(level, frame, moved(parameters))
-        return -(_score(level, pixels, level.bins, level.edges) or 0.0)
+        return -_score(level, _pixels(level, frame, moved(parameters)), level.bins, level.edges)
 
     found = minimize(loss, np.zeros(4), method="Powell", options=_SETTLE)
     return moved(found.x), -float(found.fun)
@@ -412,16 +401,13 @@ def _surveyed(level: _Level, frame: NormalisedFrame, matrix: Array) -> list[Arra
     for parameters in product(_SURVEY, repeat=4):
         moved = matrix + (basis @ parameters).reshape(3, 3)
         pixels = mapped_places(moved, unit) * frame.pixel_scale + frame.pixel_centre
-        score = _score(level, pixels, level.bins[thin], level.edges[thin])
-        found.append((score or 0.0, parameters))
+        found.append((_score(level, pixels, level.bins[thin], level.edges[thin]), parameters))
     found.sort(reverse=True)
     return [matrix + (basis @ best).reshape(3, 3) for _, best in found[:_FINALS]]
 
 
-def _climb(
-    level: _Level, frame: NormalisedFrame, matrix: Array, model: Model
-) -> tuple[Array, float]:
-    """Return the matrix of the most common edges near a matrix, and their mean."""
+def _climb(level: _Level, frame: NormalisedFrame, matrix: Array, model: Model) -> Array:
+    """Return the matrix of the most common edges near a matrix."""
     basis = _scaled_basis(level, frame, matrix, model)
 
     def loss(parameters: Array) -> tuple[float, Array]:
@@ -430,7 +416,7 @@ def _climb(
         return -common, -slopes.sum(axis=0)
 
     found = minimize(loss, np.zeros(basis.shape[1]), jac=True, method="BFGS", options=_CLIMB)
-    return matrix + (basis @ found.x).reshape(3, 3), -float(found.fun)
+    return np.asarray(matrix + (basis @ found.x).reshape(3, 3))
 
 
 def _scaled_basis(level: _Level, frame: NormalisedFrame, matrix: Array, model: Model) -> Array:
@@ -454,8 +440,8 @@ def _common_edges(
     along, right, down = (lines * edges[:, None]).sum(axis=2).T
     pull = 2 * (weight * along)[:, None] * np.stack([right, down], axis=1)
     pull += (along**2)[:, None] * fading
-    slopes = element_slopes(matrix, places[here]) @ basis * (frame.pixel_scale / level.count)
-    common = float((weight * along**2).sum() / level.count)
+    slopes = element_slopes(matrix, places[here]) @ basis * (frame.pixel_scale / len(level.places))
+    common = float((weight * along**2).sum() / len(level.places))
     return common, np.einsum("ni,nik->nk", pull, slopes), here
 
 

@@ -316,28 +316,16 @@ def _least(
         return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k)
 
     k = basis.shape[1]
-    begin = _direct(found, target) if model == "homography" else _linear(found, target, basis)
+    begin = _direct(found, target, basis)
     fit = least_squares(residual, begin, slope, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return basis, residual(fit.x), slope(fit.x), matrix_of(fit.x)
 
 
-def _linear(found: Array, target: Array, basis: Array) -> Array:
-    slopes = (element_slopes(np.eye(3), found) @ basis).reshape(target.size, -1)
-    return np.asarray(np.linalg.lstsq(slopes, target.ravel())[0])
-
-
-def _direct(found: Array, target: Array) -> Array:
-    """Return the direct linear solution of a homography: the least singular vector."""
-    whole = np.concatenate([found, np.ones((len(found), 1))], axis=1)
-    none = np.zeros_like(whole)
-    rows = np.concatenate(
-        [
-            np.concatenate([whole, none, -target[:, :1] * whole], axis=1),
-            np.concatenate([none, whole, -target[:, 1:] * whole], axis=1),
-        ]
-    )
-    vector = np.linalg.svd(rows)[2][-1]
-    return np.asarray(vector[:8] / vector[8])
+def _direct(found: Array, target: Array, basis: Array) -> Array:
+    """Return the direct linear solution: X − column W = 0 and Y − row W = 0."""
+    slopes = element_slopes(np.eye(3), found)
+    slopes[..., 6:8] = -target[..., None] * found[:, None]
+    return np.asarray(np.linalg.lstsq((slopes @ basis).reshape(target.size, -1), target.ravel())[0])
 
 
 def _checked(positions: ArrayLike, pixels: ArrayLike, model: Model) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """Offset and drift of two cameras' clocks, from an event that both recorded."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import log
 from typing import Final
 
@@ -99,19 +99,14 @@ def align_times(
     smooth = _smoothed(visible_signal / np.std(visible_signal))
     spline = CubicSpline(visible_times, smooth, extrapolate=False)
     target = (infrared_signal - infrared_signal.mean()) / infrared_signal.std()
-    reference = float(infrared_times.mean())
     offsets, correlations = _correlations(infrared_times, target, visible_times, spline)
     best = int(np.abs(correlations).argmax())
-    fitted, covariance, freedom, correlation = _refined(
-        infrared_times - reference, target, spline, float(offsets[best]) + reference, drift
-    )
+    found = _refined(infrared_times, target, spline, float(offsets[best]), drift)
     warnings = (
-        *_chance(correlation, freedom, len(offsets)),
+        *_chance(found.correlation, found.degrees_of_freedom, len(offsets)),
         *_rivals(offsets, correlations, best, len(target)),
     )
-    return TimeAlignment(
-        fitted[0] - reference, fitted[1], reference, covariance, correlation, freedom, warnings
-    )
+    return replace(found, warnings=warnings)
 
 
 def simultaneous_frames(
@@ -234,43 +229,31 @@ def _correlation(target: Array, values: Array) -> Array:
 
 
 def _refined(
-    times: Array,
-    target: Array,
-    spline: CubicSpline,
-    begin: float,
-    drift: bool,
-) -> tuple[tuple[float, float], Array, float, float]:
-    """Return offset and drift, their covariance, degrees of freedom and correlation."""
-    known = np.isfinite(spline(times + begin))
+    times: Array, target: Array, spline: CubicSpline, begin: float, drift: bool
+) -> TimeAlignment:
+    """Return the clocks near an offset, by least squares."""
+    known, reference = np.isfinite(spline(times + begin)), float(times.mean())
     times, target = times[known], target[known]
-    first, last = float(spline.x[0]), float(spline.x[-1])
-    span = max(float(np.abs(times).max()), 1e-300)
+    since = times - reference
     unit = float(np.median(np.diff(spline.x)))
-    scale = np.array([unit, unit / span] if drift else [unit])
+    # Parameters are offset and drift as shifts by visible frames, the drift's at the end.
+    scale = unit / np.array([1.0, max(float(np.abs(since).max()), 1e-300)])[: 1 + drift]
 
-    def residual(parameters: Array) -> Array:
-        shift = scale * parameters[2:]
-        moved = times + begin + shift[0] + (shift[1] * times if drift else 0.0)
-        values = spline(np.clip(moved, first, last))
-        return np.asarray(parameters[0] + parameters[1] * values - target)
+    def placed(shift: Array) -> Array:
+        moved = times + begin + np.polynomial.polynomial.polyval(since, scale * shift)
+        return np.asarray(spline(np.clip(moved, spline.x[0], spline.x[-1])))
 
     slope, level = np.polyfit(spline(times + begin), target, 1)
     start = np.concatenate([[level, slope], np.zeros(scale.size)])
-    fit = least_squares(residual, start, x_scale="jac")
+    fit = least_squares(lambda p: p[0] + p[1] * placed(p[2:]) - target, start, x_scale="jac")
     freedom = max(times.size - start.size, 1)
-    inverse = np.linalg.pinv(fit.jac.T @ fit.jac)[2:, 2:]
-    covariance = np.zeros((2, 2))
-    covariance[: scale.size, : scale.size] = (
-        float(fit.fun @ fit.fun) / freedom * inverse * np.outer(scale, scale)
-    )
-    shift = scale * fit.x[2:]
+    slopes = np.linalg.pinv(fit.jac.T @ fit.jac)[2:, 2:] * np.outer(scale, scale)
+    covariance, shift = np.zeros((2, 2)), np.zeros(2)
+    covariance[: scale.size, : scale.size] = float(fit.fun @ fit.fun) / freedom * slopes
+    shift[: scale.size] = scale * fit.x[2:]
     correlation = float(np.corrcoef(target, target + fit.fun)[0, 1]) * float(np.sign(fit.x[1]))
-    return (
-        (begin + float(shift[0]), float(shift[1]) if drift else 0.0),
-        covariance,
-        float(freedom),
-        correlation,
-    )
+    offset, rate = shift.tolist()
+    return TimeAlignment(begin + offset, rate, reference, covariance, correlation, freedom)
 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
