@@ -87,7 +87,7 @@ PROGRAMS = {
         {"| scikit-image, correlation |": 5},
     ),
     "softening.py": (f"--cell {COARSEST} --length 1 johnson-cook", {"| johnson-cook": 4}),
-    "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 6}),
+    "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
     "titanium.py": (
         f"--cell {COARSEST} 88.9-0.1",
         {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},
@@ -105,7 +105,6 @@ NEEDED = {
 # What begins the row of a program that may be there: its package, its name.
 PEERS = {
     "camera_pass.py": ("image: ", {"galsim": "GalSim", "pyxel": "Pyxel"}),
-    "solver_speed.py": ("", {"warp": "Warp"}),
 }
 # Programs that fork, spawn processes or drive a browser run in a process of their own.
 OWN_PROCESS = ("app_latency.py", "fuzz/fuzz.py")
