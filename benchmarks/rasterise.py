@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import LinearNDInterpolator
 
 from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.triangles import rasterise
 from chipglow.scene import Raster
-from chipglow.scene.rasterise import rasterise
 
 RASTER = Raster(left=0.0, top=810e-6, spacing=1e-6, rows=810, columns=900)
 REPEATS = 7

@@ -80,12 +80,6 @@ def test_feed_is_read_from_the_surface_before_the_cut(metrics):
     assert chip_metrics(swollen.scene()).feed == pytest.approx(CHIP.feed, abs=SAMPLE)
 
 
-def test_a_given_feed_counts():
-    assert chip_metrics(replace(CHIP, frames=80).scene(), feed=190e-6).feed == 190e-6
-    with pytest.raises(ValueError, match="feed is 0"):
-        chip_metrics(replace(CHIP, frames=2).scene(), feed=0.0)
-
-
 @pytest.mark.slow
 def test_the_view_does_not_decide():
     """A taller and wider view shows the chip where it has left the face: not to be measured."""
@@ -121,14 +115,10 @@ def test_what_the_view_cuts_is_unknown():
     assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
 
 
-def test_less_than_a_period_gives_no_thickness():
-    metrics = chip_metrics(replace(CHIP, frames=40).scene())
-    assert np.isnan([metrics.thickness, metrics.peak, metrics.valley]).all()
+def test_less_than_a_period_gives_no_thickness_and_contact_beyond_the_view_is_unknown():
+    metrics = chip_metrics(replace(CHIP, frames=40, contact=1e-3).scene())
+    assert np.isnan([metrics.thickness, metrics.peak, metrics.valley, metrics.contact]).all()
     assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
-
-
-def test_contact_beyond_the_view_is_unknown():
-    assert np.isnan(chip_metrics(replace(CHIP, contact=1e-3, frames=4).scene()).contact)
 
 
 def test_without_forces_the_scene_counts_as_one_segment():
@@ -147,8 +137,11 @@ def test_a_chip_that_is_not_segmented_has_degree_nought():
     assert metrics.thickness == pytest.approx(even.thickness, abs=SAMPLE)
 
 
-def test_a_scene_without_its_tool_is_refused():
+def test_a_given_feed_counts_and_what_cannot_be_is_refused():
     scene = replace(CHIP, frames=2).scene()
+    assert chip_metrics(scene, feed=190e-6).feed == 190e-6
+    with pytest.raises(ValueError, match="feed is 0"):
+        chip_metrics(scene, feed=0.0)
     for name in [name for name in scene.data.attrs if name.startswith("tool_")]:
         del scene.data.attrs[name]
     with pytest.raises(ValueError, match="tool"):

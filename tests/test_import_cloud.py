@@ -174,14 +174,6 @@ def test_distance_of_neighbours():
     assert np.isnan(neighbour_distance(np.zeros((1, 2))))
 
 
-@pytest.mark.parametrize("name", ["values", "material", "spacing", "area"])
-def test_impossible_clouds(name):
-    cloud = a_cloud(lattice())
-    parts = {field: getattr(cloud, field) for field in ("places", *cloud.__dict__)}
-    with pytest.raises(ValueError, match=name):
-        Cloud(**{**parts, name: parts[name][:-1]})
-
-
 # Files
 
 

@@ -15,8 +15,12 @@ from chipglow.io.sources import SourceError
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
-from chipglow.scene.completion import Completion, complete
-from chipglow.scene.motion import optical_flow, strain_rate_along
+from chipglow.scene.completion import (
+    Completion,
+    complete,
+    optical_flow,
+    strain_rate_along,
+)
 
 RASTER = Raster(0.0, 100e-6, 2e-6, 50, 60)
 WHOLE = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")

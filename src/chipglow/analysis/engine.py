@@ -33,7 +33,7 @@ from chipglow.laboratory.chip import (
     resolution_warnings,
 )
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
-from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.scene.tool_outline import tool_attributes
 from chipglow.surface import EmissivityField, Surface
 
 PSF_ORDERS: Final = ("detector", "optics")

@@ -15,7 +15,7 @@ from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
 from chipglow.scene.notebook import frames_text, plot_image
 from chipglow.scene.scene import raster_coordinates
-from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+from chipglow.scene.tool_outline import stored_tool, tool_attributes
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
 

@@ -37,7 +37,7 @@ from chipglow.scene import (
 )
 from chipglow.scene.scene import FORCE_UNITS, check_frame, raster_coordinates
 from chipglow.scene.splines import Lattice, SplineFrame
-from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.scene.tool_outline import tool_attributes
 
 SCENE_FORMAT: Final = 5
 """Changes when the same scene is written to a file in another way."""

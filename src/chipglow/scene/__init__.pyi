@@ -3,8 +3,10 @@ from .frame import (
     FILLED as FILLED,
     MATERIAL_COORDINATE_UNITS as MATERIAL_COORDINATE_UNITS,
     QUALITY as QUALITY,
+    READABLE as READABLE,
     Frame as Frame,
     Material as Material,
+    SampledFrame as SampledFrame,
     SceneError as SceneError,
 )
 from .lines import (
@@ -20,10 +22,6 @@ from .regions import (
     Region as Region,
     areas as areas,
     shared_pixels as shared_pixels,
-)
-from .sampled import (
-    READABLE as READABLE,
-    SampledFrame as SampledFrame,
 )
 from .scene import (
     ENERGY_UNITS as ENERGY_UNITS,

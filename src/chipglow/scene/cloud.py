@@ -48,12 +48,6 @@ class Cloud:
     one another, shape (points,)."""
 
     def __post_init__(self) -> None:
-        count = len(self.places)
-        if self.places.shape != (count, 2):
-            raise ValueError(f"places: shape {self.places.shape}, expected (points, 2)")
-        for name in ("values", "material", "spacing", "area"):
-            if len(getattr(self, name)) != count:
-                raise ValueError(f"{name}: {len(getattr(self, name))} points, expected {count}")
         if not np.isfinite(self.places).all():
             raise ValueError("places: expected finite numbers")
         for name in ("spacing", "area"):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, zoom
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import SPEED, TEMPERATURE, Position
@@ -16,13 +17,12 @@ from chipglow.scene.frame import (
     QUALITY,
     Frame,
     Material,
+    SampledFrame,
     SceneError,
 )
-from chipglow.scene.motion import optical_flow, strain_rate_along
-from chipglow.scene.nearest import fill
-from chipglow.scene.polygon import in_polygon
+from chipglow.scene.nearest import extended, fill
 from chipglow.scene.raster import Raster
-from chipglow.scene.sampled import SampledFrame
+from chipglow.scene.regions import in_polygon
 from chipglow.scene.tool import Tool
 
 STRAIN_OF_CHIP: Final = 1.0
@@ -34,6 +34,9 @@ _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
 _MOST_FILLED: Final = 0.5
 _FLOW_FRAMES: Final = 5
 """The optical flow is that over so many frames: from one to the next little moves."""
+
+_FLOW_SAMPLES: Final = 320
+"""Most samples across a picture of which the optical flow is computed: it takes seconds else."""
 
 
 @dataclass(frozen=True)
@@ -311,3 +314,50 @@ def _inside(corners: Sequence[tuple[float, float]] | None, raster: Raster) -> ND
     if corners is None:
         return np.zeros(raster.shape, np.bool_)
     return in_polygon(corners, raster.x[None, :], raster.y[:, None])
+
+
+def strain_rate_along(
+    strain: NDArray[np.float32],
+    before: NDArray[np.float32],
+    velocity: tuple[NDArray[np.float32], NDArray[np.float32]],
+    interval: float,
+    spacing: float,
+) -> NDArray[np.float32]:
+    """Return (strain(x) - before(x - v interval)) / interval in 1/s, shape (y, x), 0 or more.
+
+    Strains are NaN without material, where the rate is NaN too; 0 where there was none before.
+    """
+    rows, columns = np.indices(strain.shape, dtype=np.float32)
+    shift = np.float32(interval / spacing)
+    origin = rows + velocity[1] * shift, columns - velocity[0] * shift
+    there = np.isfinite(before)
+    earlier = map_coordinates(extended(before, there), origin, order=3, mode="nearest")
+    known = map_coordinates(there.astype(np.float32), origin, order=1, mode="constant") > 0.5
+    rate = np.maximum((strain - earlier) / np.float32(interval), 0.0)
+    rate[~known & np.isfinite(strain)] = 0.0
+    return np.asarray(rate, np.float32)
+
+
+def optical_flow(
+    before: NDArray[np.float32], after: NDArray[np.float32], interval: float, spacing: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the velocity along x and up in m/s by which a pattern moved, shape (y, x) each.
+
+    Total variation with the L1 norm (Zach, Pock and Bischof 2007) by scikit-image, on a picture of
+    a few hundred samples. It sees only what has a pattern: a region without one takes on the
+    motion of its surroundings.
+    """
+    from skimage import registration
+
+    factor = min(_FLOW_SAMPLES / max(before.shape), 1.0)
+    scale = np.float32(max(float(before.max()), float(after.max()), 1e-30))
+    small = [zoom(pattern / scale, factor, order=1) for pattern in (before, after)]
+    down, right = registration.optical_flow_tvl1(*small, dtype=np.float32)
+    back = [_resized(flow, before.shape) for flow in (right, -down)]
+    speed = np.float32(spacing * before.shape[1] / small[0].shape[1] / interval)
+    return back[0] * speed, back[1] * speed
+
+
+def _resized(values: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    factors = [new / old for new, old in zip(shape, values.shape, strict=True)]
+    return np.asarray(zoom(values, factors, order=1, grid_mode=True, mode="nearest"), np.float32)

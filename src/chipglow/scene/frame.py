@@ -24,6 +24,11 @@ FIELD_UNITS: Final[Mapping[str, str]] = {
 MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "material_y": "m"}
 """Where each point was before the cut: optional, both or none."""
 
+READABLE: Final = tuple(
+    name for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS) if name != "material"
+)
+"""Fields that a source may have, by the names of a scene."""
+
 QUALITY: Final = "quality"
 """Name of an optional field that says how far each sample of an imported scene can be trusted.
 
@@ -68,6 +73,18 @@ class Frame:
         if values is None:
             raise SceneError(f"scene: has no {name}, expected it: this needs it")
         return values
+
+
+@dataclass(frozen=True)
+class SampledFrame:
+    """Fields of a source at one time, sampled on a raster."""
+
+    time: float
+    fields: Mapping[str, NDArray[np.float32]]
+    """By the names of `READABLE` in SI units, shape (y, x); NaN where there is no material."""
+    material: NDArray[np.uint8]
+    quality: NDArray[np.uint8] | None = None
+    """See `QUALITY`."""
 
 
 class SceneError(ValueError):

@@ -23,7 +23,7 @@ from chipglow.scene.frame import (
 from chipglow.scene.notebook import frames_text, plot_image
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
-from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+from chipglow.scene.tool_outline import stored_tool, tool_attributes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

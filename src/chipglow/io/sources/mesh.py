@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, match_names, simple
-from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_flat import FlatMesh, flatten
@@ -22,15 +21,16 @@ from chipglow.io.sources.source import (
     SourceError,
     Survey,
     even_times,
+    files_of,
     naming,
     reading,
     required,
     span_of,
 )
+from chipglow.io.sources.triangles import NOTHING, rasterise
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
-from chipglow.scene.rasterise import NOTHING, rasterise
 from chipglow.text import Notes
 
 MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {

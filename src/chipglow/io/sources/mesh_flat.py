@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources.conventions import Placement
 from chipglow.io.sources.mesh_reader import Block, numeric_arrays, offsets_of
 from chipglow.io.sources.source import SourceError
-from chipglow.scene.triangulate import Shape, triangulate
+from chipglow.io.sources.triangles import Shape, triangulate
 
 Arrays: TypeAlias = Mapping[str, NDArray[np.float64]]
 Section: TypeAlias = float | Literal["facing"] | None

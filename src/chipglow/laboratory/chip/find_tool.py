@@ -83,7 +83,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     if rows.size < _FEWEST_ROWS:
         raise _not_found(f"only {rows.size} rows of the image show one")
     fit = _fit(image, rows, _best_start(image, rows, start))
-    residuals = np.sqrt((_Strip.along(fit, image, rows).residuals(fit) ** 2).mean(axis=-1))
+    residuals = np.sqrt((_Strip(fit, image, rows).residuals(fit) ** 2).mean(axis=-1))
     rows = rows[residuals <= _WORST_ROWS * np.median(residuals)]
     fit = _fit(image, rows, fit)
     angle_error, place_error = _jackknife(image, rows, fit)
@@ -164,8 +164,13 @@ def _gain(windows: Array, place: Array, blur: float, image: Array) -> Array:
     smooth = np.stack([steps**power for power in range(5)], axis=-1)
     explained = (_residuals(windows, smooth) ** 2).sum(axis=-1)
     explained -= (_residuals(windows, basis) ** 2).sum(axis=-1)
-    level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0) + 1e-300
-    return np.asarray(np.sqrt(np.maximum(explained, 0.0) / steps.size) / level)
+    explained = np.sqrt(np.maximum(explained, 0.0) / steps.size)
+    return np.asarray(explained / (_level(windows, image) + 1e-300))
+
+
+def _level(windows: Array, image: Array) -> Array:
+    """Return the mean radiance of each window, kept off 0 by 2 % of the brightest in the image."""
+    return np.asarray(windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0))
 
 
 def _parabolas(offset: Array, blur: float) -> Array:
@@ -196,27 +201,16 @@ def _residuals(windows: Array, basis: Array) -> Array:
     return np.asarray(windows - np.einsum("...sk,...k->...s", frame, parts))
 
 
-@dataclass(frozen=True)
 class _Strip:
-    """Pixels of rows beside a line; nothing is resampled."""
+    """Pixels of rows beside a line, shape (rows, pixels), and their level; not resampled."""
 
-    windows: Array
-    """Radiance, shape (rows, pixels)."""
-    middle: Array
-    """Column of each window's middle pixel, shape (rows,)."""
-    up: Array
-    """Rows counted up from the image's middle one, shape (rows,)."""
-    level: Array
-    """Level of each window's radiance, shape (rows,)."""
-
-    @classmethod
-    def along(cls, line: Array, image: Array, rows: NDArray[np.int64]) -> "_Strip":
-        up = _up(image, rows)
-        nearest = np.rint(line[0] + line[1] * up).astype(np.int64)
-        middle = np.clip(nearest, _REACH, image.shape[1] - 1 - _REACH)
-        windows = image[rows[:, None], middle[:, None] + np.arange(-_REACH, _REACH + 1)]
-        level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0)
-        return cls(windows, middle.astype(np.float64), up, level)
+    def __init__(self, line: Array, image: Array, rows: NDArray[np.int64]) -> None:
+        self.up = _up(image, rows)
+        nearest = np.rint(line[0] + line[1] * self.up).astype(np.int64)
+        self.middle = np.clip(nearest, _REACH, image.shape[1] - 1 - _REACH)
+        columns = self.middle[:, None] + np.arange(-_REACH, _REACH + 1)
+        self.windows = image[rows[:, None], columns]
+        self.level = _level(self.windows, image)
 
     def place(self, line: Array) -> Array:
         """Return the place of a line in each window, from its middle pixel."""
@@ -234,7 +228,7 @@ def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:
     every = np.arange(image.shape[0], dtype=np.int64)
     place = line[0] + line[1] * _up(image, every)
     rows = every[(place > _REACH) & (place < image.shape[1] - 1 - _REACH)]
-    strip = _Strip.along(line, image, rows)
+    strip = _Strip(line, image, rows)
     gain = _gain(strip.windows, strip.place(line), line[2], image)
     typical = np.median(np.sort(gain)[-rows.size // 2 :])
     return np.asarray(rows[gain > _HAS_FACE * typical], dtype=np.int64)
@@ -247,14 +241,14 @@ def _best_start(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
         for place in np.linspace(-4.0, 4.0, 17)
         for slope in np.linspace(-_ROOM, _ROOM, 9)
     ]
-    left = [np.abs(_Strip.along(line, image, rows).residuals(line)).sum() for line in lines]
+    left = [np.abs(_Strip(line, image, rows).residuals(line)).sum() for line in lines]
     return np.asarray(lines[int(np.argmin(left))], dtype=np.float64)
 
 
 def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     """Fit column in the middle row, slope and width of the blur in pixels."""
     # Windows that moved with the line would make the sum of squares jump.
-    strip = _Strip.along(start, image, rows)
+    strip = _Strip(start, image, rows)
     room = np.array([3.0, _ROOM])
     lower, upper = start[:2] - room, start[:2] + room
     middle = float(np.clip(start[2], 0.5, 2.9))
@@ -288,7 +282,7 @@ def _jackknife(image: Array, rows: NDArray[np.int64], fit: Array) -> tuple[float
 def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float, bool]:
     """Return the row at which the radiance on the face falls to half, and whether it does."""
     every = np.arange(image.shape[0])
-    windows = _Strip.along(line, image, every).windows
+    windows = _Strip(line, image, every).windows
     level = windows[:, _REACH - 1 : _REACH + 2].mean(axis=-1)
     hottest = int(rows[level[rows].argmax()])
     below = np.flatnonzero(level[hottest:] < level[hottest] / 2)

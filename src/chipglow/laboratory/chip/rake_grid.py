@@ -30,7 +30,7 @@ from chipglow.laboratory.chip.tool_position import (
 )
 from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
-from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.scene.tool_outline import tool_attributes
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, to_xarray
 

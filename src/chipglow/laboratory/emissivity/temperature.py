@@ -3,9 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from math import inf, isnan, sqrt
-from typing import Final
+from typing import Any, Final
 from uuid import uuid4
 
 import numpy as np
@@ -154,8 +153,13 @@ def true_temperature(
     )
     pixels = temperature(values.mean(axis=0))
     mean_of_pixels = float(pixels.mean())
-    warnings = [f"Emissivity: {warning}" for warning in estimate.warnings]
-    warnings = used.warnings() + warnings + _warnings(area.name, estimate, mean_of_pixels)
+    warnings = used.warnings() + [f"Emissivity: {warning}" for warning in estimate.warnings]
+    uneven = abs(float(estimate.values) - mean_of_pixels)
+    if uneven > max(_UNEVEN * float(estimate.standard_uncertainty), _NO_MATTER):
+        warnings.append(
+            f"{area.name}: is uneven, the mean of its pixels' temperatures is {uneven:.3g} K from "
+            "the temperature of its mean radiance."
+        )
     return TrueTemperature(
         name=area.name,
         used=used,
@@ -308,16 +312,6 @@ def _mean_radiance(
     return found + (random - mean)
 
 
-def _warnings(name: str, found: Estimate, mean_of_pixels: float) -> list[str]:
-    uneven = abs(float(found.values) - mean_of_pixels)
-    if uneven <= max(_UNEVEN * float(found.standard_uncertainty), _NO_MATTER):
-        return []
-    return [
-        f"{name}: is uneven, the mean of its pixels' temperatures is {uneven:.3g} K from the "
-        "temperature of its mean radiance."
-    ]
-
-
 def _temperature(emissivity: float, reflected: float, band: Band, radiance: Array) -> Array:
     """Return the true temperature in K by apparent radiance in W/(m² sr): Equation 2."""
     room = float(band.radiance(np.array(reflected)))
@@ -355,18 +349,19 @@ def _emissivity_of_area(
         return line.at(line.middle)
     room = float(band.radiance(np.array(reflected)))
 
-    def excess(temperature: float) -> float:
-        value = float(line.at(temperature).values)
-        return value * (float(band.radiance(np.array(temperature))) - room) - (radiance - room)
+    def excess(temperature: Any) -> Array:
+        black = band.radiance(np.asarray(temperature, np.float64))
+        return np.asarray(line.at(temperature).values * (black - room) - (radiance - room))
 
-    temperatures = np.geomspace(reflected, HOTTEST, _STEPS).tolist()
-    for colder, hotter in pairwise(temperatures):
-        if excess(hotter) > 0:
-            return line.at(scipy.optimize.brentq(excess, colder, hotter, xtol=1e-6))
-    raise ValueError(
-        f"region {name}: no temperature up to {HOTTEST - ZERO_CELSIUS:.0f} °C has its "
-        "radiance by the line of its emissivity, expected one that falls less with the temperature"
-    )
+    kelvins = np.geomspace(reflected, HOTTEST, _STEPS)
+    hotter = np.flatnonzero(excess(kelvins) > 0)
+    if not hotter.size:
+        raise ValueError(
+            f"region {name}: no temperature up to {HOTTEST - ZERO_CELSIUS:.0f} °C has its radiance "
+            "by the line of its emissivity, expected one that falls less with the temperature"
+        )
+    ends = kelvins[hotter[0] - 1 : hotter[0] + 1]
+    return line.at(scipy.optimize.brentq(excess, *ends, xtol=1e-6))
 
 
 def _surroundings(emissivity: EmissivityLine) -> Estimate:

@@ -1,0 +1,272 @@
+"""Flat elements as triangles, and the fields of triangles on the samples of a raster."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.scene import Raster
+
+Shape = Literal["triangle", "quad", "triangle6", "quad8", "quad9"]
+"""Nodes of an element: corners in order around it, then middles of edges, then its centre."""
+
+DIVISIONS: Final = 4
+"""Pieces of an edge of a quadratic element."""
+
+NOTHING: Final = -1
+"""Number of the element where there is none."""
+
+FARTHEST: Final = 1e100
+"""Samples from the corner that a node may be away; beyond, products of lengths would overflow."""
+
+SMALLEST: Final = 1e-200
+"""Twice the area in samples from which on a triangle covers something; its inverse is finite."""
+
+
+@dataclass(frozen=True)
+class Rasterised:
+    """The fields and elements of a mesh at the samples of a raster."""
+
+    fields: NDArray[np.float32]
+    """Those of nodes, then of elements, float32 of shape (fields, y, x); NaN without an element."""
+    element: NDArray[np.int32]
+    """Number of the triangle at each sample, int32 of shape (y, x); `NOTHING` without one."""
+
+
+def rasterise(
+    raster: Raster,
+    points: ArrayLike,
+    triangles: ArrayLike,
+    node_values: ArrayLike | None = None,
+    element_values: ArrayLike | None = None,
+    height: ArrayLike | None = None,
+) -> Rasterised:
+    """Sample the fields of a mesh of triangles at the centres of a raster's samples.
+
+    Points (nodes, 2) and `height` in m; values of nodes and elements have shape (n, fields). A
+    sample on an edge that two triangles share belongs to one of them. A triangle without area, or
+    with a position that is not finite or absurdly far away, covers nothing. Where triangles lie
+    over one another the highest is taken, of those as high the last.
+    """
+    points = np.ascontiguousarray(points, np.float64)
+    triangles = np.ascontiguousarray(triangles, np.int64)
+    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
+        raise ValueError(
+            f"triangles: nodes {triangles.min()} to {triangles.max()}, expected 0 to "
+            f"{len(points) - 1}"
+        )
+    of_nodes = _columns(node_values, len(points))
+    of_elements = _columns(element_values, len(triangles))
+    heights = np.empty(0) if height is None else np.ascontiguousarray(height, np.float64)
+    fields = np.full((of_nodes.shape[1] + of_elements.shape[1], *raster.shape), np.nan, np.float32)
+    element = np.full(raster.shape, NOTHING, np.int32)
+    highest = np.full(raster.shape if len(heights) else (0, 0), -np.inf)
+    corner = np.array((raster.left, raster.top))
+    # Samples are at whole numbers of columns and rows.
+    with np.errstate(over="ignore", invalid="ignore"):
+        places = (points - corner) * np.array((1.0, -1.0)) / raster.spacing - 0.5
+    _fill(places, triangles, of_nodes, of_elements, heights, fields, element, highest)
+    return Rasterised(fields, element)
+
+
+def _columns(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
+    array = np.ascontiguousarray(() if values is None else values, np.float64)
+    return array.reshape(count, -1) if array.size else np.empty((count, 0))
+
+
+@njit(cache=True)
+def _fill(  # type: ignore[no-untyped-def]
+    places, triangles, of_nodes, of_elements, heights, fields, element, highest
+):
+    rows, columns = element.shape
+    for number in range(len(triangles)):
+        a, b, c = triangles[number]
+        # In ascending order of rows.
+        if places[b, 1] < places[a, 1]:
+            a, b = b, a
+        if places[c, 1] < places[b, 1]:
+            b, c = c, b
+        if places[b, 1] < places[a, 1]:
+            a, b = b, a
+        xa, ya = places[a]
+        xb, yb = places[b]
+        xc, yc = places[c]
+        area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)
+        farthest = max(abs(xa), abs(xb), abs(xc), abs(ya), abs(yc))
+        if not (abs(area) > SMALLEST and farthest < FARTHEST):
+            continue
+        scale = 1.0 / area
+        slope_ab = _slope(xa, ya, xb, yb)
+        slope_bc = _slope(xb, yb, xc, yc)
+        slope_ac = _slope(xa, ya, xc, yc)
+        first = int(max(np.ceil(ya), 0.0))
+        last = int(min(np.ceil(yc), float(rows)))
+        for row in range(first, last):
+            long = _crossing(xa, ya, xc, slope_ac, row)
+            if row < yb:
+                short = _crossing(xa, ya, xb, slope_ab, row)
+            else:
+                short = _crossing(xb, yb, xc, slope_bc, row)
+            left, right = (long, short) if area > 0.0 else (short, long)
+            begin = int(min(max(np.ceil(left), 0.0), float(columns)))
+            end = int(min(max(np.ceil(right), 0.0), float(columns)))
+            for column in range(begin, end):
+                # Rounding may put a weight outside of 0 to 1, far so in a triangle like a needle.
+                u = ((column - xa) * (yc - ya) - (xc - xa) * (row - ya)) * scale
+                u = min(max(u, 0.0), 1.0)
+                v = ((xb - xa) * (row - ya) - (column - xa) * (yb - ya)) * scale
+                v = min(max(v, 0.0), 1.0 - u)
+                w = 1.0 - u - v
+                if len(heights):
+                    height = w * heights[a] + u * heights[b] + v * heights[c]
+                    if not height >= highest[row, column]:
+                        continue
+                    highest[row, column] = height
+                element[row, column] = number
+                for field in range(of_nodes.shape[1]):
+                    fields[field, row, column] = (
+                        w * of_nodes[a, field] + u * of_nodes[b, field] + v * of_nodes[c, field]
+                    )
+                for field in range(of_elements.shape[1]):
+                    fields[of_nodes.shape[1] + field, row, column] = of_elements[number, field]
+
+
+@njit(cache=True, inline="always")
+def _slope(x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+    """Columns per row; that of an edge along a row is not used, but has to be finite."""
+    return (x1 - x0) / max(y1 - y0, SMALLEST)
+
+
+@njit(cache=True, inline="always")
+def _crossing(x0, y0, x1, slope, row):  # type: ignore[no-untyped-def]
+    """Where an edge crosses a row, the lower end first: the same for both of its triangles."""
+    x = x0 + (row - y0) * slope
+    return min(max(x, min(x0, x1)), max(x0, x1))
+
+
+@dataclass(frozen=True)
+class Triangulated:
+    """Elements as triangles (n, 3) of nodes (nodes, axes) with values (nodes, fields)."""
+
+    points: NDArray[np.float64]
+    values: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    element: NDArray[np.int64]
+    """Number of the element that each triangle is a piece of, shape (triangles,)."""
+
+
+def triangulate(
+    shape: Shape,
+    points: NDArray[np.float64],
+    values: NDArray[np.float64],
+    elements: NDArray[np.int64],
+) -> Triangulated:
+    """Split elements of one shape into triangles.
+
+    A quad is split along its shorter diagonal, so the linear part of its field is exact and the
+    rest is off by up to a quarter of the difference of the sums of opposite corners. A quadratic
+    element is mapped by its own shape functions, edges too, and cut into pieces of a quarter of
+    its edges: a field with second derivative f'' along an edge of length h is off by up to
+    f'' h^2 / 128 in a triangle's edge, a quarter of that for every doubling of the mesh.
+    """
+    if shape == "triangle":
+        return Triangulated(points, values, elements, np.arange(len(elements)))
+    if shape == "quad":
+        return _split(points, values, elements)
+    return _subdivide(shape, points, values, elements)
+
+
+def _split(
+    points: NDArray[np.float64], values: NDArray[np.float64], quads: NDArray[np.int64]
+) -> Triangulated:
+    a, b, c, d = (points[quads[:, corner]] for corner in range(4))
+    with np.errstate(over="ignore", invalid="ignore"):
+        other = ((d - b) ** 2).sum(axis=1) < ((c - a) ** 2).sum(axis=1)
+    turned = np.where(other[:, None], np.roll(quads, -1, axis=1), quads)
+    triangles = np.stack((turned[:, (0, 1, 2)], turned[:, (0, 2, 3)]), axis=1)
+    return Triangulated(points, values, triangles.reshape(-1, 3), np.arange(len(quads)).repeat(2))
+
+
+def _subdivide(
+    shape: Shape,
+    points: NDArray[np.float64],
+    values: NDArray[np.float64],
+    elements: NDArray[np.int64],
+) -> Triangulated:
+    lattice, pieces = _lattice(three=shape == "triangle6")
+    weights = _FUNCTIONS[shape](lattice[:, 0], lattice[:, 1])
+    corners = 3 if shape == "triangle6" else 4
+    nodes = [_combine(weights, of_nodes, elements, corners) for of_nodes in (points, values)]
+    first = np.arange(len(elements))[:, None, None] * len(lattice)
+    return Triangulated(
+        nodes[0],
+        nodes[1],
+        (first + pieces).reshape(-1, 3),
+        np.arange(len(elements)).repeat(len(pieces)),
+    )
+
+
+def _combine(
+    weights: NDArray[np.float64],
+    of_nodes: NDArray[np.float64],
+    elements: NDArray[np.int64],
+    corners: int,
+) -> NDArray[np.float64]:
+    """Values at the lattice's points.
+
+    On an edge two corners and one middle have a weight. Added in this order, and each product
+    rounded before, two elements get the same bits on the edge that they share.
+    """
+    result = np.zeros((len(elements), len(weights), of_nodes.shape[1]))
+    middles = np.zeros_like(result)
+    for node in range(elements.shape[1]):
+        total = result if node < corners else middles
+        total += weights[:, node, None] * of_nodes[elements[:, node]][:, None, :]
+    result += middles
+    return result.reshape(len(elements) * len(weights), of_nodes.shape[1])
+
+
+def _lattice(three: bool) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points in an element's own coordinates from 0 to 1, and the triangles between them."""
+    count = DIVISIONS + 1
+    number = np.arange(count * count).reshape(count, count)
+    lower = np.stack((number[:-1, :-1], number[:-1, 1:], number[1:, :-1]), axis=-1)
+    upper = np.stack((number[:-1, 1:], number[1:, 1:], number[1:, :-1]), axis=-1)
+    row, column = np.divmod(np.arange(count * count), count)
+    triangles = np.concatenate((lower.reshape(-1, 3), upper.reshape(-1, 3)))
+    if three:
+        triangles = triangles[((row + column)[triangles] <= DIVISIONS).all(axis=1)]
+    return np.stack((column, row), axis=1) / DIVISIONS, triangles
+
+
+def _triangle6(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    w = 1.0 - u - v
+    return np.stack(
+        (w * (2 * w - 1), u * (2 * u - 1), v * (2 * v - 1), 4 * w * u, 4 * u * v, 4 * v * w), axis=1
+    )
+
+
+def _quad8(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    s, t = 1.0 - u, 1.0 - v
+    middles = (4 * u * s * t, 4 * v * t * u, 4 * u * s * v, 4 * v * t * s)
+    corners = (s * t, u * t, u * v, s * v)
+    halves = [(middles[corner - 1] + middles[corner]) / 2 for corner in range(4)]
+    return np.stack(
+        [corner - half for corner, half in zip(corners, halves, strict=True)] + list(middles),
+        axis=1,
+    )
+
+
+def _quad9(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    (a, b, c), (d, e, f) = (
+        ((1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)) for x in (u, v)
+    )
+    return np.stack((a * d, c * d, c * f, a * f, b * d, c * e, b * f, a * e, b * e), axis=1)
+
+
+_FUNCTIONS: Final[
+    Mapping[Shape, Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]]
+] = {"triangle6": _triangle6, "quad8": _quad8, "quad9": _quad9}
