@@ -145,10 +145,9 @@ def sentences(found: KnifeEdge) -> list[str]:
         f"its standard uncertainty; {found.best.model.name}: {_parameters(found.best)})."
     ]
     lines += _directions(found)
-    section = _study_section(found)
-    return (
-        [*lines, f"For a study's camera: psf_order: optics, psf: {section}"] if section else lines
-    )
+    if (text := _study_section(found)) is not None:
+        lines.append(f"For a study's camera: psf_order: optics, psf: {text}")
+    return lines
 
 
 def _study_section(found: KnifeEdge) -> str | None:
