@@ -21,8 +21,8 @@ from chipglow.scene.frame import (
     SceneError,
 )
 from chipglow.scene.nearest import extended, fill
-from chipglow.scene.polygon import in_polygon
 from chipglow.scene.raster import Raster
+from chipglow.scene.regions import in_polygon
 from chipglow.scene.tool import Tool
 
 STRAIN_OF_CHIP: Final = 1.0

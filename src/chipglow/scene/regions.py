@@ -6,9 +6,8 @@ from itertools import combinations
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from chipglow.scene.polygon import in_polygon
 from chipglow.scene.raster import Raster
 
 Point: TypeAlias = tuple[float, float]
@@ -16,6 +15,17 @@ Point: TypeAlias = tuple[float, float]
 
 _ROUND: Final = 72
 _BEYOND: Final = 1e-6
+
+
+def in_polygon(corners: Sequence[Point], x: ArrayLike, y: ArrayLike) -> NDArray[np.bool_]:
+    """Tell which points lie in a polygon; where it overlaps itself, those twice in it do not."""
+    x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+    inside = np.zeros(x.shape, np.bool_)
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if y1 != y2:
+            crossed = (y1 > y) != (y2 > y)
+            inside ^= crossed & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
+    return inside
 
 
 @dataclass(frozen=True)

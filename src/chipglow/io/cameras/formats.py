@@ -14,8 +14,7 @@ from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.file_order import files_of
-from chipglow.io.sources.source import reading
+from chipglow.io.sources.source import files_of, reading
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520

@@ -15,8 +15,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.file_order import files_of
-from chipglow.io.sources.source import SourceError, check_hdf5, reading, required
+from chipglow.io.sources.source import SourceError, check_hdf5, files_of, reading, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000

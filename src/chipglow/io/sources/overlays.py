@@ -13,7 +13,7 @@ from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
 from chipglow.io.sources.source import SourceError
 from chipglow.scene import FILLED, Material
 from chipglow.scene.nearest import fill
-from chipglow.scene.polygon import in_polygon
+from chipglow.scene.regions import in_polygon
 
 Box = tuple[int, int, int, int]
 """Left, top, right and bottom edge in whole pixels from the upper left corner of a picture."""

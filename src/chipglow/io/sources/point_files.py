@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.lammps_dump import ENDINGS, Snapshot, is_dump, snapshots
-from chipglow.io.sources.source import SourceError, reading, required
+from chipglow.io.sources.source import SourceError, files_of, reading, required
 from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
