@@ -22,8 +22,7 @@ Source: ISO 12233; ISO 15529. More: :doc:`/do/knife-edge`.
 from samples.edges import edge, measured
 
 from chipglow import AnnularAperturePSF, GaussianPSF, Measurement, edge_image, knife_edge
-from chipglow.laboratory.psf.figure import draw_knife_edge
-from chipglow.laboratory.psf.summary import sentences
+from chipglow.laboratory.psf.figure import draw_knife_edge, sentences
 from chipglow.quantities.format import uncertain_text
 
 mirror = AnnularAperturePSF(4.45e-6)

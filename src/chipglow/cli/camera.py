@@ -167,8 +167,7 @@ def psf(
     """Determine the point spread function and MTF of a camera from images of an edge."""
     from chipglow.laboratory import psf as lab
     from chipglow.laboratory.measurement import load_measurement
-    from chipglow.laboratory.psf.figure import draw_knife_edge
-    from chipglow.laboratory.psf.summary import sentences
+    from chipglow.laboratory.psf.figure import draw_knife_edge, sentences
 
     window = None if region is None else _region(region)
     images = [lab.load_edge(path, settings or (), window) for path in edges]

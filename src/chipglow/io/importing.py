@@ -15,6 +15,7 @@ import numpy as np
 
 from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
+from chipglow.io.sources.layout import check_times
 from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import COLDEST, LENGTH, POSITION
@@ -320,13 +321,7 @@ def _check_times(survey: Survey) -> None:
         raise SourceError(f"{survey.kind}: has no frame, expected 1 or more")
     if not np.isfinite(times).all():
         raise SourceError(f"{survey.kind}: its times are not finite")
-    later = np.diff(times) <= 0
-    if later.any():
-        at = int(np.argmax(later)) + 1
-        raise SourceError(
-            f"{survey.kind}: frame {at} is at {times[at]:.9g} s, expected later than "
-            f"{times[at - 1]:.9g} s"
-        )
+    check_times(survey.kind, times)
 
 
 def _key(wanted: Import, looked: Prospect) -> str:

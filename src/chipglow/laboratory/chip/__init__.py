@@ -18,11 +18,6 @@ from chipglow.laboratory.chip.find_tool import (
     FoundTool as FoundTool,
     find_tool as find_tool,
 )
-from chipglow.laboratory.chip.inertia import (
-    Inertia as Inertia,
-    inertia as inertia,
-    resolution_warnings as resolution_warnings,
-)
 from chipglow.laboratory.chip.metrics import (
     ChipMetrics as ChipMetrics,
     ChipScan as ChipScan,
@@ -43,7 +38,10 @@ from chipglow.laboratory.chip.segment import (
     contact_temperatures as contact_temperatures,
 )
 from chipglow.laboratory.chip.segmentation import (
+    Inertia as Inertia,
     Segmentation as Segmentation,
+    inertia as inertia,
+    resolution_warnings as resolution_warnings,
     segmentation as segmentation,
 )
 from chipglow.laboratory.chip.shear_band import (

@@ -1,4 +1,4 @@
-"""Segmentation of the chip as the cutting force shows it."""
+"""What a cut's histories show: segmentation by the force, and the inertia of the scaled mass."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,7 +10,9 @@ import scipy  # its signal part is slow to import, and loaded at its first use
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from chipglow.cutting import unresolved
 from chipglow.quantities import Array
+from chipglow.scene import Scene
 
 _LEAST_PROMINENCE: Final = 0.3
 """Least rise of the autocorrelation from the valley before its first peak to that peak."""
@@ -23,6 +25,9 @@ _LEAST_SMOOTH: Final = 0.7
 
 _LEAST_SWING: Final = 0.1
 """Least range of the force over its mean: less is the ripple of a continuous chip."""
+
+LARGEST_FRACTION: Final = 0.01
+"""Fraction of work or force from which inertia counts as too much."""
 
 
 @dataclass(frozen=True)
@@ -159,3 +164,63 @@ def _swing(force: Array, peaks: NDArray[np.int64]) -> float:
         return nan
     heights = [max(force[a], force[b]) - force[a:b].min() for a, b in pairwise(peaks)]
     return float(np.mean(heights))
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Inertia of the scaled mass in a cut, after the first build-up of the chip."""
+
+    kinetic_fraction: float
+    """Greatest change of the kinetic energy over the work of the drive so far; NaN if unknown."""
+    force_fraction: float
+    """Momentum flow of the scaled mass, ρV² times uncut chip thickness, over the cutting force."""
+    mass_scaling: float
+    """Factor on the density."""
+
+    @property
+    def warning(self) -> str:
+        """Warning of too much inertia; empty if there is none."""
+        fractions = (
+            (self.kinetic_fraction, "kinetic energy reaches {} of the work"),
+            (self.force_fraction, "momentum is worth {} of the cutting force"),
+        )
+        over = [text.format(f"{s:.1%}") for s, text in fractions if s > LARGEST_FRACTION]
+        if not over:
+            return ""
+        return (
+            f"The scaled mass's {' and its '.join(over)}, expected up to {LARGEST_FRACTION:.0%}: "
+            f"lower mass_scaling, now {self.mass_scaling:g}."
+        )
+
+
+def inertia(scene: Scene) -> Inertia | None:
+    """Compute the inertia of a scene's cut; None without a force history."""
+    if "cutting_force" not in scene.data:
+        return None
+    cutting = _values(scene, "cutting_force")
+    first = end_of_build_up(cutting)
+    kinetic_fraction = nan
+    if "drive_work" in scene.data:
+        kinetic, work = (_values(scene, n)[first:] for n in ("kinetic_energy", "drive_work"))
+        kinetic_fraction = np.fmax.reduce(_ratio(np.abs(kinetic), work))
+    flow = float(scene.data.attrs.get("momentum_flow", nan))
+    scaling = float(scene.data.attrs.get("mass_scaling", nan))
+    force_fraction = _ratio(np.array(flow), cutting[first:].mean())
+    return Inertia(float(kinetic_fraction), float(force_fraction), scaling)
+
+
+def _ratio(part: Array, whole: Array) -> Array:
+    """Return the quotient; NaN where the divisor is 0, as before the tool touches."""
+    unknown = np.full(np.shape(whole), nan)
+    return np.asarray(np.divide(part, whole, out=unknown, where=whole > 0.0))
+
+
+def _values(scene: Scene, name: str) -> Array:
+    return np.asarray(scene.data[name].values, dtype=np.float64)
+
+
+def resolution_warnings(scene: Scene, band_width: float = nan) -> tuple[str, ...]:
+    """Return sentences about lengths of a cut that its grid does not resolve."""
+    known = str(scene.data.attrs.get("resolution_warnings", ""))
+    cell = float(scene.data.attrs.get("cell", 0.0))
+    return (*known.splitlines(), *unresolved({"shear band": band_width}, cell))

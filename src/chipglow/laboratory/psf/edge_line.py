@@ -115,8 +115,6 @@ def _refined(
         here, there = (b, a) if steep else (a, b)
         expected = (line.position - there * other) / here
         place, centre = _centroids(derivative, middles, other, expected, pitch)
-        if place.size < 8:
-            return line, None
         kept = _without_outliers(place, centre)
         if kept.sum() < 8:
             return line, None
@@ -150,11 +148,11 @@ def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
     """Return which centroids lie near their line, by the median of their distances."""
     kept = np.ones(place.size, dtype=np.bool_)
     for _ in range(_ROUNDS):
+        if kept.sum() < 8:
+            break
         residual = centre - np.polyval(np.polyfit(place[kept], centre[kept], 1), place)
         spread = 1.4826 * float(np.median(np.abs(residual[kept])))
         kept = np.abs(residual) <= max(_OUTLIER * spread, 1e-12)
-        if kept.sum() < 8:
-            break
     return kept
 
 

@@ -1,17 +1,19 @@
-"""A point spread function by the knife edge, as a picture."""
+"""A point spread function by the knife edge, as a picture and in sentences."""
 
-from math import cos, hypot, sin
+from math import cos, hypot, sin, sqrt
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chipglow.camera import AnnularAperturePSF, GaussianPSF
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
-from chipglow.laboratory.psf.psf_fit import FittedEdge
+from chipglow.laboratory.psf.psf_fit import FittedEdge, ModelFit
+from chipglow.laboratory.psf.psf_models import is_length
 from chipglow.quantities import uncertain_text
 from chipglow.scene import Raster
 
@@ -133,3 +135,56 @@ def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
     axes.set_xlabel("diameter / µm")
     axes.set_ylabel("fraction of an endless source / %")
     axes.legend(loc="lower right")
+
+
+def sentences(found: KnifeEdge) -> list[str]:
+    """Return the result, and how to use it."""
+    width = uncertain_text(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
+    lines = [
+        f"The optics' point spread function is {width} um wide (full width at half maximum, with "
+        f"its standard uncertainty; {found.best.model.name}: {_parameters(found.best)})."
+    ]
+    lines += _directions(found)
+    if (text := _study_section(found)) is not None:
+        lines.append(f"For a study's camera: psf_order: optics, psf: {text}")
+    return lines
+
+
+def _study_section(found: KnifeEdge) -> str | None:
+    """Return the best model as a study's camera section; None if only a file can hold it."""
+    psf = found.psf()
+    if isinstance(psf, GaussianPSF):
+        return f"{{kind: gaussian, fwhm: {psf.fwhm * 1e6:.4g} um}}"
+    if isinstance(psf, AnnularAperturePSF):
+        return (
+            f"{{kind: annular-aperture, wavelength: {psf.wavelength * 1e6:.4g} um, "
+            f"numerical_aperture: {psf.numerical_aperture:.4g}, "
+            f"obscuration: {psf.obscuration:.4g}}}"
+        )
+    return None
+
+
+def _parameters(fit: ModelFit) -> str:
+    texts = []
+    for name, value, deviation in zip(
+        fit.model.parameters, fit.values, fit.uncertainties, strict=True
+    ):
+        scale, unit = (1e6, " um") if is_length(name) else (1.0, "")
+        number = uncertain_text(float(value) * scale, float(deviation) * scale)
+        texts.append(f"{name.replace('_', ' ')} {number}{unit}")
+    return ", ".join(texts)
+
+
+def _directions(found: KnifeEdge) -> list[str]:
+    """Return whether edges of several orientations agree."""
+    if len(found.edges) < 2:
+        return []
+    widths = np.array([edge.fwhm for edge in found.edges])
+    spread = np.array([edge.fwhm_uncertainty for edge in found.edges])
+    apart = float(np.ptp(widths))
+    unsure = sqrt(float(spread[widths.argmax()] ** 2 + spread[widths.argmin()] ** 2))
+    verdict = "agree" if apart < 2 * unsure else "differ: the point spread function is not round"
+    return [
+        f"The edges' own widths lie {apart * 1e6:.2g} um apart, with a standard uncertainty of "
+        f"{unsure * 1e6:.2g} um: they {verdict}."
+    ]

@@ -20,6 +20,7 @@ from scipy.special import chdtri
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
 from chipglow.camera.optics.kernel import normalised
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
+from chipglow.laboratory.psf.edge_line import EdgeLine
 from chipglow.laboratory.psf.edge_spread import BINS_PER_PITCH, edge_curves
 from chipglow.laboratory.psf.psf_fit import (
     ApertureSignals,
@@ -280,7 +281,7 @@ def _models(
             "ratio of the wavelength to the numerical aperture can be determined."
         )
     directions = orientations(edges)
-    tilts = [abs((direction + np.pi / 4) % (np.pi / 2) - np.pi / 4) for direction in directions]
+    tilts = [abs(EdgeLine(direction, 0.0).tilt) for direction in directions]
     if len(directions) >= 3:
         models.append(EllipticalModel(tilted=True))
     elif len(directions) == 2 and max(tilts) < _ALIGNED:

@@ -116,15 +116,21 @@ class ModelFit:
     """Radiance of the source behind the apertures above the background, and the background, in
     W/(m² sr); NaN without apertures.
     """
+    vector: Array
+    """All fitted parameters: those of the model, of the edges and of the apertures."""
     chi_square: float
     """Sum of the squared residuals over their noise."""
     count: int
-    free: int
-    """Number of pixels and apertures, and of parameters."""
+    """Number of pixels and apertures."""
     reduced_chi_squared: float
     """Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
     nothing but noise is left.
     """
+
+    @property
+    def free(self) -> int:
+        """Number of parameters."""
+        return self.vector.size
 
     @property
     def aicc(self) -> float:
@@ -167,7 +173,7 @@ def fit_model(
 ) -> ModelFit:
     """Fit by weighted least squares with the edges' places, backgrounds and steps free."""
     problem = _Problem(model, tuple(edges), apertures)
-    starts = problem.starts()[:tries] if start is None else [problem.vector_of(start)]
+    starts = problem.starts()[:tries] if start is None else [start.vector]
     ends = [problem.least(vector, tolerance) for vector in starts]
     return problem.fitted(min(ends, key=problem.cost))
 
@@ -220,14 +226,6 @@ class _Problem:
             for values in self.model.starts(width * pitch)
         ]
         return sorted(candidates, key=self.cost)
-
-    def vector_of(self, fit: ModelFit) -> Array:
-        """Return all parameters of an earlier fit."""
-        places = [
-            (edge.background, edge.step, edge.line.position, edge.line.normal) for edge in fit.edges
-        ]
-        source = () if self.apertures is None else (fit.aperture_background, fit.source)
-        return np.concatenate([fit.values, *places, source])
 
     def residual(self, vector: Array) -> Array:
         """Return measured minus modelled values over the noise."""
@@ -296,9 +294,9 @@ class _Problem:
             ),
             float(source[1]) if source.size else np.nan,
             float(source[0]) if source.size else np.nan,
+            vector,
             float(residual @ residual),
             residual.size,
-            vector.size,
             reduced,
         )  # fmt: skip
 

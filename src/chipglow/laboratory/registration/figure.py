@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import HEAT, VERMILLION
+from chipglow.drawing.scales import HEAT, VERMILLION, VOID
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Tool
@@ -36,11 +36,13 @@ def draw_registration(
         left, right = figure.subplots(1, 2)
         picture = drawing.show_image(left, celsius, raster, tool, HEAT, limits)
         left.set_title("infrared")
-        _draw_visible(right, visible)
         warped = registration.warp(celsius, raster, (visible.shape[0], visible.shape[1]))
-        _draw_warped(right, warped, limits, _OPACITY)
-        right.set_title("visible, infrared over it")
+        _show(right, visible, "gray", scales.ends(visible, 0.5, 99.5))
+        _show(right, warped, HEAT, limits, _OPACITY)
         _draw_tool(right, registration, tool, visible.shape)
+        right.set_title("visible, infrared over it")
+        right.set_xlabel("column")
+        right.set_ylabel("row")
         if points is not None:
             left.plot(*(1e6 * points[0]).T, "+", color=VERMILLION)
             right.plot(*points[1].T, "+", color=VERMILLION)
@@ -62,48 +64,38 @@ def blink_pictures(
     """
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - ZERO_CELSIUS, raster, shape)
+    plain = _rendered(registration, tool, visible, "gray", scales.ends(visible, 0.5, 99.5))
     limits = scales.ends(celsius, 0.5, 99.8, 1.0)
-    plain = _rendered(registration, visible, tool)
-    hot = _rendered(registration, visible, tool, celsius, limits)
-    return plain, hot
+    return plain, _rendered(registration, tool, celsius, HEAT, limits)
 
 
 def _rendered(
     registration: Registration,
-    visible: NDArray[Any],
     tool: Tool | None,
-    celsius: Array | None = None,
-    limits: tuple[float, float] = (0.0, 1.0),
+    image: NDArray[Any],
+    colours: Any,
+    limits: tuple[float, float],
 ) -> NDArray[np.uint8]:
-    height = _BLINK_WIDTH * visible.shape[0] / visible.shape[1]
+    height = _BLINK_WIDTH * image.shape[0] / image.shape[1]
     figure = Figure(figsize=(_BLINK_WIDTH, height), dpi=100)
     canvas: Any = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    if celsius is None:
-        _draw_visible(axes, visible)
-    else:
-        _draw_warped(axes, celsius, limits)
-        axes.set_facecolor(scales.VOID)
-    axes.set_axis_on()
-    axes.set_xticks([])
-    axes.set_yticks([])
-    _draw_tool(axes, registration, tool, visible.shape)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=VOID)
+    _show(axes, image, colours, limits)
+    axes.set(xticks=[], yticks=[])
+    _draw_tool(axes, registration, tool, image.shape)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba(), np.uint8)[..., :3].copy()
 
 
-def _draw_visible(axes: Axes, visible: NDArray[Any]) -> None:
-    low, high = np.percentile(visible, (0.5, 99.5))
-    axes.imshow(visible, cmap="gray", vmin=low, vmax=max(high, low + 1e-9))
-    axes.set_xlabel("column")
-    axes.set_ylabel("row")
-
-
-def _draw_warped(
-    axes: Axes, celsius: Array, limits: tuple[float, float], opacity: float = 1.0
+def _show(
+    axes: Axes,
+    image: NDArray[Any],
+    colours: Any,
+    limits: tuple[float, float],
+    opacity: float = 1.0,
 ) -> None:
-    shown: Any = np.ma.masked_invalid(celsius)
-    axes.imshow(shown, cmap=HEAT, vmin=limits[0], vmax=limits[1], alpha=opacity)
+    shown: Any = np.ma.masked_invalid(image)
+    axes.imshow(shown, cmap=colours, vmin=limits[0], vmax=limits[1], alpha=opacity)
 
 
 def _draw_tool(

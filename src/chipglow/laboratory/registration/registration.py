@@ -250,11 +250,8 @@ class NormalisedFrame:
     def around(cls, positions: Array, pixels: Array) -> "NormalisedFrame":
         """Return the middle of points, and their distance from it, in both images."""
         centre, pixel_centre = positions.mean(axis=0), pixels.mean(axis=0)
-        spreads = (
-            float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
-            for points, middle in ((positions, centre), (pixels, pixel_centre))
-        )
-        scale, pixel_scale = spreads
+        scale = float(np.sqrt(((positions - centre) ** 2).sum(axis=1).mean()))
+        pixel_scale = float(np.sqrt(((pixels - pixel_centre) ** 2).sum(axis=1).mean()))
         return cls(centre, scale, pixel_centre, pixel_scale)
 
     def unit(self, positions: Array) -> Array:
@@ -267,7 +264,10 @@ class NormalisedFrame:
 
     def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
         """Return a matrix in these coordinates, and its covariance, for m and pixels."""
-        before, after = self._sides()
+        x, y = self.centre / self.scale
+        before = np.array([[1 / self.scale, 0, -x], [0, -1 / self.scale, y], [0, 0, 1]])
+        column, row = self.pixel_centre
+        after = np.array([[self.pixel_scale, 0, column], [0, self.pixel_scale, row], [0, 0, 1]])
         whole = after @ matrix @ before
         slope = np.kron(after, before.T)
         last = np.zeros(9)
@@ -276,13 +276,6 @@ class NormalisedFrame:
         full = whole / whole[2, 2]
         full[2, 2] = 1.0
         return full, slope @ covariance @ slope.T
-
-    def _sides(self) -> tuple[Array, Array]:
-        x, y = self.centre / self.scale
-        before = np.array([[1 / self.scale, 0, -x], [0, -1 / self.scale, y], [0, 0, 1]])
-        column, row = self.pixel_centre
-        after = np.array([[self.pixel_scale, 0, column], [0, self.pixel_scale, row], [0, 0, 1]])
-        return before, after
 
 
 def parameter_basis(model: Model, mirrored: bool) -> Array:
