@@ -1,8 +1,5 @@
 """Virtual and real cameras: optics, exposure, detector, calibration and measurement."""
 
-from chipglow.camera.calibration.blackbody import (
-    Blackbody as Blackbody,
-)
 from chipglow.camera.calibration.calibration import (
     MODELS as MODELS,
     Calibration as Calibration,
@@ -15,11 +12,13 @@ from chipglow.camera.calibration.errors import (
     CalibrationErrors as CalibrationErrors,
 )
 from chipglow.camera.calibration.fit import (
+    Blackbody as Blackbody,
     CalibrationFit as CalibrationFit,
     fit_calibration as fit_calibration,
 )
 from chipglow.camera.camera import (
     Camera as Camera,
+    ChipglowWarning as ChipglowWarning,
 )
 from chipglow.camera.detector.bad_pixels import (
     LEAST_FRAMES as LEAST_FRAMES,
@@ -116,7 +115,4 @@ from chipglow.camera.ratio_camera import (
 from chipglow.camera.recording import (
     PlanckConversion as PlanckConversion,
     Recording as Recording,
-)
-from chipglow.camera.warning import (
-    ChipglowWarning as ChipglowWarning,
 )

@@ -21,7 +21,6 @@ from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
 from chipglow.camera.sweep import Check
-from chipglow.camera.warning import ChipglowWarning
 from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import (
     COLDEST,
@@ -42,6 +41,10 @@ BORDER_TOLERANCE: Final = 1.0
 _ROUNDING: Final = 1e-13
 _COLD_FLOOR: Final = 373.15
 """Floor in K up to which a round number is probably one of degrees Celsius."""
+
+
+class ChipglowWarning(UserWarning):
+    """A setting that is possible, and probably not meant, such as °C where K are due."""
 
 
 @dataclass(frozen=True)

@@ -233,20 +233,14 @@ Position = Annotated[float, POSITION]
 LENGTH: Final = Quantity("a length", "m", "um", "6 um")
 Length = Annotated[float, LENGTH]
 CUT_LENGTH: Final = Quantity("a length", "m", "mm", "0.3 mm")
-CutLength = Annotated[float, CUT_LENGTH]
 WAVELENGTH: Final = Quantity("a wavelength", "m", "um", "4.5 um")
 Wavelength = Annotated[float, WAVELENGTH]
 WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
-WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
-Time = Annotated[float, TIME]
 INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)
 FREQUENCY: Final = Quantity("a frequency", "Hz", "Hz", "600 Hz")
-Frequency = Annotated[float, FREQUENCY]
 SPEED: Final = Quantity("a speed", "m/s", "m/min", "250 m/min")
-Speed = Annotated[float, SPEED]
 ANGLE: Final = Quantity("an angle", "rad", "deg", "-7 deg", positive=False)
-Angle = Annotated[float, ANGLE]
 HEAT_TRANSFER: Final = Quantity(
     "a coefficient of heat transfer", "W/m^2/K", "W/m^2/K", "50 W/m^2/K", positive=False
 )

@@ -18,9 +18,9 @@ from chipglow.camera.optics.kernel import (
     folded,
     half_size,
     kernel_fwhm,
+    light_on_squares,
     normalised,
 )
-from chipglow.camera.optics.round import light_on_squares
 from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Array, Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
