@@ -366,14 +366,9 @@ class Camera(Part):
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
-        if self._forms_on_pixels:
-            return self._both(image, scene)[0]
-        return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
-
-    @property
-    def _forms_on_pixels(self) -> bool:
-        """Whether the image is needed nowhere but on the pixels."""
-        return self.psf is not None and self.psf_order == "optics" and not self.optics
+        if self.psf is None or self.optics:
+            return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
+        return self._both(image, scene)[0]
 
     def _both(self, image: Array, scene: Raster) -> tuple[Array, Array]:
         """Return the radiance that the pixels receive, as at the edges or nothing beyond."""
