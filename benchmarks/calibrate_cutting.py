@@ -1,16 +1,14 @@
-"""Fit the onset, loss and energy of failure of AISI 1045 to measured cuts.
+"""Fit strength, onset, loss and energy of failure, friction and edge radius to cuts of AISI 1045.
 
     python benchmarks/calibrate_cutting.py [--processes 2] [--markdown]
 
 The four cuts of the assessment of machining models whose forces are known, and the paper's, are
 computed at every point of a design; each cut takes minutes, all are kept in build/experiments. The
-edge radius of the four is not told: it is fitted with them, and stands for rounding and wear.
+edge radius of the four is not stated: it is fitted with them, and stands for rounding and wear.
 
-Quadratic surfaces through the logarithms of the forces stand for the solver between the points. The
-forces alone would have next to no softening, and a chip without segments: so along the front
-between the two, where only the loss differs, the loss is chosen that segments the chip and comes
-closest to the paper's period. Printed are all points, what is found, its uncertainty, and the
-valley of numbers that are as good.
+Quadratic surfaces through the logarithms of the results stand for the solver between the points.
+Forces, period and degree of segmentation are fitted together. Printed are all points, the best
+place with its differences, its uncertainty, and the principal axes of the covariance.
 """
 
 import argparse
@@ -27,29 +25,23 @@ from experiments import Experiment, Means, aligned, markdown, means_of, read_exp
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation
+from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation, ZerilliArmstrong
+from chipglow.cutting.material import NonlocalViscosity
 
 Array: TypeAlias = NDArray[np.float64]
 
-CELL = 20e-6
-LENGTHS = {"amm-200-0.15": 1.0e-3, "amm-200-0.30": 1.5e-3, "paper": 2.8e-3}
+CELL = 14e-6
+LENGTHS = {"amm-200-0.15": 1.4e-3, "amm-200-0.30": 2.0e-3, "paper": 2.8e-3}
 """Cutting lengths by the beginning of a cut's name: several segments, or a steady force."""
 
-FORCES = {"cutting_force": 0.05, "thrust_force": 0.1}
-"""Measured forces and their assumed relative standard uncertainties (none is published)."""
+UNCERTAINTIES = {"cutting_force": 0.05, "thrust_force": 0.1}
+"""Assumed relative standard uncertainties of measured forces (none is published)."""
 
-PERIOD, PERIOD_UNCERTAINTY = 90e-6, 15e-6
-LEAST_DEGREE = 0.1
-"""Degree of segmentation under which a chip is wavy rather than segmented."""
+PAPER = {"period": (90e-6, 0.1), "degree": (0.3, 0.15)}
+"""Period of the paper's simulation and an assumed degree, with relative standard uncertainties."""
 
 AXIAL = 0.7
 """Distance of the design's outer points from its middle, of the half range."""
-
-
-FRONT = (1.0, 8e3, 100e-6)
-"""Onset, fracture energy and edge radius of the points whose loss alone is varied, in SI."""
-
-FRONT_LOSSES = (0.3, 0.35, 0.4, 0.45)
 
 
 @dataclass(frozen=True)
@@ -68,29 +60,42 @@ class Range:
 
 
 RANGES = (
-    Range("onset (d1, d2 over those in use)", "", 1.0, 0.7, 2.0),
-    Range("loss", "", 1.0, 0.12, 0.5),
-    Range("fracture energy", "kJ/m2", 1e3, 2.0, 15.0),
-    Range("edge radius of the four", "um", 1e-6, 40.0, 120.0),
+    Range("strength over the law's", "", 1.0, 1.0, 1.25),
+    Range("onset (d1, d2 over BASE)", "", 1.0, 0.7, 1.45),
+    Range("triaxiality's exponent -d3", "", 1.0, 3.0, 5.3),
+    Range("loss", "", 1.0, 0.6, 0.92),
+    Range("fracture energy", "kJ/m2", 1e3, 8.0, 18.0),
+    Range("friction coefficient", "", 1.0, 0.38, 0.65),
+    Range("edge radius of the four", "um", 1e-6, 70.0, 122.0),
 )
-BASE = {"d1": 0.006, "d2": 0.331}
-"""A tenth of the constants that circulate for medium carbon steel."""
+LAW = ZerilliArmstrong(159.2e6, 1533.7e6, 0.00609, 0.000189, 742.6e6, 0.171, 1.0, 2.1e3)
+VISCOSITY = NonlocalViscosity(2.1e3, 20e-6)
+BASE = {"d1": 0.006, "d2": 0.08}
+STRESSES = ("athermal_stress", "thermal_stress", "hardening")
 
 
 def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulation:
     """Return a cut at a place of the design."""
-    onset, loss, energy, edge = (r.at(p) for r, p in zip(RANGES, place, strict=True))
+    strength, onset, d3, loss, energy, friction, edge = (
+        one.at(part) for one, part in zip(RANGES, place, strict=True)
+    )
     length = next(value for name, value in LENGTHS.items() if experiment.name.startswith(name))
     cut = experiment.simulation(CELL, length)
-    assert AISI_1045.damage is not None
+    law, damage = LAW, AISI_1045.damage
+    assert damage is not None
+    law = replace(law, **{name: strength * getattr(law, name) for name in STRESSES})
     damage = replace(
-        AISI_1045.damage,
+        damage,
         **{name: onset * value for name, value in BASE.items()},
+        d3=-d3,
         loss=loss,
         fracture_energy=energy,
     )
+    workpiece = replace(AISI_1045, flow_stress=law, damage=damage, nonlocal_viscosity=VISCOSITY)
     tool = cut.tool if experiment.name == "paper" else replace(cut.tool, edge_radius=edge)
-    return replace(cut, workpiece=replace(AISI_1045, damage=damage), tool=tool)
+    return replace(
+        cut, workpiece=workpiece, tool=tool, friction=replace(cut.friction, coefficient=friction)
+    )
 
 
 def compute(task: tuple[Experiment, tuple[float, ...]]) -> Means:
@@ -116,14 +121,14 @@ class Observation:
 
 
 def observations(experiments: Iterable[Experiment]) -> list[Observation]:
-    """Return the measured forces of the four cuts, and the period of the paper's."""
+    """Return the measured forces of the four cuts, period and degree of the paper's."""
     forces = [
-        Observation(one.name, entry.quantity, entry.value, FORCES[entry.quantity])
+        Observation(one.name, entry.quantity, entry.value, UNCERTAINTIES[entry.quantity])
         for one in experiments
         for entry in one.published
-        if entry.kind == "measured" and entry.quantity in FORCES
+        if entry.kind == "measured" and entry.quantity in UNCERTAINTIES
     ]
-    return [*forces, Observation("paper", "period", PERIOD, PERIOD_UNCERTAINTY / PERIOD)]
+    return [*forces, *(Observation("paper", name, *value) for name, value in PAPER.items())]
 
 
 def terms(places: Array) -> Array:
@@ -146,10 +151,14 @@ class Fit:
     def through(cls, places: Array, values: Array, observed: list[Observation]) -> "Fit":
         """Fit computed values of shape (places, observations) by least squares."""
         basis, logs = terms(places), np.log(values)
-        weights, *_ = np.linalg.lstsq(basis, logs, rcond=None)
-        residuals = logs - basis @ weights
-        free = max(len(places) - np.linalg.matrix_rank(basis), 1)
-        return cls(observed, weights, np.sqrt((residuals**2).sum(axis=0) / free))
+        weights, scatter = [], []
+        for column in logs.T:
+            known = np.isfinite(column)  # a chip that hardly segments has no period
+            free = max(known.sum() - np.linalg.matrix_rank(basis[known]), 1)
+            weights.append(np.linalg.lstsq(basis[known], column[known], rcond=None)[0])
+            residuals = column[known] - basis[known] @ weights[-1]
+            scatter.append(np.sqrt((residuals**2).sum() / free))
+        return cls(observed, np.transpose(weights), np.array(scatter))
 
     def logs(self, place: Array) -> Array:
         """Return the logarithms of the quantities at a place."""
@@ -208,17 +217,27 @@ def computed(
     ]
 
 
-def number_table(free: Array, chosen: Array, covariance: Array) -> list[list[str]]:
+def best_table(fit: Fit, place: Array) -> list[list[str]]:
+    """Return the table of what the surfaces predict at a place, and their scatter."""
+    rows = [["cut", "quantity", "predicted over measured / %", "scatter of the surface / %"]]
+    for one, value, scatter in zip(fit.observed, fit.logs(place), fit.scatter, strict=True):
+        difference = f"{100 * (exp(value) / one.value - 1):+.0f}"
+        rows.append([one.cut, one.quantity, difference, f"{100 * scatter:.0f}"])
+    return rows
+
+
+def number_table(place: Array, covariance: Array) -> list[list[str]]:
     """Return the table of fitted numbers, standard uncertainties and correlations."""
     deviations = np.sqrt(np.diag(covariance))
     correlations = covariance / np.outer(deviations, deviations)
-    rows = [["number", "range", "forces alone", "chosen", "standard uncertainty / %", *"1234"]]
+    numbers = [str(k + 1) for k in range(len(RANGES))]
+    rows = [["number", "range", "best", "standard uncertainty / %", *numbers]]
     for k, one in enumerate(RANGES):
         rows.append(
             [
                 f"{one.name} {f'/ {one.unit}' if one.unit else ''}".strip(),
                 f"{one.low:g} to {one.high:g}",
-                *(f"{one.at(place[k]) / one.scale:.3g}" for place in (free, chosen)),
+                f"{one.at(place[k]) / one.scale:.3g}",
                 f"{100 * deviations[k]:.0f}",
                 *(f"{value:+.2f}".replace("-", "−") for value in correlations[k]),
             ]
@@ -253,25 +272,6 @@ def run_table(
     return rows
 
 
-def front() -> list[tuple[float, ...]]:
-    """Return the places at which only the loss differs."""
-    return [place_of((*FRONT[:1], loss, *FRONT[1:])) for loss in FRONT_LOSSES]
-
-
-def place_of(values: Iterable[float]) -> tuple[float, ...]:
-    """Return the place of values in SI."""
-    return tuple(
-        2 * log(value / one.scale / one.low) / log(one.high / one.low) - 1
-        for value, one in zip(values, RANGES, strict=True)
-    )
-
-
-def segments(run: dict[str, Means]) -> bool:
-    """Return whether the paper's cut is segmented with the published period."""
-    paper = run["paper"]
-    return abs(paper.period - PERIOD) <= PERIOD_UNCERTAINTY and paper.degree >= LEAST_DEGREE
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--processes", type=int, default=2, help="cuts at a time, one thread each")
@@ -284,20 +284,17 @@ def main() -> None:
         if one.name == "paper" or any(entry.kind == "measured" for entry in one.published)
     ]
     observed = observations(experiments)
-    places = [*design(), *front()]
+    places = design()
     runs = computed(experiments, places, given.processes)
-    forces = observed[:-1]
-    values = [[getattr(run[one.cut], one.quantity) for one in forces] for run in runs]
-    fit = Fit.through(np.array(places), np.array(values, dtype=np.float64), forces)
-    along = zip(places[-len(FRONT_LOSSES) :], runs[-len(FRONT_LOSSES) :], strict=True)
-    segmented = [(place, run) for place, run in along if segments(run)]
-    chosen, _ = min(segmented, key=lambda point: abs(point[1]["paper"].period - PERIOD))
-    covariance = fit.covariance_at(np.array(chosen))
+    values = [[getattr(run[one.cut], one.quantity) for one in observed] for run in runs]
+    fit = Fit.through(np.array(places), np.array(values, dtype=np.float64), observed)
+    best = fit.best_place()
+    covariance = fit.covariance_at(best)
     table = markdown if given.markdown else aligned
     print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.\n")
     print(f"{table(run_table(places, runs, observed))}\n")
-    print("By the forces alone, and the front's point that segments the paper's cut in time:\n")
-    print(f"{table(number_table(fit.best_place(), np.array(chosen), covariance))}\n")
+    print(f"{table(best_table(fit, best))}\n")
+    print(f"{table(number_table(best, covariance))}\n")
     print(table(valley_table(covariance)))
 
 

@@ -29,7 +29,7 @@ SIDES = 20e-6
 """Length at either end of a profile whose mean is the temperature beside the band."""
 
 COLUMNS = (
-    "cell / µm", "cutting force / (N/mm)", "swing / (N/mm)", "thrust / (N/mm)", "period / µs",
+    "cell / µm", "cutting force / (N/mm)", "thrust / (N/mm)", "period / µs", "degree / %",
     "hottest chip / °C", "band / µm", "band's rate / (10³ 1/s)", "width of its temperature / µm",
     "its temperature / °C", "unaccounted work / %", "time / s",
 )  # fmt: skip
@@ -89,14 +89,14 @@ def row(cell, length, workpiece):
     history = simulation.run(OutputWindow(START, length, 1e-6, later_bands=0), RASTER, fields.add)
     seconds = perf_counter() - start
     later = history.time * conditions.speed > START
-    segments = segmentation(history.time[later], history.cutting[later], history.thrust[later])
+    segments = segmentation(history.time[later], history.thickness[later], numerics.cell)
     rate, width, temperature_width, temperature = fields.active()
     return [
         f"{cell:g}",
-        f"{segments.cutting_mean / 1e3:.0f}",
-        number(segments.cutting_swing / 1e3),
-        f"{segments.thrust_mean / 1e3:.0f}",
+        f"{history.cutting[later].mean() / 1e3:.0f}",
+        f"{history.thrust[later].mean() / 1e3:.0f}",
         f"{number(segments.period * 1e6)}{deviation(segments.period_uncertainty)}",
+        f"{segments.degree * 100:.0f} ± {segments.degree_uncertainty * 100:.0f}",
         f"{max(fields.hottest) - 273.15:.0f}",
         f"{width * 1e6:.0f}",
         f"{rate / 1e3:.0f}",

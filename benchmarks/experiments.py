@@ -37,6 +37,7 @@ from chipglow.io import atomic_path
 from chipglow.laboratory.chip import ChipMetrics, chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity
 from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, ToolGeometry
+from chipglow.scene.scene import FORCE_UNITS
 
 DATA = Path(__file__).with_name("experiments.yaml")
 RESULTS = Path("build/experiments")
@@ -226,10 +227,11 @@ def scene_of(
     """Return frames and forces as a scene."""
     fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in FIELD_UNITS}
     scene = Scene.from_fields(raster, [frame.time for frame in frames], fields, tool)
-    forces = {"cutting_force": history.cutting, "thrust_force": history.thrust}
+    values = history.cutting, history.thrust, history.thickness
+    known = zip(FORCE_UNITS.items(), values, strict=True)
     return Scene(
         scene.data.assign_coords(force_time=("force_time", history.time, {"units": "s"})).assign(
-            {name: ("force_time", force, {"units": "N/m"}) for name, force in forces.items()}
+            {name: ("force_time", each, {"units": unit}) for (name, unit), each in known}
         )
     )
 

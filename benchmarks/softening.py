@@ -23,6 +23,7 @@ from chipglow.cutting import (
     JohnsonCookDamage,
     Numerics,
     OutputWindow,
+    workpiece,
 )
 
 WINDOW = OutputWindow(start=0.9e-3, interval=1e-6, later_bands=0)
@@ -49,7 +50,7 @@ CASES = {
         AISI_1045,
         damage=None,
         flow_stress=HyperbolicTangent(
-            **asdict(AISI_1045.flow_stress),
+            **asdict(workpiece("aisi-1045/jaspers-dautzenberg").flow_stress),
             hardening_limit=1.1,
             recovery_temperature=0.4,
             recovery_strain=12.0,

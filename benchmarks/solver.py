@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numba import get_num_threads
 
-from chipglow.cutting import AISI_1045
+from chipglow.cutting import workpiece
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.material import ROOM_TEMPERATURE
@@ -15,14 +15,15 @@ from chipglow.cutting.recording import held_energy
 from chipglow.scene import ToolGeometry
 
 FAR = 1.0
-DENSITY = float(AISI_1045.density_at(ROOM_TEMPERATURE))
-UNBROKEN = replace(AISI_1045, damage=None, density=DENSITY)
+STEEL = workpiece("aisi-1045/jaspers-dautzenberg")
+DENSITY = float(STEEL.density_at(ROOM_TEMPERATURE))
+UNBROKEN = replace(STEEL, damage=None, density=DENSITY)
 """AISI 1045 that does not fail and does not expand."""
 ELASTIC = replace(
     UNBROKEN,
     young_modulus=205e9,
     poisson_ratio=0.29,
-    flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15),
+    flow_stress=replace(STEEL.flow_stress, yield_stress=1e15),
 )
 
 

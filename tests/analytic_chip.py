@@ -82,6 +82,7 @@ class AnalyticChip:
             scene.data.assign(
                 cutting_force=("force_time", cutting, units),
                 thrust_force=("force_time", thrust, units),
+                chip_thickness=("force_time", self.passing(time), {"units": "m"}),
             ).assign_coords(force_time=("force_time", time, {"units": "s"}))
         )
 
@@ -94,6 +95,11 @@ class AnalyticChip:
         cutting = rise * (450e3 + 30e3 * swing) + noise[0]
         return time, cutting, rise * (180e3 + 20e3 * swing) + noise[1]
 
+    def passing(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the thickness in m that passes a line, 25 % less in a valley than at a peak."""
+        swing = np.cos(2 * np.pi * (time - 100e-6) / self.segment_period)
+        return np.asarray(350e-6 + 50e-6 * swing)
+
     def cut_history(self) -> ForceHistory:
         """The same as a cutting simulation gives it; 2 % of the work is not found again."""
         time, cutting, thrust = self.forces()
@@ -103,7 +109,9 @@ class AnalyticChip:
             work, nothing, nothing, nothing, 0.9 * work, 0.08 * work, nothing, nothing, nothing,
             nothing,
         )  # fmt: skip
-        return ForceHistory(time, cutting, thrust, energy)
+        return ForceHistory(
+            time, cutting, thrust, self.passing(time), energy, self.scene().frame(0)
+        )
 
     def _fields(self, time: float) -> dict[str, NDArray[np.generic]]:
         points = np.stack(np.meshgrid(self.raster.x, self.raster.y), axis=-1)
@@ -191,5 +199,6 @@ def replace_cut(monkeypatch, scene):
         return AnalyticChip().cut_history()
 
     monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
+    monkeypatch.setattr(CuttingSimulation, "overview_raster", AnalyticChip().raster)
     monkeypatch.setattr(CuttingSimulation, "lattice", lambda *_: None)  # it has samples only
     return calls

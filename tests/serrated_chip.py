@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from math import cos, log, radians, sin, tan
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Material, Raster, Scene, ToolGeometry
 
@@ -64,9 +64,26 @@ class SerratedChip:
         forces = {
             "cutting_force": ("force_time", 450e3 + 30e3 * swing, units),
             "thrust_force": ("force_time", 180e3 + 20e3 * swing, units),
+            "chip_thickness": ("force_time", self.passing(time), {"units": "m"}),
         }
         data = scene.data.assign(forces)
         return Scene(data.assign_coords(force_time=("force_time", time, {"units": "s"})))
+
+    def passing(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the thickness at the edge at times in s."""
+        return self._back(self._phase(np.zeros(1), time))
+
+    def _phase(self, along: NDArray[np.float64], time: ArrayLike) -> NDArray[np.float64]:
+        """Return the phase of the sawtooth at distances along the face."""
+        turn = 2 * np.pi * np.asarray(time) / self.period
+        length = self.chip_speed * self.period
+        travel = length / (2 * np.pi) * (turn + self.unsteadiness * np.sin(turn))
+        return np.asarray((along - travel) / length % 1.0)
+
+    def _back(self, phase: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the thickness at a phase of the sawtooth."""
+        fraction = np.where(phase < self.rise, phase / self.rise, (1 - phase) / (1 - self.rise))
+        return np.asarray(self.valley + (self.peak - self.valley) * fraction)
 
     def _fields(self, time: float) -> dict[str, NDArray[np.generic]]:
         points = np.stack(np.meshgrid(self.raster.x, self.raster.y), axis=-1)
@@ -77,10 +94,8 @@ class SerratedChip:
         along = (points - self.tool.rake_point(0.0)) @ np.array(self.tool.rake_direction)
         turn = 2 * np.pi * time / self.period
         length = self.chip_speed * self.period
-        travel = length / (2 * np.pi) * (turn + self.unsteadiness * np.sin(turn))
-        phase = (along - travel) / length % 1.0
-        fraction = np.where(phase < self.rise, phase / self.rise, (1 - phase) / (1 - self.rise))
-        back = self.valley + (self.peak - self.valley) * fraction
+        phase = self._phase(along, time)
+        back = self._back(phase)
         free = along > self.contact
         gap = np.where(free, 8e-6 + tan(self.lift) * (along - self.contact), 0.0)
         back = back + np.where(free, gap - 8e-6, 0.0)

@@ -405,72 +405,54 @@ def test_lines_beyond_the_image_have_no_reading():
 # Segments
 
 
-@pytest.mark.parametrize("period", [45e-6, 72e-6, 95e-6])
+@pytest.mark.parametrize("period", [45e-6, 95e-6])
 @pytest.mark.parametrize("shape", ["sine", "saw"])
-def test_the_period_of_a_synthetic_force_is_found(period, shape):
+def test_the_segments_of_a_known_thickness_are_found(period, shape):
     time = np.arange(0.0, 470e-6, 0.25e-6)
     phase = time / period % 1.0
-    wave = (
-        np.sin(2 * np.pi * phase)
-        if shape == "sine"
-        else 2 * np.minimum(phase / 0.8, 5 - 5 * phase) - 1
-    )
-    noise = np.random.default_rng(5).normal(0.0, 2e3, time.size)
-    rise = 1 - np.exp(-time / 10e-6)
-    cutting = rise * (450e3 + 40e3 * wave) + noise
-    found = segmentation(time, cutting, 0.4 * cutting)
-    assert found.period == pytest.approx(period, rel=0.02)
-    assert found.correlation_period == pytest.approx(period, rel=0.05)
-    assert found.segments >= int((time[-1] - found.start) / period) - 1
-    assert found.cutting_mean == pytest.approx(450e3, rel=0.03)
-    assert found.thrust_mean == pytest.approx(0.4 * found.cutting_mean)
-    # Smoothing over a fifteenth of a period rounds the peaks, most those of a saw.
-    assert found.cutting_swing == pytest.approx(80e3, rel=0.25)
-    assert not found.period_uncertainty > 0.02 * period
+    saw = 2 * np.minimum(phase / 0.8, 5 - 5 * phase) - 1
+    wave = np.sin(2 * np.pi * phase) if shape == "sine" else saw
+    noise = np.random.default_rng(5).uniform(-5e-6, 5e-6, time.size)
+    found = segmentation(time, 350e-6 + 50e-6 * wave + noise, 20e-6)
+    # Noise of 1.5 um where the wave is flat within 3 um of its valley: it is off by some 3 us.
+    intervals = found.valleys.size - 1
+    assert found.period == pytest.approx(period, abs=6e-6 / intervals)
+    assert found.period_uncertainty < 6e-6 / np.sqrt(intervals)
+    assert found.segments >= int(470e-6 / period) - 1
+    # A Gaussian of 1 us takes its standard deviation times the mean slope of both sides, over
+    # sqrt(2 pi) each, off the tip of a saw; of a sine 1 - exp(-(2 pi 1 us / period)^2 / 2).
+    slopes = 100e-6 / period * (1 / 0.2 + 1 / 0.8)
+    cut = slopes * 1e-6 / np.sqrt(2 * np.pi) if shape == "saw" else 2e-6
+    assert found.peak == pytest.approx(400e-6, abs=cut + 4e-6)
+    assert found.valley == pytest.approx(300e-6, abs=cut + 4e-6)
+    assert found.degree == pytest.approx(0.25, abs=2 * (cut + 4e-6) / 400e-6)
 
 
-def test_segments_too_unequal_for_the_autocorrelation_have_a_period():
-    # The cutting force of a cut with twice the fracture energy, cell 14 um, in N/mm every 6 us.
-    forces = [
-        282, 493, 549, 570, 596, 607, 619, 628, 642, 646, 649, 648, 621, 623, 604, 575, 550, 510,
-        486, 459, 460, 428, 476, 495, 500, 516, 534, 556, 557, 567, 584, 594, 603, 605, 597, 605,
-        596, 593, 581, 472, 497, 503, 502, 514, 527, 519, 529, 541, 546, 562, 545, 544, 527, 495,
-        441, 472, 495, 491, 516, 520, 536, 537, 543, 554, 558, 548, 549, 517, 478, 466, 507, 493,
-        521, 523, 549, 554, 558, 551,
-    ]  # fmt: skip
-    time = np.arange(0.0, 463e-6, 1e-6)
-    force = np.interp(time, 6e-6 * np.arange(len(forces)), forces) * 1e3
-    found = segmentation(time, force, force)
-    assert np.isnan(found.correlation_period)
+def test_the_degree_is_the_mean_of_the_segments_with_its_uncertainty():
+    time = np.arange(0.0, 400e-6, 1e-6)
+    heights = [0, 400, 300, 400, 200, 400, 300, 400, 0]
+    found = segmentation(time, np.interp(time, np.arange(9) * 50e-6, heights) * 1e-6, 20e-6)
+    # Degrees of 1/4, 1/2 and 1/4; the Gaussian takes up to 3 um off tips, of slopes of 4 um/us.
     assert found.segments == 3
-    # Plateaus of some 20 us end at 214, 300 and 396 us.
-    assert found.period == pytest.approx((396 - 214) / 2 * 1e-6, abs=8e-6)
+    assert found.degree == pytest.approx(1 / 3, abs=0.03)
+    assert found.degree_uncertainty == pytest.approx(0.25 / np.sqrt(3) / np.sqrt(3), abs=0.01)
+    assert found.period == pytest.approx(100e-6, abs=2e-6)
 
 
-def test_noise_has_no_period():
-    time = np.arange(0.0, 470e-6, 2e-6)
-    found = 0
-    for seed in range(40):
-        noise = np.random.default_rng(seed).normal(0.0, 20e3, time.size)
-        found += np.isfinite(segmentation(time, 450e3 + noise, noise).period)
-    # Of white noise over so short a time some looks like a period.
-    assert found <= 4
+def test_a_relief_under_the_resolution_is_no_segment():
+    time = np.arange(0.0, 470e-6, 1e-6)
+    ripple = 350e-6 + 8e-6 * np.sin(2 * np.pi * time / 60e-6)
+    found = segmentation(time, ripple, 20e-6)
+    assert found.segments == 0 and np.isnan([found.period, found.degree_uncertainty]).all()
+    # What there is of a degree is stated: 16 um of 358 um.
+    assert found.degree == pytest.approx(16 / 358, abs=0.003)
+    assert segmentation(time, ripple, 10e-6).segments == 6
 
 
-def test_the_ripple_of_a_continuous_chip_is_no_segment():
-    time = np.arange(0.0, 470e-6, 2e-6)
-    ripple = np.sin(2 * np.pi * time / 60e-6)
-    assert np.isnan(segmentation(time, 700e3 + 25e3 * ripple, 300e3 + ripple).period)
-    assert segmentation(time, 700e3 + 60e3 * ripple, 300e3 + ripple).segments > 4
-
-
-def test_a_force_without_period_has_none():
-    time = np.arange(0.0, 400e-6, 0.5e-6)
-    steady = 600e3 * (1 - np.exp(-time / 30e-6))
-    found = segmentation(time, steady, steady)
-    assert np.isnan(found.period) and found.segments == 0
-    with pytest.raises(ValueError, match="even ascending steps"):
-        segmentation(time[::-1], steady, steady)
+def test_an_unknown_thickness_has_no_segments():
+    time = np.arange(0.0, 400e-6, 1e-6)
+    found = segmentation(time, np.full(time.size, np.nan), 20e-6)
+    assert found.segments == 0 and np.isnan([found.period, found.peak, found.degree]).all()
 
 
 # The study
@@ -518,7 +500,7 @@ def test_the_band_of_the_study_is_the_chips(study, chip):
     assert segment.band_width == pytest.approx(chip.band_width, rel=0.03)
     drift = chip.shear_angle_drift * CAMERA.integration_time * band.length / 2
     assert segment.sweep == pytest.approx(drift, abs=2e-6)
-    period = study.cut.forces.segmentation.period
+    period = study.cut.forces.history.segmentation.period
     assert period == pytest.approx(chip.segment_period, rel=0.02)
 
 

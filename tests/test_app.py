@@ -55,7 +55,7 @@ def seen_by_the_library(study, start):
 
 STATES = [
     {},
-    {"start": "440 us", "camera.pitch": "5 um", "camera.offset_right": "2 um"},
+    {"start": "394 us", "camera.pitch": "5 um", "camera.offset_right": "2 um"},
     {"camera.band.0": "3.5", "camera.integration_time": "7 us", "camera.reflected": "60 degC"},
     {
         "camera.psf": "gaussian",
@@ -200,7 +200,7 @@ def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
         ({"seed": "-1"}, "Seed: Camera.seed: -1, expected 0 or more"),
         (
             {"camera.integration_time": "90"},
-            "Exposure: exposure: 0.000443 s to 0.000533 s is not",
+            "Exposure: exposure: 0.000397 s to 0.000487 s is not",
         ),
         ({"camera.pitch": "6 mm"}, "Pixel pitch: camera: pitch of 0.006 m"),
         ({"camera.lower_limit": "9999"}, "Lower range limit: lower_limit: 9999 degC"),
@@ -219,7 +219,7 @@ def test_a_refused_value_is_one_clear_error(model, texts, said):
 
 def test_a_link_brings_the_state_back(model):
     texts = {
-        "start": "441.5 us",
+        "start": "395.5 us",
         "camera.psf": "none",
         "camera.lower_limit": "none",
         "band_line": "-310,90;-250,200",
@@ -227,7 +227,7 @@ def test_a_link_brings_the_state_back(model):
     state = model.controls.changed(model.controls.initial, texts)
     restored = model.controls.changed(model.controls.initial, state.texts)
     assert restored == state and restored.study == state.study
-    assert state.texts.keys() == texts.keys() and state.start == 441.5e-6
+    assert state.texts.keys() == texts.keys() and state.start == 395.5e-6
     rows = [model.controls.row(path) for path in texts]
     back = {row.path: row.shown(model.controls.value(row, restored)) for row in rows}
     assert model.controls.changed(model.controls.initial, back) == state

@@ -247,18 +247,18 @@ def test_a_line_and_the_cursor_are_dragged(page, model):
 
 
 def test_downloads_hold_what_is_shown(visit, tmp_path, model):
-    page = visit("&camera.pitch=5+um&start=440+us")
+    page = visit("&camera.pitch=5+um&start=394+us")
     with page.expect_download() as started:
         page.get_by_role("button", name="study.yaml").click()
     file = tmp_path / "study.yaml"
     started.value.save_as(file)
     study = load_study(file)
     assert study.camera.pitch == 5e-6
-    assert "--start '440 us'" in file.read_text(encoding="utf-8").splitlines()[1]
+    assert "--start '394 us'" in file.read_text(encoding="utf-8").splitlines()[1]
     fitted = fit(study, open_scene(study.scene))
     (surface,) = fitted.surfaces.values()
     camera = study.camera.on(fitted.scene.raster, study.seed)
-    measured = camera.measure(fitted.scene, surface, 440e-6)
+    measured = camera.measure(fitted.scene, surface, 394e-6)
     with page.expect_download() as started:
         page.get_by_role("button", name="NetCDF").click()
     saved = tmp_path / "measurement.nc"

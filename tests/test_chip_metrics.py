@@ -8,6 +8,7 @@ from serrated_chip import SerratedChip
 
 from chipglow.laboratory.chip import chip_metrics
 from chipglow.scene import Material, Raster, Scene
+from chipglow.scene.scene import FORCE_UNITS
 
 CHIP = SerratedChip()
 # Surfaces lie between samples' centres, and lines oblique cut their squares.
@@ -20,10 +21,11 @@ def metrics():
 
 
 def test_thickness_and_segments(metrics):
-    assert metrics.segments == 2
-    # Over the frames' distance of 2.4 µs the back moves 12 µm at most and the sawtooth's steeper
-    # side 12 µm x 80 µm / 82 µm: an extreme is missed by half of that.
-    missed = 6e-6
+    # The history counts from when the force first exceeds its median after 120 µs: seven peaks.
+    assert metrics.segments == 6
+    # A Gaussian of 1 µs takes 1 µs / sqrt(2 pi) times the slopes of both sides off a tip: 80 µm in
+    # 50 and in 22 µs, at most 1.3 times as fast.
+    missed = 1e-6 / np.sqrt(2 * np.pi) * 1.3 * (80e-6 / 50e-6 + 80e-6 / 22e-6)
     assert metrics.peak == pytest.approx(CHIP.peak, abs=missed + SAMPLE)
     assert metrics.valley == pytest.approx(CHIP.valley, abs=missed + SAMPLE)
     assert metrics.peak_standard_deviation < missed
@@ -37,7 +39,7 @@ def test_thickness_and_segments(metrics):
 
 
 def test_period_spacing_and_speeds(metrics):
-    # The forces are smooth, so their peaks are at most a step of 0.5 µs off.
+    # A peak is off by less than the 1 µs that are smoothed over; six periods share both ends.
     assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
     assert metrics.frequency == pytest.approx(1 / CHIP.period, rel=0.005)
     assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
@@ -108,26 +110,35 @@ def test_what_the_view_cuts_is_unknown():
     """No free surface of the chip in a view that ends 200 µm before the edge, under its peaks."""
     narrow = Raster(left=-200e-6, top=300e-6, spacing=2e-6, rows=168, columns=142)
     metrics = chip_metrics(replace(CHIP, raster=narrow, frames=80).scene())
-    unknown = ("thickness", "peak", "valley", "degree", "ratio", "chip_speed", "chip_spacing")
+    unknown = ("thickness", "ratio", "chip_speed", "chip_spacing")
     assert all(np.isnan(getattr(metrics, name)) for name in unknown)
     assert np.isnan(metrics.scan.height)
-    assert metrics.segments == 0
     assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
+    bare = chip_metrics(without_history(replace(CHIP, raster=narrow, frames=80).scene()))
+    assert np.isnan([bare.peak, bare.valley, bare.degree, bare.period]).all()
+    assert bare.segments == 0
 
 
 def test_less_than_a_period_gives_no_thickness_and_contact_beyond_the_view_is_unknown():
     metrics = chip_metrics(replace(CHIP, frames=40, contact=1e-3).scene())
-    assert np.isnan([metrics.thickness, metrics.peak, metrics.valley, metrics.contact]).all()
+    assert np.isnan([metrics.thickness, metrics.contact]).all()
     assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
 
 
-def test_without_forces_the_scene_counts_as_one_segment():
-    scene = replace(CHIP, frames=72).scene()
-    bare = Scene(scene.data.drop_vars(["cutting_force", "thrust_force", "force_time"]))
-    metrics = chip_metrics(bare)
-    assert metrics.segments == 1
+def without_history(scene):
+    return Scene(scene.data.drop_vars([*FORCE_UNITS, "force_time"]))
+
+
+def test_without_a_history_the_frames_show_the_segments():
+    metrics = chip_metrics(without_history(replace(CHIP, frames=72).scene()))
+    assert metrics.segments == 0
     assert np.isnan([metrics.period, metrics.spacing, metrics.cutting_mean]).all()
     assert metrics.thickness == pytest.approx(CHIP.thickness, abs=SAMPLE)
+    assert metrics.degree == pytest.approx(1 - CHIP.valley / CHIP.peak, abs=0.05)
+    longer = chip_metrics(without_history(replace(CHIP, frames=220).scene()))
+    assert longer.segments == 2
+    # Frames every 3.5 µs; each end of two periods is off by half of that at most.
+    assert longer.period == pytest.approx(CHIP.period, abs=3.5e-6 / 2)
 
 
 def test_a_chip_that_is_not_segmented_has_degree_nought():

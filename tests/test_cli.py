@@ -157,7 +157,7 @@ def test_run_writes_a_report_and_prints_the_comparison(finished):
     assert "results/report.html" in result.output
     for heading in ("quantity", "the paper", "this study", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
-    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
+    assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
     assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
@@ -280,14 +280,14 @@ def test_cut_writes_the_scene_and_keeps_it_in_the_cache(folder, runs, tmp_path):
     assert result.exit_code == 0, result.output
     assert len(open_scene(folder / "scene.nc").times) == AnalyticChip().frames
     assert result.stdout == "scene.nc\n"
-    # The chip in closed form has no kinetic energy; the paper's momentum flux is 3.03 N/mm.
+    # The chip in closed form has no kinetic energy; the momentum flux is 0.45 % of √3 σ times feed.
     assert (
         "Scaled mass after the build-up: kinetic energy at most 0.00% of the work" in result.stderr
     )
-    assert "momentum flux 0.67% of the mean cutting force" in result.stderr
+    assert "momentum flux 0.83% of the mean cutting force" in result.stderr
     # The paper's edge of 20 um is known, and too small for the default cell.
     assert result.stderr.count("Warning") == 1
-    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
+    assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
     listed = chipglow("cache", "list").output
     assert re.search(r"\d MB  scene-[0-9a-f]{32}\.nc", listed)
     assert re.search(r"1 scenes, \d+\.\d MB in ", listed)

@@ -111,9 +111,9 @@ def test_adiabatic_shear_follows_the_flow_stress():
     of_it = 0.852288
     material = replace(AISI_1045, density=DENSITY, taylor_quinney=fraction)
     # So heavy that nothing slows it: the shear stays as it was set.
-    block = Block((60e-6, 60e-6), material=material, mass=1e9, time_step=1e-3 / rate)
+    block = Block((60e-6, 60e-6), material=material, mass=1e9, time_step=5e-4 / rate)
     block.set_velocity(lambda x, y: rate * y + 0 * x, lambda x, y: 0 * x * y)
-    block.advance(1000)
+    block.advance(2000)
     equivalent_rate = rate / sqrt(3)
     law = AISI_1045.flow_stress.numbers()
     harm = Damage.of(AISI_1045.damage, AISI_1045.failing_layer(block.cell))
@@ -135,10 +135,11 @@ def test_adiabatic_shear_follows_the_flow_stress():
     assert here["strain"].mean() == pytest.approx(end, rel=1e-3)
     solution = solve_ivp(change, (0.0, end), [293.0, 0.0], rtol=1e-8, max_step=0.01)
     temperature, damage = solution.y[:, -1]
-    # The heat capacity is taken at whole kelvins, and strain is added in steps of 6e-4.
+    # The heat capacity is taken at whole kelvins, and strain is added in steps of 3e-4.
     assert here["temperature"].mean() - 293.0 == pytest.approx(temperature - 293.0, rel=2e-3)
     assert damage > 1.1
-    assert here["damage"].mean() == pytest.approx(damage, rel=2e-3)
+    # The step in which the damage reaches 1 counts whole: 2.9e-4 over a strain to failure of 0.09.
+    assert here["damage"].mean() == pytest.approx(damage, abs=2e-3 * damage + 2.9e-4 / 0.09)
     flowing = weakening(damage, harm) * flow_stress(end, equivalent_rate, temperature, law)
     assert stress_now == pytest.approx(flowing, rel=2e-3)
 

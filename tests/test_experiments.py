@@ -142,7 +142,9 @@ def test_drift_is_the_change_of_the_mean_from_half_to_half():
     # Forty records do not count; the halves of what is left have means of 340 and 374 kN/m.
     cutting = np.repeat([100e3, 340e3, 374e3], [40, 30, 30])
     none = EnergyHistory(*np.zeros((ENERGIES, 100)))
-    history = ForceHistory(time, cutting, np.full(100, 1e5), none)
+    history = ForceHistory(
+        time, cutting, np.full(100, 1e5), np.full(100, 4e-4), none, overview=None
+    )
     assert experiments.drift(history) == pytest.approx(0.1, rel=1e-12)
 
 

@@ -34,7 +34,7 @@ def test_the_steel_is_drawn_and_differs_in_its_damage_only():
     drawn = AISI_1045.drawn(np.random.default_rng(1))
     assert drawn.damage != AISI_1045.damage
     assert replace(drawn, damage=AISI_1045.damage) == AISI_1045
-    assert drawn.damage.d3 == AISI_1045.damage.d3
+    assert drawn.damage.d4 == AISI_1045.damage.d4
 
 
 def test_a_material_whose_damage_was_not_fitted_is_not_drawn():
@@ -46,7 +46,7 @@ def test_a_material_whose_damage_was_not_fitted_is_not_drawn():
     ("old", "new", "expected"),
     [
         ("numbers: [d1,", "numbers: [onset,", "fitted_damage: numbers: 'onset', expected one of"),
-        ("numbers: [d1, d2,", "numbers: [d1,", "expected 3 rows of 3 numbers"),
+        ("numbers: [d1, d2,", "numbers: [d1,", "expected 4 rows of 4 numbers"),
         ("numbers: [d1,", "numbers: [1,", "fitted_damage.numbers.0: 1, expected a valid string"),
     ],
 )

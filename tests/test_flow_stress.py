@@ -13,7 +13,7 @@ import pytest
 import yaml
 from hypothesis import given, strategies as st
 from numba import njit
-from solver import Block
+from solver import STEEL as AISI_1045_JC, Block
 
 from chipglow.cutting import (
     AISI_1045,
@@ -31,12 +31,12 @@ from chipglow.cutting.lanes import exponential, logarithm
 from chipglow.quantities import Parameter
 from chipglow.quantities.units import STRESS
 
-STEEL = AISI_1045.flow_stress
+STEEL = AISI_1045_JC.flow_stress
 TITANIUM = HyperbolicTangent(
     724.7e6, 683.1e6, 0.47, 0.035, 1.0, 1878.0, 298.0, 1.0, hardening_limit=2.0,
     recovery_temperature=5.0, recovery_strain=2.0, softening_temperature=1.0, sharpness=0.05,
 )  # fmt: skip
-CUBIC = ZerilliArmstrong(150e6, 1500e6, 0.006, 0.0002, 700e6, 0.2, 1.0)
+CUBIC = ZerilliArmstrong(150e6, 1500e6, 0.006, 0.0002, 700e6, 0.2, 1.0, 2e3)
 
 
 @njit
@@ -236,6 +236,8 @@ def test_zerilli_armstrong_by_hand():
     assert law.at(0.25, 1e4, 500.0) == pytest.approx(656.188e6, rel=1e-6)
     # Hot and slow what is left is 100 + 350 MPa, and exp(-15) of 1000 MPa.
     assert law.at(0.25, 1.0, 3000.0) == pytest.approx(450.000306e6, rel=1e-8)
+    # A drag of 2 kPa s in shear adds 3 x 2e3 x 1e4 Pa.
+    assert replace(law, drag=2e3).at(0.25, 1e4, 500.0) == pytest.approx(716.188e6, rel=1e-6)
 
 
 def test_the_rate_does_not_matter_below_the_reference():
@@ -282,9 +284,9 @@ def test_softening_takes_the_fracture_energy_whatever_the_cell(cell, loss):
 def test_nothing_softens_before_the_strain_to_failure():
     harm = AISI_1045.damage
     law = Damage.of(harm, 10e-6)
-    # At room temperature, the reference rate and no mean stress: D1 + D2 = 0.337.
+    # At room temperature, the reference rate and no mean stress the strain to failure is D1 + D2.
     assert harm is not None
-    half = damage_growth(0.0, 0.337 / 2, 1.0, 0.0, 1e9, 293.0, law)
+    half = damage_growth(0.0, (harm.d1 + harm.d2) / 2, 1.0, 0.0, 1e9, 293.0, law)
     assert half == pytest.approx(0.5, rel=1e-12)
     assert weakening(half, law) == weakening(1.0, law) == 1.0
     assert weakening(1.5, law) == pytest.approx(1 - harm.loss / 2, rel=1e-12)

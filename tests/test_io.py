@@ -68,7 +68,7 @@ def a_file(folder, count=3, name="scene.nc", **options):
     with SceneWriter(path, RASTER, ToolGeometry(), {"study": "one"}, **options) as writer:
         for index in range(count):
             writer.append(a_frame(index * 0.2e-6, seed=index))
-        writer.forces([0.0, 1e-6], [4.0e5, 4.5e5], [1.5e5, 2.0e5])
+        writer.forces([0.0, 1e-6], [4.0e5, 4.5e5], [1.5e5, 2.0e5], [3e-4, np.nan])
     return path
 
 

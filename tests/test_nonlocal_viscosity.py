@@ -5,7 +5,7 @@ from math import exp, pi
 
 import numpy as np
 import pytest
-from solver import UNBROKEN, Block
+from solver import STEEL, UNBROKEN, Block
 
 from chipglow.cutting import AISI_1045, MaterialError, NonlocalViscosity, stress
 from chipglow.cutting.damage import Damage
@@ -114,7 +114,7 @@ def test_weak_places_flow_as_much_faster_as_the_mean_allows(cell):
     """
     viscosity, weak, wave, rate = 3e3, 10e6, 2 * pi / 160e-6, 1.5e4
     law = replace(
-        AISI_1045.flow_stress, yield_stress=600e6, hardening=0.0, rate_sensitivity=0.0
+        STEEL.flow_stress, yield_stress=600e6, hardening=0.0, rate_sensitivity=0.0
     ).numbers()
     block = Block((640e-6, 4 * cell), cell=cell, material=UNBROKEN)
     points = block.points

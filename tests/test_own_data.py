@@ -26,7 +26,7 @@ def test_a_scene(tmp_path, kind):
 def test_an_upload(tmp_path, kind):
     path = a_file(tmp_path)
     point_elsewhere(path, "plastic_strain", kind)
-    with pytest.raises(SourceError, match=r"mine\.nc: .*'plastic_strain' is in another file"):
+    with pytest.raises(ValueError, match=r"mine\.nc: .*'plastic_strain' is in another file"):
         open_uploaded(path, "mine.nc")
 
 

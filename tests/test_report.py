@@ -410,11 +410,13 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_pa
     assert names == FIGURES - {"figure-2-psf", "forces"}
     assert "failed" not in Page((tmp_path / "report.html").read_text(encoding="utf-8")).text
     assert "segment_period_us" not in {row.key for row in result_rows(bare)}
-    segmentation = replace(result.cut.forces.segmentation, period=float("nan"))
-    unknown = of_cut(result, forces=replace(result.cut.forces, segmentation=segmentation))
+    forces = result.cut.forces
+    segmentation = replace(forces.history.segmentation, period=float("nan"))
+    history = replace(forces.history, segmentation=segmentation)
+    unknown = of_cut(result, forces=replace(forces, history=history))
     row = next(r for r in result_rows(unknown) if r.key == "segment_period_us")
     assert row.here is None and row.cells["mean"] == "–"
-    assert "no period" in row.explanation
+    assert "there is no period" in row.explanation
 
 
 def test_a_part_that_fails_is_shown_beside_the_others(result, undrawn, tmp_path):

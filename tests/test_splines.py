@@ -74,7 +74,7 @@ def a_file(path, count=6, **options):
     with SceneWriter(path, RASTER, ToolGeometry(), lattice=a_lattice(), **options) as writer:
         for index in range(count):
             writer.append(a_spline_frame(index, index * STEP).frame())
-        writer.forces([0.0, 1e-6], [4e5, 4.5e5], [1.5e5, 2e5])
+        writer.forces([0.0, 1e-6], [4e5, 4.5e5], [1.5e5, 2e5], [3e-4, np.nan])
     return path
 
 

@@ -2,8 +2,8 @@
 
     python docs/pictures/example_scene.py
 
-A part of the quick study's cut: every second frame of the time in which its first shear band
-develops. It is cut anew where it is not in the cache.
+A part of the quick study's cut: every second frame from the time at which its first shear band is
+developed, and the whole chip at the end. It is cut anew where it is not in the cache.
 """
 
 import json
@@ -14,7 +14,7 @@ from chipglow.io import SceneWriter, open_scene
 from chipglow.study import Study, cut
 
 FILE = Path(__file__).parents[2] / "src/chipglow/io/example-scene.nc"
-FIRST, LAST = 425.9e-6, 470e-6  # s
+FIRST, LAST = 379e-6, 423e-6  # s
 STEP = 2
 ORIGIN = (
     "chipglow: every second frame of a part of the quick study (chipglow reproduce --quick), the "
@@ -36,6 +36,7 @@ def write(scene, path):
     with SceneWriter(path, scene.raster, scene.tool, attributes, lattice=scene.lattice) as writer:
         for index in indices:
             writer.append(scene.frame(index))
+        writer.overview(scene.overview.frame(0), scene.overview.raster)
 
 
 if __name__ == "__main__":

@@ -13,17 +13,18 @@ from chipglow.analysis.places import TOUCHING
 from chipglow.cutting import EnergyHistory
 from chipglow.laboratory.chip import (
     ChipMetrics,
+    CutHistory,
     Inertia,
     Instant,
     NoContactError,
     NoShearBandError,
     Segment,
-    Segmentation,
     ShearBand,
+    cut_history,
     inertia,
-    segmentation,
 )
 from chipglow.scene import ENERGY_UNITS, Frame, Scene
+from chipglow.scene.scene import FORCE_UNITS
 
 Progress: TypeAlias = Callable[[str, float], None]
 """Told what is being done and which fraction of it, 0 to 1, is done."""
@@ -44,12 +45,13 @@ _NEEDED: Final = {
 
 @dataclass(frozen=True, eq=False)
 class CuttingForces:
-    """Forces per width of cut in N/m over time in s, shape (n,), and their segments."""
+    """Forces per width of cut in N/m over time in s, shape (n,), and the segments with them."""
 
     time: NDArray[np.float64]
     cutting: NDArray[np.float64]
     thrust: NDArray[np.float64]
-    segmentation: Segmentation
+    thickness: NDArray[np.float64]  # of the chip in m
+    history: CutHistory
     unaccounted: float  # part of the drive's work, NaN without an energy account
     inertia: Inertia
 
@@ -66,6 +68,7 @@ class Cut:
     chip: ChipMetrics | None = None
     forces: CuttingForces | None = None
     heated: tuple[HeatedObject, ...] = ()
+    overview: Scene | None = None
 
     @property
     def one_segment(self) -> tuple[Instant, ...]:
@@ -127,16 +130,14 @@ def find_cut(scene: Scene, duration: float, exposures: int, tell: Progress) -> C
 
 def cutting_forces(scene: Scene) -> CuttingForces | None:
     """Return the forces of a cut and their segments, if the scene has them."""
-    if "cutting_force" not in scene.data:
+    history, inert = cut_history(scene), inertia(scene)
+    if history is None or inert is None:
         return None
-    time, cutting, thrust = (
+    time, cutting, thrust, thickness = (
         np.asarray(scene.data[name].values, dtype=np.float64)
-        for name in ("force_time", "cutting_force", "thrust_force")
+        for name in ("force_time", *FORCE_UNITS)
     )
-    inert = inertia(scene)
-    assert inert is not None
-    segments = segmentation(time, cutting, thrust)
-    return CuttingForces(time, cutting, thrust, segments, _unaccounted(scene), inert)
+    return CuttingForces(time, cutting, thrust, thickness, history, _unaccounted(scene), inert)
 
 
 def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:

@@ -184,17 +184,17 @@ class Numerics(Part):
     cell: Annotated[
         float,
         Parameter(
-            "Side of a cell of the grid; half of it takes eight times long.",
+            "Side of a cell of the grid; halving it takes eight times as long.",
             LENGTH,
             least=0.5e-6,
             most=43.75e-6,
         ),
-    ] = 10e-6
+    ] = 20e-6
     mass_scaling: Annotated[
         float | None,
         Parameter(
             "Factor on the density in the equation of motion, for longer time steps; none: by the "
-            "speed, so that the scaled mass makes less than 0.5 % of the cutting force.",
+            "speed, so that the scaled mass makes about 0.5 % of the cutting force.",
             least=1.0,
             most=1e4,
         ),

@@ -1,6 +1,6 @@
 """The flow-stress laws that come with chipglow."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -9,7 +9,9 @@ from numba import njit
 from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
 from chipglow.cutting.lanes import INLINE, exponential, logarithm
 from chipglow.quantities import Parameter
-from chipglow.quantities.units import KELVINS, PER_KELVIN, STRAIN_RATE, STRESS
+from chipglow.quantities.units import KELVINS, PER_KELVIN, STRAIN_RATE, STRESS, VISCOSITY
+
+_DRAG = replace(VISCOSITY, positive=False)  # may be 0
 
 MELTING_LIMIT = 3000.0
 """No metal that is cut melts above, in K."""
@@ -145,7 +147,9 @@ def _zerilli_armstrong(strain, rate, temperature, law):  # type: ignore[no-untyp
     hardened = law.hardening * exponential(n * logarithm(held))
     faster = by_rate * logarithm(rate / law.reference_rate)
     thermal = law.thermal_stress * exponential(faster - law.thermal_softening * temperature)
-    return law.athermal_stress + thermal + hardened, hardened * n / held, thermal * by_rate
+    drag = 3.0 * law.drag * rate
+    stress = law.athermal_stress + thermal + hardened + drag
+    return stress, hardened * n / held, thermal * by_rate + drag
 
 
 @FLOW_LAWS.part
@@ -153,9 +157,10 @@ def _zerilli_armstrong(strain, rate, temperature, law):  # type: ignore[no-untyp
 class ZerilliArmstrong(FlowStress):
     """Flow stress of Zerilli and Armstrong (1987), J. Appl. Phys. 61, 1816, for bcc metals.
 
-    σ = C₀ + C₁ exp(−C₃ T + C₄ T ln(ε̇/ε̇₀)) + C₅ εⁿ, T in K: strength falls exponentially with
-    temperature to what hardening and C₀ leave, and does not know a melting point. (Equation as
-    widely cited; the paper was not seen.)
+    σ = C₀ + C₁ exp(−C₃ T + C₄ T ln(ε̇/ε̇₀)) + C₅ εⁿ + 3 η ε̇, T in K: strength falls exponentially
+    with temperature to what hardening and C₀ leave; there is no melting point. The drag of shear η
+    is an addition for rates above 10⁴ 1/s (Campbell and Ferguson 1970, Philos. Mag. 21, 63).
+    (Equations as widely cited; neither paper was seen.)
     """
 
     kind: ClassVar[str] = "zerilli-armstrong"
@@ -166,6 +171,7 @@ class ZerilliArmstrong(FlowStress):
     hardening: Annotated[float, Parameter("C₅.", STRESS, least=0.0)]
     hardening_exponent: Annotated[float, Parameter("n.", over=0.0)]
     reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)] = 1.0
+    drag: Annotated[float, Parameter("η, of shear.", _DRAG, least=0.0)] = 0.0
 
     stress_and_slopes = staticmethod(_zerilli_armstrong)
 

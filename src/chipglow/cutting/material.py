@@ -180,8 +180,9 @@ class WorkpieceMaterial(Part):
 
     @property
     def melting_temperature(self) -> float:
-        """Of the flow-stress law in K; the end of the tables for a law that has none."""
-        return float(getattr(self.flow_stress, "melting_temperature", TABLE_HOTTEST))
+        """Of the flow-stress law in K, or else of the damage, or else the end of the tables."""
+        of_damage = getattr(self.damage, "melting_temperature", TABLE_HOTTEST)
+        return float(getattr(self.flow_stress, "melting_temperature", of_damage))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from math import ceil, inf, sqrt
+from math import ceil, inf, nan, sqrt
 from typing import Final
 
 import numpy as np
@@ -80,10 +80,18 @@ from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
 
-SOLVER_VERSION: Final = "11"
+SOLVER_VERSION: Final = "12"
 """Changes whenever the same input gives another result."""
 
+SCAN_FEEDS: Final = 1.5
+"""Height of the line on which the chip's thickness is read, in feeds up the rake face.
+
+The line is at right angles to the rake face, over the uncut surface and most often in contact.
+"""
+
 _MARGIN: Final = 4
+_GAP: Final = 5.0
+"""Spacings of points without a point that part the chip from other material."""
 _CONTACT_STIFFNESS: Final = 50e9
 _CONTACT_DAMPING: Final = 0.2
 _KEPT: Final = 1.0
@@ -118,7 +126,11 @@ class ForceHistory:
     cutting: NDArray[np.float64]
     thrust: NDArray[np.float64]
     """Against the motion of the workpiece, and away from the tool into it, in N/m, shape (n,)."""
+    thickness: NDArray[np.float64]
+    """Thickness of the chip in m at the ends of the intervals, shape (n,); see `SCAN_FEEDS`."""
     energy: EnergyHistory
+    overview: Frame
+    """The whole computed region at the end, on `CuttingSimulation.overview_raster`."""
 
 
 @dataclass(frozen=True)
@@ -184,9 +196,10 @@ class CuttingSimulation:
         if isinstance(self.tool_temperature, ToolBody) and resume is None:
             state.warm(self.steady_tool(), self.tool_temperature)
         picture = state.picture(raster)
+        whole = state.picture(self.overview_raster)
         coarse = state.picture(preview.raster) if preview is not None else None
         last = recorder.last
-        records = np.empty((last, 2 + ENERGIES))
+        records = np.empty((last, 3 + ENERGIES))
         done = restore(state, resume, records) if resume is not None else 0
         recorder.replay(records[:done, 0])
         for record in range(done + 1, last + 1):
@@ -195,14 +208,20 @@ class CuttingSimulation:
                 on_frame(state.frame(picture))
             if preview is not None and coarse is not None and preview.shows(record, last):
                 preview.on_frame(state.frame(coarse))
+            if record == last:
+                overview = state.frame(whole)
+                break
             state.mark()
             if on_checkpoint is not None:
                 on_checkpoint(capture(state, records[:record], record / last))
             if on_progress is not None:
                 on_progress(record / last)
+        if on_progress is not None:
+            on_progress(1.0)
         time = window.interval * np.arange(1, last + 1, dtype=np.float64)
-        cutting, thrust, *energies = records.T.copy()
-        return ForceHistory(time, cutting, thrust, EnergyHistory(*energies))
+        cutting, thrust, thickness, *energies = records.T.copy()
+        energy = EnergyHistory(*energies)
+        return ForceHistory(time, cutting, thrust, thickness, energy, overview)
 
     @property
     def momentum_flow(self) -> float:
@@ -305,6 +324,14 @@ class CuttingSimulation:
                 f"with an interval of {window.interval * 1e6:g} us"
             )
         return recorder
+
+    @property
+    def overview_raster(self) -> Raster:
+        """Samples of a quarter of a cell over the computed region."""
+        grid = _grid(self.numerics)
+        left, top = grid.left + 4 * grid.cell, grid.bottom + (grid.rows - 7) * grid.cell
+        rows, columns = (4 * (count - 11) for count in (grid.rows, grid.columns))
+        return Raster(left, top, grid.cell / 4, rows, columns)
 
     def lattice(self, raster: Raster) -> Lattice:
         """Return the nodes whose splines the frames are; the raster must be simulated."""
@@ -493,7 +520,7 @@ class _State:
 
     @np.errstate(invalid="ignore", over="ignore")  # `find_trouble` finds what is not finite
     def advance(self) -> NDArray[np.float64]:
-        """Advance by one interval; return mean forces in N/m, and the energies."""
+        """Advance by one interval; return mean forces in N/m, thickness in m, and the energies."""
         sums, threads = np.zeros_like(self.work), get_num_threads()
         for _ in range(self.cycles):
             before = self._held().sum()
@@ -516,7 +543,13 @@ class _State:
         held = self._held() - self.held_at_start
         used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS, EXPANSION_WORK, MODULI_LOSS]]
         return np.concatenate(
-            [forces, [drive, self.work[CONTACT_WORK]], held, used, [self.lost_heat]]
+            [
+                forces,
+                [self.thickness(), drive, self.work[CONTACT_WORK]],
+                held,
+                used,
+                [self.lost_heat],
+            ]
         )
 
     def choose_steps(self, allowed: float = inf) -> None:
@@ -581,6 +614,21 @@ class _State:
             "material_y": points["material_y"],
         }
         return picture.frame(self.time, points, values, self.tool_temperature)
+
+    def thickness(self) -> float:
+        """Return the thickness of the chip in m on the scan line; NaN without a chip there."""
+        points, tool = self.points[: self.count], self.simulation.tool
+        foot = tool.rake_point(SCAN_FEEDS * self.simulation.conditions.feed)
+        x, y = points["x"] - foot[0], points["y"] - foot[1]
+        (along_x, along_y), (normal_x, normal_y) = tool.rake_direction, tool.rake_normal
+        near = np.abs(x * along_x + y * along_y) < 2.0 * self.spacing
+        distance = np.sort(x[near] * normal_x + y[near] * normal_y)
+        if distance.size == 0:
+            return nan
+        # The chip is the longest stretch of material: it may have lifted off the face.
+        ends = np.flatnonzero(np.diff(distance) > _GAP * self.spacing)
+        first, last = np.append(0, ends + 1), np.append(ends, distance.size - 1)
+        return float((distance[last] - distance[first]).max() + self.spacing)
 
     def mark(self) -> None:
         """Start a new interval of the strain rate."""

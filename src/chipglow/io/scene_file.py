@@ -35,11 +35,11 @@ from chipglow.scene import (
     SceneError,
     Tool,
 )
-from chipglow.scene.scene import FORCE_UNITS, check_frame, raster_coordinates
+from chipglow.scene.scene import FORCE_UNITS, OVERVIEW_FIELDS, check_frame, raster_coordinates
 from chipglow.scene.splines import Lattice, SplineFrame
 from chipglow.scene.tool_outline import tool_attributes
 
-SCENE_FORMAT: Final = 5
+SCENE_FORMAT: Final = 6
 """Changes when the same scene is written to a file in another way."""
 
 _LONG_NAMES: Final[Mapping[str, str]] = {
@@ -54,6 +54,7 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "quality": "0 to 254: distance from the colour scale in CIE L*a*b*; 255: filled",
     "cutting_force": "cutting force per width of cut",
     "thrust_force": "thrust force per width of cut",
+    "chip_thickness": "thickness of the chip on a line normal to the rake face",
     "drive_work": "work of the drive since the start",
     "contact_work": "work of the tool's normal force since the start",
     "kinetic_energy": "change of the kinetic energy, of the scaled mass",
@@ -103,6 +104,7 @@ class SceneWriter:
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         self._units = {name: units[name] for name in self.fields}
         self._forces: dict[str, tuple[str, NDArray[np.float64]]] = {}
+        self._overview: tuple[Frame, Raster] | None = None
         self._stack = ExitStack()
 
     def __enter__(self) -> "SceneWriter":
@@ -142,15 +144,21 @@ class SceneWriter:
         times: ArrayLike,
         cutting: ArrayLike,
         thrust: ArrayLike,
+        thickness: ArrayLike,
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
-        """Write the force history, and the energy balance with it."""
+        """Write the history of forces and chip thickness, and the energy balance with it."""
         units = {"force_time": "s", **FORCE_UNITS, **ENERGY_UNITS}
-        history = {"force_time": times, "cutting_force": cutting, "thrust_force": thrust}
-        history |= energies or {}
+        measured = dict(zip(FORCE_UNITS, (cutting, thrust, thickness), strict=True))
+        history = {"force_time": times, **measured, **(energies or {})}
         self._forces = {
             name: (units[name], np.asarray(values, np.float64)) for name, values in history.items()
         }
+
+    def overview(self, frame: Frame, raster: Raster) -> None:
+        """Write the whole chip at one time, with samples of its own."""
+        check_frame(frame)
+        self._overview = frame, raster
 
     def _kept(self, frame: Frame) -> list[NDArray[Any]]:
         """Return what the file keeps of a frame, in the order of the variables."""
@@ -210,12 +218,32 @@ class SceneWriter:
             spline_file.create(file, self.lattice)
         else:
             self._create_fields(file)
+        if self._overview is not None:
+            self._create_overview(file, *self._overview)
         if self._forces:
             file.dimensions["force_time"] = self._forces["force_time"][1].size
         for name, (unit, values) in self._forces.items():
             variable = file.create_variable(name, ("force_time",), data=values, **COMPRESSION)
             long_name = _LONG_NAMES.get(name, "time of the force history")
             variable.attrs.update(units=unit, long_name=long_name)
+
+    def _create_overview(self, file: h5netcdf.File, frame: Frame, raster: Raster) -> None:
+        coordinates = raster_coordinates(raster, np.array([frame.time]))
+        for name in ("y", "x"):
+            dimension = f"overview_{name}"
+            file.dimensions[dimension] = coordinates[name][1].size
+            variable = file.create_variable(dimension, (dimension,), data=coordinates[name][1])
+            variable.attrs.update(coordinates[name][2])
+        time = file.create_variable("overview_time", (), data=np.float64(frame.time))
+        time.attrs.update(coordinates["time"][2])
+        for name in OVERVIEW_FIELDS:
+            variable = file.create_variable(
+                f"overview_{name}",
+                ("overview_y", "overview_x"),
+                data=getattr(frame, name),
+                **COMPRESSION,
+            )
+            variable.attrs.update(units=FIELD_UNITS[name], long_name=_LONG_NAMES[name])
 
     def _create_fields(self, file: h5netcdf.File) -> None:
         chunks = (1, *self.raster.shape)
@@ -390,12 +418,14 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
     ) as writer:
         for frame in scene.frames():
             writer.append(frame)
+        if scene.overview is not None:
+            writer.overview(scene.overview.frame(0), scene.overview.raster)
         if "cutting_force" in scene.data:
-            time, cutting, thrust = (
+            time, cutting, thrust, thickness = (
                 scene.data[name].values for name in ("force_time", *FORCE_UNITS)
             )
-            known = [name for name in ENERGY_UNITS if name in scene.data]
-            writer.forces(time, cutting, thrust, {name: scene.data[name].values for name in known})
+            known = {name: scene.data[name].values for name in ENERGY_UNITS if name in scene.data}
+            writer.forces(time, cutting, thrust, thickness, known)
 
 
 def _first_line(error: BaseException) -> str:

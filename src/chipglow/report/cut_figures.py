@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import Analysis, Cut, HeatedObject
 from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
 from chipglow.report.facts import Facts
-from chipglow.scene import Frame, Material, Raster
+from chipglow.scene import Frame, Material, Raster, Scene, Tool
 from chipglow.surface import Emissivity, Texture
 
 _COLOURS: Final = (BLUE, VERMILLION)
@@ -155,26 +156,56 @@ def band_curves(facts: Facts) -> Figure:
     return figure
 
 
+def chip(facts: Facts) -> Figure | None:
+    """Draw the whole chip at the end of the cut, with the view of the scene."""
+    overview, tool = _cut(facts).overview, facts.analysis.tool
+    return None if overview is None else draw_chip(overview, facts.analysis.raster, tool)
+
+
+def draw_chip(overview: Scene, view: Raster, tool: Tool | None) -> Figure:
+    """Return a figure of the whole chip with the border of a view."""
+    frame, raster = overview.frame(0), overview.raster
+    void, solid = frame.material == Material.VOID, frame.material == Material.WORKPIECE
+    celsius = np.where(void, np.nan, frame.temperature - KELVIN)
+    strain = np.where(solid, frame.needed("plastic_strain"), np.nan)
+    rate = np.where(solid, 1e-3 * frame.needed("plastic_strain_rate"), np.nan)
+    heat = (0.0, scales.round_limit(celsius, 99.9, 50.0))
+    panels = (
+        ImagePanel("temperature", "temperature / °C", celsius, heat, scales.HEAT),
+        ImagePanel("plastic strain", "plastic strain", strain, (0.0, 4.0)),
+        ImagePanel("strain rate", "strain rate / (10³ 1/s)", rate, (0.0, 60.0)),
+    )
+    figure = drawing.image_figure(raster, 2.2, rows=1)
+    factor, _ = drawing.length_unit(raster)
+    for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
+        panel.draw(figure, axes, raster, tool, "bottom")
+        drawing.draw_line(axes, view.border, GREEN, factor=factor)
+        axes.label_outer()
+    return figure
+
+
 def forces(facts: Facts) -> Figure | None:
     """Draw the force history with its segments."""
     history = _cut(facts).forces
     if history is None:
         return None
-    segments, time = history.segmentation, history.time * 1e6
+    means, time = history.history, history.time * 1e6
     figure = drawing.new_figure(3.3)
     axes = figure.subplots()
     axes.plot(time, history.cutting * 1e-3, color=BLUE, label="cutting force", linewidth=1.2)
     axes.plot(time, history.thrust * 1e-3, color=VERMILLION, label="thrust force", linewidth=1.2)
-    for i, peak in enumerate(segments.peaks * 1e6):
-        axes.axvline(peak, color=GREY, linewidth=0.8, linestyle=":", label="" if i else "segments")
-    axes.axvspan(time[0], segments.start * 1e6, color=scales.VOID, label="first build-up")
+    for i, peak in enumerate(means.segmentation.peaks * 1e6):
+        axes.axvline(
+            peak, color=GREY, linewidth=0.8, linestyle=":", label="" if i else "peaks of the chip"
+        )
+    axes.axvspan(time[0], means.start * 1e6, color=scales.VOID, label="first build-up")
     duration = facts.analysis.camera.integration_time
     for i, start in enumerate(facts.data.instant.values):
         ends = (start * 1e6, (start + duration) * 1e6)
         axes.axvspan(*ends, ymax=0.03, color=GREEN, label="" if i else "exposures")
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(0.0)
-    period = segments.period * 1e6
+    period = means.segmentation.period * 1e6
     axes.set_title(f"period {period:.0f} µs" if np.isfinite(period) else "no period")
     axes.set(xlabel="time / µs", ylabel="force per width / (N/mm)")
     figure.legend(loc="outside lower center", ncols=3)
@@ -198,7 +229,11 @@ def chip_thickness(facts: Facts) -> Figure | None:
     drawing.draw_line(left, cut.segments[0].moment.ridge.points, BLUE, "band")
     figure.legend(loc="outside lower center", ncols=2)
     left.set_title(f"a) at {frame.time * 1e6:.0f} µs")
-    right.plot(scan.time * 1e6, scan.thickness * 1e6, color=VERMILLION)
+    time, passed = scan.time, scan.thickness
+    if cut.forces is not None:
+        later = cut.forces.time >= cut.forces.history.start
+        time, passed = cut.forces.time[later], cut.forces.thickness[later]
+    right.plot(time * 1e6, passed * 1e6, color=VERMILLION)
     place: Any = {"xycoords": ("axes fraction", "data"), "va": "center"}
     levels = {"peak": cut.chip.peak, "mean": cut.chip.thickness, "valley": cut.chip.valley}
     for label, level in levels.items():

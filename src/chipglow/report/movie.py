@@ -29,7 +29,6 @@ _TOOL: Final = "#9ca3af"
 _FAR: Final = 3e-3
 
 _HOT: Final = 0.6
-_MELTING: Final = 1773.15
 _STRAIN: Final = 5.0
 _DECADES: Final = 3
 
@@ -46,8 +45,7 @@ class MovieScales:
     def of(cls, simulation: CuttingSimulation) -> "MovieScales":
         conditions = simulation.conditions
         start = conditions.initial_temperature
-        melting = getattr(simulation.workpiece.flow_stress, "melting_temperature", _MELTING)
-        hottest = start + _HOT * max(melting - start, 0.0)
+        hottest = start + _HOT * max(simulation.workpiece.melting_temperature - start, 0.0)
         top = 50.0 * ceil((hottest - scales.KELVIN) / 50.0 + 1e-9) + scales.KELVIN
         decade = floor(log10(0.1 * conditions.speed / conditions.feed) + 1e-9)
         return cls(

@@ -47,6 +47,7 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "psf": figures.point_spread,
     "heated-chips": cut_figures.heated_chips,
     "heated-tool": cut_figures.heated_tool,
+    "chip": cut_figures.chip,
     "scene": figures.scene,
     "measurement": figures.measurement,
     "rake-profiles": cut_figures.rake_profiles,

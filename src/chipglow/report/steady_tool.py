@@ -81,8 +81,8 @@ def _values(analysis: Analysis) -> Mapping[str, Spread]:
         **peaks,
         "rake_error_K": _error(analysis, "rake"),
         "band_error_K": _error(analysis, "band"),
-        "cutting_N_per_mm": (1e-3 * forces.segmentation.cutting_mean, nan) if forces else _UNKNOWN,
-        "thrust_N_per_mm": (1e-3 * forces.segmentation.thrust_mean, nan) if forces else _UNKNOWN,
+        "cutting_N_per_mm": (1e-3 * forces.history.cutting_mean, nan) if forces else _UNKNOWN,
+        "thrust_N_per_mm": (1e-3 * forces.history.thrust_mean, nan) if forces else _UNKNOWN,
     }
 
 

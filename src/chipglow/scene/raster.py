@@ -65,6 +65,13 @@ class Raster:
             self.top,
         )
 
+    @property
+    def border(self) -> NDArray[np.float64]:
+        """Corners of the outer edge in m, the first again at the end, shape (5, 2)."""
+        left, right, bottom, top = self.extent
+        corners = (left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)
+        return np.array(corners)
+
     def index(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return fractional row and column of points (..., 2) in m, shape (2, ...)."""
         places = np.asarray(points, dtype=np.float64)

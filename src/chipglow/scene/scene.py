@@ -30,8 +30,15 @@ if TYPE_CHECKING:
 
     from chipglow.scene.splines import SplineFrame
 
-FORCE_UNITS: Final[Mapping[str, str]] = {"cutting_force": "N/m", "thrust_force": "N/m"}
-"""Force history on `force_time`, per width of cut: optional, both or none."""
+OVERVIEW_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "material")
+"""Fields of `Scene.overview`."""
+
+FORCE_UNITS: Final[Mapping[str, str]] = {
+    "cutting_force": "N/m",
+    "thrust_force": "N/m",
+    "chip_thickness": "m",
+}
+"""History on `force_time`: forces per width of cut and the chip's thickness; all or none."""
 
 ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
     (
@@ -68,8 +75,8 @@ class Scene:
         ``units`` attribute each; coordinates ``time`` in s, ascending; ``x`` in m, ascending;
         ``y`` in m, descending. The velocity has both components or none.
         Further: ``material_x`` and ``material_y`` in m, where each point was before the cut;
-        ``quality``, see `QUALITY`; ``cutting_force`` and ``thrust_force`` in N/m over
-        ``force_time`` in s.
+        ``quality``, see `QUALITY`; ``cutting_force`` and ``thrust_force`` in N/m and
+        ``chip_thickness`` in m over ``force_time`` in s.
 
     Raises
     ------
@@ -206,6 +213,15 @@ class Scene:
     def tool(self) -> Tool | None:
         """The tool's outline, if the scene says it."""
         return stored_tool(self.data.attrs)
+
+    @property
+    def overview(self) -> "Scene | None":
+        """The whole chip at one time, of a cut that was computed by chipglow."""
+        if "overview_temperature" not in self.data:
+            return None
+        names = {name: f"overview_{name}" for name in ("time", "x", "y", *OVERVIEW_FIELDS)}
+        data = self.data[list(names.values())].rename({old: new for new, old in names.items()})
+        return Scene(data.set_coords("time").expand_dims("time"))
 
     def with_tool(self, tool: Tool) -> Self:
         """Return the scene with this tool's outline."""

@@ -11,7 +11,7 @@ from chipglow.study.schema import Study
 _POINT_STEPS: Final = 13e6
 """Points times steps that a thread of the solver does in a second: 13.5 to 14.5 million."""
 
-_SECONDS_A_SAMPLE: Final = 150e-9
+_SECONDS_A_SAMPLE: Final = 80e-9
 """Sampling, packing and writing a frame of the scene, for each of its samples."""
 
 _BYTES_A_NODE: Final = 18.0
@@ -20,10 +20,10 @@ _BYTES_A_NODE: Final = 18.0
 _NODES_BEYOND: Final = 6
 """Nodes beside those that lie among the samples, in either direction."""
 
-_ANALYSIS_SECONDS: Final = 210e-9
+_ANALYSIS_SECONDS: Final = 40e-9
 """Analysis, for each sample of each frame of each exposure that it reads."""
 
-_ALWAYS: Final = 45.0
+_ALWAYS: Final = 15.0
 """Seconds of any study: libraries, tables of the radiance, pictures."""
 
 _MEMORY, _MEMORY_A_SAMPLE = 0.3e9, 1100.0

@@ -265,7 +265,14 @@ def _compute(
                 keeper.keep,
                 preview_of(study, on_preview) if on_preview else None,
             )
-            writer.forces(history.time, history.cutting, history.thrust, vars(history.energy))
+            writer.overview(history.overview, simulation.overview_raster)
+            writer.forces(
+                history.time,
+                history.cutting,
+                history.thrust,
+                history.thickness,
+                vars(history.energy),
+            )
         except SolverError as error:
             raise SolverError("; ".join(filter(None, (str(error), keeper.note)))) from None
         except KeyboardInterrupt:

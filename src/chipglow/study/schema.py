@@ -93,7 +93,6 @@ class Study(Part):
         """Return the paper's study on a coarse cell and coarse samples."""
         title = "Quick look at the study of Heigel and Whitenton (2010)"
         cutting = {
-            "numerics.cell": "20 um",
             "window": {"interval": "0.5 us", "later_bands": 1},
             "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 440},
         }

@@ -38,8 +38,10 @@ from chipglow.laboratory.chip.segment import (
     contact_temperatures as contact_temperatures,
 )
 from chipglow.laboratory.chip.segmentation import (
+    CutHistory as CutHistory,
     Inertia as Inertia,
     Segmentation as Segmentation,
+    cut_history as cut_history,
     inertia as inertia,
     resolution_warnings as resolution_warnings,
     segmentation as segmentation,

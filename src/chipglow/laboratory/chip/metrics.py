@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.laboratory.chip.segment import contact_length, shear_band
-from chipglow.laboratory.chip.segmentation import segmentation
+from chipglow.laboratory.chip.segmentation import cut_history, resolution, segmentation
 from chipglow.laboratory.chip.shear_band import ShearBand
 from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
@@ -23,9 +23,12 @@ _WHOLE: Final = 0.9
 """Fraction of a period at or above which a period counts as whole."""
 
 _DEVELOPED: Final = 0.5
-_FORCES: Final = (
-    *("period", "period_uncertainty"),
-    *("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing"),
+_FORCES: Final = ("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing")
+"""Metrics that a `CutHistory` states."""
+
+_SEGMENTS: Final = (
+    *("period", "period_uncertainty", "degree", "degree_uncertainty"),
+    *("peak", "peak_standard_deviation", "valley", "valley_standard_deviation"),
 )
 """Metrics that a `Segmentation` states."""
 
@@ -53,7 +56,7 @@ class ChipMetrics:
 
     period: float
     period_uncertainty: float
-    """Time from segment to segment and its standard uncertainty, by the force history."""
+    """Time from segment to segment and its standard uncertainty, by the chip's thickness."""
     frequency: float
     """Segments per second in Hz."""
     speed: float
@@ -71,9 +74,10 @@ class ChipMetrics:
     peak_standard_deviation: float
     valley: float
     valley_standard_deviation: float
-    """Largest and least thickness of a segment, over the segments."""
+    """Thickness at the peaks and valleys of a `Segmentation`."""
     degree: float
-    """Degree of segmentation, (`peak` - `valley`) / `peak`."""
+    degree_uncertainty: float
+    """Degree of segmentation, 1 - valley / peak, and its standard uncertainty."""
     ratio: float
     """Chip ratio, `feed` / `thickness`."""
     chip_speed: float
@@ -100,9 +104,9 @@ class ChipMetrics:
     cutting_swing: float
     thrust_mean: float
     thrust_swing: float
-    """Forces as in `Segmentation`; NaN without a force history."""
+    """Forces as in `CutHistory`; NaN without a force history."""
     segments: int
-    """Whole segments that pass `scan`; without a period the scene counts as one."""
+    """Whole segments: valleys between two peaks."""
     scan: ChipScan
     """Where and when the thickness was read. The thickness is NaN if the chip is cut by the
     border of the view at every height at some time, or the scene is shorter than a period.
@@ -117,6 +121,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     and over 1.2 times the feed all the time: higher up it has lifted off and curls. The means are
     over whole periods, each moment weighted by the chip's speed, which makes them means over the
     chip's length. At most 64 frames are looked at, of the scene's longest part without a gap.
+    Segments are found in the thickness that the scene states over the cut, or else on the line.
     """
     tool = scene.tool
     if tool is None:
@@ -130,28 +135,32 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     seen = [_measured(scene.frame(k), scene.raster, tool, heights) for k in frames]
     profiles, contacts, feeds, speeds = map(np.array, zip(*seen, strict=True))
     feed = _median(feeds) if feed is None else feed
-    forces = _forces(scene)
-    period, speed = forces["period"], _median(speeds)
+    speed = _median(speeds)
     scan = _scan(scene.times[frames], profiles, heights, tool, feed)
-    segments, passing = _passing(scene, tool, frames, scan, period)
+    history = cut_history(scene)
+    segments = history.segmentation if history else None
+    if segments is None or np.isnan(segments.peak):
+        segments = segmentation(scan.time, scan.thickness, resolution(scene))
+    period = segments.period
+    passing = _passing(scene, tool, frames, scan, period)
     bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
     return ChipMetrics(
-        **forces,
+        **{name: getattr(history, name, nan) for name in _FORCES},
+        **{name: getattr(segments, name) for name in _SEGMENTS},
         **passing,
         **_with_deviation("shear_angle", [_angle(band) for band in bands]),
         **_with_deviation("band_width", [band.width for band in bands]),
         frequency=1 / period,
         speed=speed,
         spacing=period * speed,
-        spacing_uncertainty=forces["period_uncertainty"] * speed,
+        spacing_uncertainty=segments.period_uncertainty * speed,
         chip_spacing=period * passing["chip_speed"],
         feed=feed,
         contact=float(contacts.mean()),
         contact_standard_deviation=_deviation(contacts),
         ratio=feed / passing["thickness"],
-        degree=1 - passing["valley"] / passing["peak"],
         band_rate=max((band.middle_rate for band in bands), default=nan),
-        segments=segments,
+        segments=segments.segments,
         scan=scan,
     )
 
@@ -182,17 +191,12 @@ def _scan(time: Array, profiles: Array, heights: Array, tool: Tool, feed: float)
 
 def _passing(
     scene: Scene, tool: Tool, frames: list[int], scan: ChipScan, period: float
-) -> tuple[int, dict[str, float]]:
-    """Return the number of whole segments that pass the line, and the metrics of their chip."""
+) -> dict[str, float]:
+    """Return the metrics of the chip that passes the line in whole periods."""
     windows = [] if np.isnan(scan.height) else _windows(scan.time, period)
     if not windows:
-        nothing = {"thickness": nan, "band_strain": nan}
-        for name in ("peak", "valley", "chip_speed"):
-            nothing |= _with_deviation(name, [])
-        return 0, nothing
-    peaks, valleys = (
-        [extreme(scan.thickness[window]) for window in windows] for extreme in (np.max, np.min)
-    )
+        return {"thickness": nan, "band_strain": nan, **_with_deviation("chip_speed", [])}
+    valleys = [scan.thickness[window].min() for window in windows]
     depth = np.linspace(0.25, 0.75, 33) * float(np.mean(valleys))
     points = tool.rake_point(scan.height) + depth[:, None] * np.array(tool.rake_normal)
     right, up, strain = (
@@ -203,9 +207,7 @@ def _passing(
     whole = np.logical_or.reduce(windows)
     moved = speed[whole].sum()
     greatest = [np.median(strain[window].max(axis=0)) for window in windows]
-    return len(windows), {
-        **_with_deviation("peak", peaks),
-        **_with_deviation("valley", valleys),
+    return {
         **_with_deviation("chip_speed", speed[whole]),
         "thickness": float((scan.thickness * speed)[whole].sum() / moved) if moved > 0 else nan,
         "band_strain": float(np.mean(greatest)),
@@ -272,15 +274,6 @@ def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     count = int((end - time[0]) / period + 1 - _WHOLE)
     before_end = (end - time) / period
     return [(before_end > k + 1e-9) & (before_end <= k + 1 + 1e-9) for k in range(count)]
-
-
-def _forces(scene: Scene) -> dict[str, float]:
-    """Return the metrics of the force history; NaN without one."""
-    if "cutting_force" not in scene.data:
-        return dict.fromkeys(_FORCES, nan)
-    names = ("force_time", "cutting_force", "thrust_force")
-    history = segmentation(*(scene.data[name].values for name in names))
-    return {name: getattr(history, name) for name in _FORCES}
 
 
 def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:

@@ -1,4 +1,4 @@
-"""What a cut's histories show: segmentation by the force, and the inertia of the scaled mass."""
+"""What the histories of a cut show: segments, forces, and the inertia of the scaled mass."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,18 +13,11 @@ from scipy.ndimage import gaussian_filter1d
 from chipglow.cutting import unresolved
 from chipglow.quantities import Array
 from chipglow.scene import Scene
+from chipglow.scene.scene import FORCE_UNITS
 
-_LEAST_PROMINENCE: Final = 0.3
-"""Least rise of the autocorrelation from the valley before its first peak to that peak."""
+_SMOOTH: Final = 1e-6
+"""Standard deviation in s of the Gaussian that smooths single points of the thickness."""
 
-_STANDING_OUT: Final = 0.35
-"""Least prominence of the peaks of unequal segments over the range of the force."""
-
-_LEAST_SMOOTH: Final = 0.7
-"""Least fraction of its range that a force with unequal segments keeps when it is smoothed."""
-
-_LEAST_SWING: Final = 0.1
-"""Least range of the force over its mean: less is the ripple of a continuous chip."""
 
 LARGEST_FRACTION: Final = 0.01
 """Fraction of work or force from which inertia counts as too much."""
@@ -32,76 +25,115 @@ LARGEST_FRACTION: Final = 0.01
 
 @dataclass(frozen=True)
 class Segmentation:
-    """Segments in a force history."""
+    """Segments of a chip; standard deviations and uncertainties are NaN for a single value."""
 
-    start: float
-    """Time in s from which the history counts, after the first build-up of the chip."""
-    period: float
-    """Mean time from one force peak to the next in s; NaN with less than two peaks."""
-    period_uncertainty: float
-    """Standard uncertainty of the period in s; NaN for less than two intervals."""
-    correlation_period: float
-    """Period in s from the autocorrelation, as a check; NaN if the segments are too unequal."""
     peaks: Array
-    """Times of the force peaks in s."""
-    cutting_mean: float
-    thrust_mean: float
-    """Mean forces per width of cut from `start` on in N/m."""
-    cutting_swing: float
-    thrust_swing: float
-    """Mean height of the forces' peaks over the valleys between them in N/m; NaN without peaks."""
+    valleys: Array
+    """Times in s at which the chip is thickest, and thinnest between two peaks."""
+    period: float
+    """Mean time from valley to valley in s, which are sharper; NaN with less than two."""
+    period_uncertainty: float
+    """Standard uncertainty of the mean."""
+    peak: float
+    peak_standard_deviation: float
+    valley: float
+    valley_standard_deviation: float
+    """Mean thickness at peaks and valleys in m; without two peaks the greatest and the least."""
+    degree: float
+    """Degree of segmentation: 1 - valley over the mean of both peaks beside it, mean."""
+    degree_uncertainty: float
+    """Standard uncertainty of the mean."""
 
     @property
     def segments(self) -> int:
-        """Number of whole segments: peaks of the cutting force."""
-        return int(self.peaks.size)
+        """Number of whole segments."""
+        return int(self.valleys.size)
 
 
-def segmentation(
-    time: ArrayLike, cutting_force: ArrayLike, thrust_force: ArrayLike
-) -> Segmentation:
-    """Compute period and swing of the segments from the history of the forces.
+def segmentation(time: ArrayLike, thickness: ArrayLike, resolution: float) -> Segmentation:
+    """Find the segments in the thickness of a chip.
 
-    The autocorrelation of the history after the build-up gives a first period; where segments are
-    too unequal for that, three or more peaks of the force smoothed over a quarter of its
-    correlation time. Then the force is smoothed over a fifteenth of that period, and its peaks, at
-    least six tenths of a period apart and a fifth of the swing high, count.
+    Parameters
+    ----------
+    time : array_like
+        Times in s, ascending in even steps, shape (n,).
+    thickness : array_like
+        Thickness in m at these times, shape (n,); NaN where it is unknown.
+    resolution : float
+        Least rise of a peak over the valleys beside it in m, such as a cell of the simulation.
     """
-    times = np.asarray(time, dtype=np.float64)
-    cutting = np.asarray(cutting_force, dtype=np.float64)
-    thrust = np.asarray(thrust_force, dtype=np.float64)
-    steps = np.diff(times)
-    if times.size < 16 or (steps <= 0).any() or not np.allclose(steps, steps.mean(), rtol=0.01):
-        raise ValueError("force history: expected 16 or more times at even ascending steps")
-    step = float(steps.mean())
-    first = end_of_build_up(cutting)
-    times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
-    regular = coarse = nan
-    least = _LEAST_SWING * abs(cutting.mean())
-    if cutting.size >= 8 and _range(swing := scipy.signal.detrend(cutting)) > least:
-        correlation = _correlation(swing)
-        regular = _correlation_period(correlation, step)
-        coarse = regular if np.isfinite(regular) else _unequal_period(swing, correlation, step)
-    peaks = np.zeros(0, dtype=np.int64)
-    swings = [nan, nan]
-    if np.isfinite(coarse):
-        smooth = [gaussian_filter1d(force, coarse / step / 15) for force in (cutting, thrust)]
-        peaks = _peaks(smooth[0], coarse / step)
-        swings = [_swing(force, peaks) for force in smooth]
-    intervals = np.diff(times[peaks])
+    known = np.isfinite(np.asarray(thickness, np.float64))
+    times, values = np.asarray(time, np.float64)[known], np.asarray(thickness, np.float64)[known]
+    if times.size < 2:
+        return Segmentation(np.zeros(0), np.zeros(0), *[nan] * 8)
+    smooth = gaussian_filter1d(values, _SMOOTH / float(np.median(np.diff(times))), mode="nearest")
+    tops = scipy.signal.find_peaks(smooth, prominence=resolution)[0]
+    bottoms = np.array([a + smooth[a:b].argmin() for a, b in pairwise(tops)], np.int64)
+    peaks, valleys = smooth[tops], smooth[bottoms]
+    degrees = 1 - 2 * valleys / (peaks[1:] + peaks[:-1])
+    if not valleys.size:
+        peaks, valleys = smooth.max(keepdims=True), smooth.min(keepdims=True)
+        degrees = 1 - valleys / peaks
     return Segmentation(
-        start=float(times[0]),
-        period=float(intervals.mean()) if intervals.size else nan,
-        period_uncertainty=(
-            float(intervals.std(ddof=1)) / sqrt(intervals.size) if intervals.size > 1 else nan
-        ),
-        correlation_period=regular,
-        peaks=times[peaks],
-        cutting_mean=float(cutting.mean()),
-        thrust_mean=float(thrust.mean()),
-        cutting_swing=swings[0],
-        thrust_swing=swings[1],
+        times[tops],
+        times[bottoms],
+        *_mean_and_uncertainty(np.diff(times[bottoms])),
+        *_mean_and_deviation(peaks),
+        *_mean_and_deviation(valleys),
+        *_mean_and_uncertainty(degrees),
     )
+
+
+def _mean_and_deviation(values: Array) -> tuple[float, float]:
+    mean = float(values.mean()) if values.size else nan
+    return mean, float(values.std(ddof=1)) if values.size > 1 else nan
+
+
+def _mean_and_uncertainty(values: Array) -> tuple[float, float]:
+    mean, deviation = _mean_and_deviation(values)
+    return mean, deviation / sqrt(max(values.size, 1))
+
+
+@dataclass(frozen=True)
+class CutHistory:
+    """Forces per width of cut in N/m and segments after the first build-up of the chip."""
+
+    start: float
+    """Time in s from which the history counts."""
+    cutting_mean: float
+    cutting_swing: float
+    thrust_mean: float
+    thrust_swing: float
+    """Mean, and mean range from one peak of the chip to the next; NaN without two peaks."""
+    segmentation: Segmentation
+
+
+def cut_history(scene: Scene) -> CutHistory | None:
+    """Return means and segments of a scene's history; None without one."""
+    if "cutting_force" not in scene.data:
+        return None
+    time, cutting, thrust, thickness = (
+        np.asarray(scene.data[name].values, np.float64) for name in ("force_time", *FORCE_UNITS)
+    )
+    first = end_of_build_up(cutting)
+    segments = segmentation(time[first:], thickness[first:], resolution(scene))
+    ends = np.searchsorted(time, segments.peaks)
+    return CutHistory(
+        float(time[first]),
+        *_mean_and_swing(cutting, first, ends),
+        *_mean_and_swing(thrust, first, ends),
+        segments,
+    )
+
+
+def resolution(scene: Scene) -> float:
+    """Return the least rise in m that counts as a segment: a cell, or two samples."""
+    return float(scene.data.attrs.get("cell", 2 * scene.raster.spacing))
+
+
+def _mean_and_swing(force: Array, first: int, ends: NDArray[np.int_]) -> tuple[float, float]:
+    ranges = [np.ptp(force[a:b]) for a, b in pairwise(ends)]
+    return float(force[first:].mean()), float(np.mean(ranges)) if ranges else nan
 
 
 def end_of_build_up(cutting_force: Array) -> int:
@@ -111,59 +143,6 @@ def end_of_build_up(cutting_force: Array) -> int:
     """
     later = cutting_force[cutting_force.size // 2 :]
     return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
-
-
-def _range(force: Array) -> float:
-    """Return the range from 5 % to 95 % of the values."""
-    low, high = np.percentile(force, [5.0, 95.0])
-    return float(high - low)
-
-
-def _correlation(swing: Array) -> Array:
-    """Compute the autocorrelation up to half of the history; 0 for a constant force."""
-    spectrum = np.fft.rfft(swing, 2 * swing.size)
-    raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
-    if not raw[0] > 0:
-        return np.zeros(swing.size // 2)
-    correlation = (raw / np.arange(swing.size, 0, -1))[: swing.size // 2]
-    return np.asarray(gaussian_filter1d(correlation / correlation[0], 2.0))
-
-
-def _correlation_period(correlation: Array, step: float) -> float:
-    """Return the lag of the first clear peak of the autocorrelation; NaN if undefined."""
-    down = np.flatnonzero(correlation < 0)
-    if down.size == 0:
-        return nan
-    peaks, _ = scipy.signal.find_peaks(correlation, prominence=_LEAST_PROMINENCE)
-    peaks = peaks[peaks > down[0]]
-    return float(peaks[0] * step) if peaks.size else nan
-
-
-def _unequal_period(swing: Array, correlation: Array, step: float) -> float:
-    """Return the mean interval between the peaks that stand out; NaN for less than three."""
-    down = np.flatnonzero(correlation < 0)
-    if down.size == 0:
-        return nan
-    smooth = gaussian_filter1d(swing, down[0] / 4)
-    if _range(smooth) < _LEAST_SMOOTH * _range(swing):
-        return nan
-    peaks, _ = scipy.signal.find_peaks(smooth, prominence=_STANDING_OUT * _range(smooth))
-    return float(np.diff(peaks).mean() * step) if peaks.size > 2 else nan
-
-
-def _peaks(force: Array, period: float) -> NDArray[np.int64]:
-    peaks, _ = scipy.signal.find_peaks(
-        force, distance=max(0.6 * period, 1.0), prominence=_range(force) / 5
-    )
-    return np.asarray(peaks, dtype=np.int64)
-
-
-def _swing(force: Array, peaks: NDArray[np.int64]) -> float:
-    """Return the mean height of the peaks over the valleys between them."""
-    if peaks.size < 2:
-        return nan
-    heights = [max(force[a], force[b]) - force[a:b].min() for a, b in pairwise(peaks)]
-    return float(np.mean(heights))
 
 
 @dataclass(frozen=True)
