@@ -96,7 +96,7 @@ def row(cell, length, workpiece):
         f"{history.cutting[later].mean() / 1e3:.0f}",
         f"{history.thrust[later].mean() / 1e3:.0f}",
         f"{number(segments.period * 1e6)}{deviation(segments.period_uncertainty)}",
-        f"{segments.degree * 100:.0f} ± {segments.degree_uncertainty * 100:.0f}",
+        f"{segments.degree * 100:.0f}{deviation(segments.degree_uncertainty, 100)}",
         f"{max(fields.hottest) - 273.15:.0f}",
         f"{width * 1e6:.0f}",
         f"{rate / 1e3:.0f}",
@@ -112,9 +112,9 @@ def number(value: float) -> str:
     return f"{value:.0f}" if isfinite(value) else "–"
 
 
-def deviation(seconds: float) -> str:
-    """Uncertainty in us after a mean; nothing for a single period."""
-    return f" ± {seconds * 1e6:.0f}" if isfinite(seconds) else ""
+def deviation(uncertainty: float, scale: float = 1e6) -> str:
+    """Uncertainty after a mean; nothing for a single value."""
+    return f" ± {uncertainty * scale:.0f}" if isfinite(uncertainty) else ""
 
 
 def main():

@@ -86,7 +86,6 @@ PROGRAMS = {
         "--pairs 1 --only 'scikit-image, correlation'",
         {"| scikit-image, correlation |": 5},
     ),
-    "softening.py": (f"--cell {COARSEST} --length 1 johnson-cook", {"| johnson-cook": 4}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
     "titanium.py": (
         f"--cell {COARSEST} 88.9-0.1",
