@@ -23,7 +23,6 @@ from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.report.page import expression, template, texts
 from chipglow.scene import Material
-from chipglow.study import Study
 
 Array = NDArray[np.float64]
 
@@ -34,10 +33,10 @@ SCENE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "
 class Facts:
     """An analysis as texts and figures read it; `context` holds the names that texts know."""
 
-    def __init__(self, analysis: Analysis, study: object = None) -> None:
+    def __init__(self, analysis: Analysis, study: Any = None) -> None:
         self.analysis, self.data = analysis, analysis.data
-        self.study = study if isinstance(study, Study) else None
-        is_papers = self.study is not None and self.study.is_papers
+        self.study = study
+        is_papers = study is not None and study.is_papers
         self.is_compared = analysis.cut is not None and is_papers
         cut, names = analysis.cut, list(analysis.measurements)
         self.starts = len(cut.one_segment) if cut else self.data.sizes["instant"]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from chipglow.analysis import Distribution
 from chipglow.analysis.distribution import COVERAGE
 from chipglow.quantities.format import quantity_text
 from chipglow.report.page import environment, texts
-from chipglow.study import Study
 from chipglow.surface import Emissivity
 
 Array = NDArray[np.float64]
@@ -19,7 +18,7 @@ Array = NDArray[np.float64]
 _TEXTS: Final = texts("paper")
 CITATION: Final[str] = _TEXTS["citation"]
 QUICK: Final[str] = _TEXTS["quick"]
-"""Remark on the quick study; means over the draws of both studies."""
+"""Remark on the quick study."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,9 @@ TABLE_1: Final = {name: Emissivity(*values) for name, values in _TEXTS["table_1"
 """Published emissivities: mean and standard deviation."""
 
 
-def table_2(study: Study) -> list[tuple[str, str, str]]:
+def table_2(cutting: Any) -> list[tuple[str, str, str]]:
     """Return the settings of the cutting simulation: name, the paper's value, the study's."""
-    values = {"cutting": study.cutting, "tool": study.cutting.tool}
+    values = {"cutting": cutting, "tool": cutting.tool}
     return [
         (name, paper, environment().from_string(template).render(values))
         for name, paper, template in _TEXTS["table_2"]

@@ -21,7 +21,6 @@ from chipglow.report.rows import all_rows
 from chipglow.report.steady_tool import tool_rows
 from chipglow.report.summary import Summary, summary
 from chipglow.report.tables import tables
-from chipglow.study import Study
 from chipglow.text import json_schema
 
 
@@ -70,7 +69,7 @@ def write_report(
     study_text: str,
     provenance: Mapping[str, str],
     remarks: Sequence[str] = (),
-    study: Study | None = None,
+    study: Any = None,
     steady: Analysis | None = None,
 ) -> Path:
     """Write the results of an analysis into a folder.
@@ -92,7 +91,7 @@ def write_report(
         Origin, time, version, seed and the like, in the order of display.
     remarks : sequence of str
         Assumptions and warnings to consider before quoting a number, one sentence each.
-    study : Study, optional
+    study : chipglow.study.Study, optional
         The study; the paper's values are shown if it is the paper's.
     steady : Analysis, optional
         Analysis of the same study with a steady tool, for comparison.
@@ -125,7 +124,7 @@ def write_report(
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
         **tables(facts, rows, tool),
-        "is_quick": facts.is_compared and study == Study.quick(),
+        "is_quick": facts.is_compared and study == type(study).quick(),
         "citation": paper.CITATION,
         "rake_missing": paper.RAKE_MISSING,
         "version": __version__,

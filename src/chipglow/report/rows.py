@@ -94,13 +94,13 @@ class Row:
         return f"why-{self.key}" if self.explanation else general
 
 
-def result_rows(analysis: Analysis, study: object = None) -> list[Row]:
+def result_rows(analysis: Analysis, study: Any = None) -> list[Row]:
     """Return all errors of an analysis and, for a cut, period, forces, contact and shear band."""
     rows = all_rows(Facts(analysis, study))
     return [*rows["errors"], *rows["cut"]]
 
 
-def results_frame(analysis: Analysis, study: object = None) -> pd.DataFrame:
+def results_frame(analysis: Analysis, study: Any = None) -> pd.DataFrame:
     """Return the numbers of `result_rows` as a table, one row per key."""
     rows = result_rows(analysis, study)
     draws = [(row.draws.standard_deviation, *row.draws.range) if row.draws else () for row in rows]

@@ -121,7 +121,9 @@ def _settings(facts: Facts) -> list[Line]:
     if not facts.is_compared or facts.study is None or facts.study.scene is not None:
         return []
     names = ("setting", "paper", "here")
-    return [Line(dict(zip(names, row, strict=True)), None) for row in paper.table_2(facts.study)]
+    return [
+        Line(dict(zip(names, row, strict=True)), None) for row in paper.table_2(facts.study.cutting)
+    ]
 
 
 def _emissivities(facts: Facts) -> list[Line]:
