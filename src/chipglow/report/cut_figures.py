@@ -1,18 +1,21 @@
 """Figures of a cut: heated chips and tool, rake face, dual spectrum, shear band, forces, chip."""
 
+from dataclasses import replace
 from typing import Any, Final
 
 import matplotlib
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import Analysis, Cut, HeatedObject
+from chipglow.analysis import Analysis, Cut, HeatedObject, band_chart
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
+from chipglow.report import paper
 from chipglow.report.facts import Facts
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
 from chipglow.surface import Emissivity, Texture
@@ -182,6 +185,54 @@ def draw_chip(overview: Scene, view: Raster, tool: Tool | None) -> Figure:
         drawing.draw_line(axes, view.border, GREEN, factor=factor)
         axes.label_outer()
     return figure
+
+
+def bands(facts: Facts) -> Figure | None:
+    """Draw the readings of straight bands over width and rise, with ours and the paper's."""
+    if not facts.is_compared or not facts.bands:
+        return None
+    found = facts.papers_band
+    sweep = float(np.mean([band.sweep for band in facts.bands]))
+    widths, rises = np.geomspace(4e-6, 90e-6, 12), np.linspace(50.0, 500.0, 10)
+    figure = drawing.new_figure(3.7)
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    for letter, axes, moved in zip("ab", panels, (sweep, found.sweep), strict=True):
+        band = replace(found, sweep=moved)
+        chart = band_chart(facts.analysis.camera, facts.band_emissivity, band, widths, rises)
+        _draw_chart(axes, chart)
+        axes.set_title(f"{letter}) travel of {1e6 * moved:.0f} µm in an exposure")
+        axes.set_xlabel("width of the temperature profile / µm")
+    ours = np.array([(1e6 * band.width, band.rise) for band in facts.bands])
+    panels[0].plot(*ours.T, "o", color="black", label="segments of this study")
+    panels[1].plot(1e6 * found.width, found.rise, "D", color="black", label="the paper's numbers")
+    panels[0].set_ylabel("rise over the sides / K")
+    shown = [axes.get_legend_handles_labels() for axes in panels]
+    handles = {label: handle for each in shown for handle, label in zip(*each, strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def _draw_chart(axes: Axes, chart: xr.Dataset) -> None:
+    """Draw lines of equal error at the centre, and those of the paper's numbers."""
+    width, rise = 1e6 * chart.width.values, chart.rise.values
+    levels = np.arange(-200.0, 0.0, 20.0)
+    thin: Any = {"colors": GREY, "linewidths": 0.6, "linestyles": "solid"}
+    lines = axes.contour(width, rise, chart.band.T, levels=levels, **thin)
+    axes.clabel(lines, fontsize=7, fmt=lambda level: f"−{-level:.0f} K")
+    scales_of = {"band": 1.0, "band_worst": 1.0, "band_psf_fraction": 0.01}
+    titles = ("centre", "beside", "PSF fraction")
+    for (name, scale), key, title, colour in zip(
+        scales_of.items(), paper.BAND_KEYS, titles, (BLUE, VERMILLION, GREEN), strict=True
+    ):
+        value = paper.PAPER[key].value
+        level = [scale * value]
+        thick: Any = {"colors": colour, "linewidths": 1.8, "linestyles": "solid"}
+        axes.contour(width, rise, chart[name].T, levels=level, **thick)
+        unit = "%" if scale < 1 else "K"
+        axes.plot([], [], color=colour, label=f"paper: {title} {value:g} {unit}".replace("-", "−"))
+    axes.set_xscale("log")
+    axes.set_xticks([5, 10, 20, 40, 80], ["5", "10", "20", "40", "80"])
+    axes.minorticks_off()
 
 
 def forces(facts: Facts) -> Figure | None:

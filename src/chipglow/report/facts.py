@@ -11,18 +11,22 @@ from numpy.typing import NDArray
 from chipglow.analysis import (
     Analysis,
     Headline,
+    StraightBand,
+    band_with,
     headlines,
     image_error,
     line_change,
     line_error,
     line_steepest,
+    read_straight_band,
     sensitivity_error,
     sensitivity_psf_fraction,
 )
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
+from chipglow.report import paper
 from chipglow.report.page import expression, template, texts
-from chipglow.scene import Material
+from chipglow.scene import Material, sample
 
 Array = NDArray[np.float64]
 
@@ -83,9 +87,43 @@ class Facts:
             self.psf_fractions,
             self.contact_reaches_border,
         )
+        values |= {"facts": self}
         values |= {function.__name__: function for function in functions}
         definition = template(texts()["definition"]).render(values)
         return {**values, "definition": definition}
+
+    @cached_property
+    def bands(self) -> tuple[StraightBand, ...]:
+        """Straight bands closest to those of the segments; no unknown ones."""
+        assert self.analysis.cut is not None
+        raster, segments = self.analysis.raster, self.analysis.cut.segments
+        known = [segment for segment in segments if np.isfinite(segment.sweep)]
+        return tuple(StraightBand.of(segment, raster) for segment in known)
+
+    @cached_property
+    def band_emissivity(self) -> float:
+        """Mean emissivity along the middle half of the shown shear band."""
+        assert self.analysis.cut is not None
+        band, surface = self.analysis.cut.band, self.data.attrs["band_surface"]
+        points = band.ridge.points[band.middle_half]
+        image = self.data.emissivity.sel(surface=surface).values
+        return float(np.nanmean(sample(image, self.analysis.raster, points)))
+
+    @cached_property
+    def papers_band(self) -> StraightBand:
+        """The straight band with the paper's three numbers, beside as warm as ours."""
+        numbers = [paper.PAPER[key].value for key in paper.BAND_KEYS]
+        numbers[-1] /= 100.0
+        beside = float(np.mean([band.beside for band in self.bands]))
+        found, _ = band_with(self.analysis.camera, self.band_emissivity, beside, numbers)
+        return found
+
+    @cached_property
+    def straight_readings(self) -> Array:
+        """Mean readings of straight bands like ours."""
+        camera, emissivity = self.analysis.camera, self.band_emissivity
+        read = [read_straight_band(camera, emissivity, band) for band in self.bands]
+        return np.asarray(np.mean(read, axis=0))
 
     @cached_property
     def headlines(self) -> Mapping[str, Headline]:

@@ -56,6 +56,7 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "error-lines": figures.error_lines,
     "over-time": figures.over_time,
     "psf-sensitivity": figures.psf_sensitivity,
+    "bands": cut_figures.bands,
     "forces": cut_figures.forces,
     "chip-thickness": cut_figures.chip_thickness,
 }
