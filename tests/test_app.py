@@ -10,6 +10,7 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 import xarray as xr
+from analytic_chip import AnalyticChip
 from matplotlib.figure import Figure
 
 import chipglow
@@ -19,6 +20,7 @@ from chipglow.app.files import figure_file, measurement_file, study_file
 from chipglow.app.opening import open_any, open_uploaded
 from chipglow.app.pictures import MeasurementModel, SceneModel
 from chipglow.app.session import Newest, Session, SupersededError
+from chipglow.app.view import _chip
 from chipglow.camera import View, expose
 from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
@@ -510,3 +512,9 @@ def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
     changing.join(10)
     assert not was_changed
     assert changed.is_set()
+
+
+def test_the_page_has_the_whole_chip_if_the_scene_knows_it(model):
+    scene = model.opened.scene
+    assert _chip(scene).startswith("data:image/png;base64,iVBOR")
+    assert _chip(AnalyticChip(frames=3).scene()) == ""

@@ -5,6 +5,7 @@ from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
+from io import BytesIO
 from itertools import groupby
 from math import isfinite
 from pathlib import Path
@@ -25,8 +26,10 @@ from chipglow.app.figures import TITLES, Figures
 from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
+from chipglow.drawing.drawing import draw_chip, style
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
+from chipglow.scene import Scene
 
 _FOLDER: Final = Path(__file__).parent
 _TEMPLATES: Final = Environment(
@@ -319,6 +322,7 @@ class View:
             images={name: one.figure.title.text for name, one in figures.images.items()},
             lines={name: one.figure.title.text for name, one in figures.lines.items()},
             draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
+            chip=_chip(opened.scene) if isinstance(opened, OpenedScene) else "",
         )
 
     def _spec(self, opened: Opened) -> str:
@@ -371,3 +375,13 @@ def _celsius(kelvins: float) -> str:
 
 def _kelvins(kelvins: float) -> str:
     return quantity_text(kelvins if isfinite(kelvins) else None, "K", 1, "+")
+
+
+def _chip(scene: Scene) -> str:
+    """Return a picture of the whole chip as the address of a PNG; empty without one."""
+    if scene.overview is None:
+        return ""
+    file = BytesIO()
+    with style():
+        draw_chip(scene.overview, scene.raster, scene.tool).savefig(file, dpi=110)
+    return f"data:image/png;base64,{b64encode(file.getvalue()).decode()}"

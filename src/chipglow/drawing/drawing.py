@@ -14,8 +14,8 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from chipglow.drawing.scales import PLAIN, VOID
-from chipglow.scene import Raster, Tool
+from chipglow.drawing.scales import GREEN, HEAT, KELVIN, PLAIN, VOID, round_limit
+from chipglow.scene import Material, Raster, Scene, Tool
 
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
@@ -201,6 +201,28 @@ def image_panels(panels: Sequence[ImagePanel], raster: Raster, tool: Tool | None
         axes.label_outer()
     for axes in grid.flat[len(panels) :]:
         leave_out(axes, grid[-2, 1] if rows > 1 else None, raster)
+    return figure
+
+
+def draw_chip(overview: Scene, view: Raster, tool: Tool | None) -> Figure:
+    """Return a figure of the whole chip with the border of a view."""
+    frame, raster = overview.frame(0), overview.raster
+    void, solid = frame.material == Material.VOID, frame.material == Material.WORKPIECE
+    celsius = np.where(void, np.nan, frame.temperature - KELVIN)
+    strain = np.where(solid, frame.needed("plastic_strain"), np.nan)
+    rate = np.where(solid, 1e-3 * frame.needed("plastic_strain_rate"), np.nan)
+    heat = (0.0, round_limit(celsius, 99.9, 50.0))
+    panels = (
+        ImagePanel("temperature", "temperature / °C", celsius, heat, HEAT),
+        ImagePanel("plastic strain", "plastic strain", strain, (0.0, 4.0)),
+        ImagePanel("strain rate", "strain rate / (10³ 1/s)", rate, (0.0, 60.0)),
+    )
+    figure = image_figure(raster, 2.2, rows=1)
+    factor, _ = length_unit(raster)
+    for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
+        panel.draw(figure, axes, raster, tool, "bottom")
+        draw_line(axes, view.border, GREEN, factor=factor)
+        axes.label_outer()
     return figure
 
 

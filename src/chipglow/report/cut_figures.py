@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import Analysis, Cut, HeatedObject, band_chart
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
 from chipglow.report import paper
 from chipglow.report.facts import Facts
-from chipglow.scene import Frame, Material, Raster, Scene, Tool
+from chipglow.scene import Frame, Material, Raster
 from chipglow.surface import Emissivity, Texture
 
 _COLOURS: Final = (BLUE, VERMILLION)
@@ -162,29 +161,7 @@ def band_curves(facts: Facts) -> Figure:
 def chip(facts: Facts) -> Figure | None:
     """Draw the whole chip at the end of the cut, with the view of the scene."""
     overview, tool = _cut(facts).overview, facts.analysis.tool
-    return None if overview is None else draw_chip(overview, facts.analysis.raster, tool)
-
-
-def draw_chip(overview: Scene, view: Raster, tool: Tool | None) -> Figure:
-    """Return a figure of the whole chip with the border of a view."""
-    frame, raster = overview.frame(0), overview.raster
-    void, solid = frame.material == Material.VOID, frame.material == Material.WORKPIECE
-    celsius = np.where(void, np.nan, frame.temperature - KELVIN)
-    strain = np.where(solid, frame.needed("plastic_strain"), np.nan)
-    rate = np.where(solid, 1e-3 * frame.needed("plastic_strain_rate"), np.nan)
-    heat = (0.0, scales.round_limit(celsius, 99.9, 50.0))
-    panels = (
-        ImagePanel("temperature", "temperature / °C", celsius, heat, scales.HEAT),
-        ImagePanel("plastic strain", "plastic strain", strain, (0.0, 4.0)),
-        ImagePanel("strain rate", "strain rate / (10³ 1/s)", rate, (0.0, 60.0)),
-    )
-    figure = drawing.image_figure(raster, 2.2, rows=1)
-    factor, _ = drawing.length_unit(raster)
-    for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
-        panel.draw(figure, axes, raster, tool, "bottom")
-        drawing.draw_line(axes, view.border, GREEN, factor=factor)
-        axes.label_outer()
-    return figure
+    return None if overview is None else drawing.draw_chip(overview, facts.analysis.raster, tool)
 
 
 def bands(facts: Facts) -> Figure | None:
