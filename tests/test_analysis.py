@@ -449,6 +449,15 @@ def test_a_relief_under_the_resolution_is_no_segment():
     assert segmentation(time, ripple, 10e-6).segments == 6
 
 
+def test_a_ripple_between_segments_is_no_segment():
+    time = np.arange(0.0, 470e-6, 0.5e-6)
+    saw = 350e-6 + 50e-6 * np.sin(2 * np.pi * time / 90e-6)
+    ripple = 8e-6 * np.sin(2 * np.pi * time / 17e-6)
+    found = segmentation(time, saw + ripple, 5e-6)
+    assert found.segments == segmentation(time, saw, 5e-6).segments
+    assert found.period == pytest.approx(90e-6, rel=0.05)
+
+
 def test_an_unknown_thickness_has_no_segments():
     time = np.arange(0.0, 400e-6, 1e-6)
     found = segmentation(time, np.full(time.size, np.nan), 20e-6)

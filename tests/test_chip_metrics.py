@@ -21,8 +21,8 @@ def metrics():
 
 
 def test_thickness_and_segments(metrics):
-    # The history counts from when the force first exceeds its median after 120 µs: seven peaks.
-    assert metrics.segments == 6
+    # The history counts from when the force first exceeds its median after 120 µs: six peaks.
+    assert metrics.segments == 5
     # A Gaussian of 1 µs takes 1 µs / sqrt(2 pi) times the slopes of both sides off a tip: 80 µm in
     # 50 and in 22 µs, at most 1.3 times as fast.
     missed = 1e-6 / np.sqrt(2 * np.pi) * 1.3 * (80e-6 / 50e-6 + 80e-6 / 22e-6)
@@ -39,7 +39,7 @@ def test_thickness_and_segments(metrics):
 
 
 def test_period_spacing_and_speeds(metrics):
-    # A peak is off by less than the 1 µs that are smoothed over; six periods share both ends.
+    # A peak is off by less than the 1 µs that are smoothed over; five periods share both ends.
     assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
     assert metrics.frequency == pytest.approx(1 / CHIP.period, rel=0.005)
     assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)

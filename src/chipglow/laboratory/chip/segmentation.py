@@ -19,6 +19,9 @@ _SMOOTH: Final = 1e-6
 """Standard deviation in s of the Gaussian that smooths single points of the thickness."""
 
 
+_STANDING_OUT: Final = 0.25
+"""Least rise of a peak over the range of the thickness: less is a ripple between segments."""
+
 LARGEST_FRACTION: Final = 0.01
 """Fraction of work or force from which inertia counts as too much."""
 
@@ -60,14 +63,16 @@ def segmentation(time: ArrayLike, thickness: ArrayLike, resolution: float) -> Se
     thickness : array_like
         Thickness in m at these times, shape (n,); NaN where it is unknown.
     resolution : float
-        Least rise of a peak over the valleys beside it in m, such as a cell of the simulation.
+        Least rise of a peak over the valleys beside it in m, such as a cell of the simulation; a
+        peak rises by a quarter of the range from 5 % to 95 % of the thickness as well.
     """
     known = np.isfinite(np.asarray(thickness, np.float64))
     times, values = np.asarray(time, np.float64)[known], np.asarray(thickness, np.float64)[known]
     if times.size < 2:
         return Segmentation(np.zeros(0), np.zeros(0), *[nan] * 8)
     smooth = gaussian_filter1d(values, _SMOOTH / float(np.median(np.diff(times))), mode="nearest")
-    tops = scipy.signal.find_peaks(smooth, prominence=resolution)[0]
+    least = max(resolution, _STANDING_OUT * float(np.ptp(np.percentile(smooth, [5, 95]))))
+    tops = scipy.signal.find_peaks(smooth, prominence=least)[0]
     bottoms = np.array([a + smooth[a:b].argmin() for a, b in pairwise(tops)], np.int64)
     peaks, valleys = smooth[tops], smooth[bottoms]
     degrees = 1 - 2 * valleys / (peaks[1:] + peaks[:-1])
