@@ -25,8 +25,7 @@ from experiments import Experiment, Means, aligned, markdown, means_of, read_exp
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation, ZerilliArmstrong
-from chipglow.cutting.material import NonlocalViscosity
+from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation, workpiece
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -68,8 +67,7 @@ RANGES = (
     Range("friction coefficient", "", 1.0, 0.38, 0.65),
     Range("edge radius of the four", "um", 1e-6, 70.0, 122.0),
 )
-LAW = ZerilliArmstrong(159.2e6, 1533.7e6, 0.00609, 0.000189, 742.6e6, 0.171, 1.0, 2.1e3)
-VISCOSITY = NonlocalViscosity(2.1e3, 20e-6)
+LAW = replace(workpiece("aisi-1045/jaspers-dautzenberg-za").flow_stress, drag=2.1e3)
 BASE = {"d1": 0.006, "d2": 0.08}
 STRESSES = ("athermal_stress", "thermal_stress", "hardening")
 
@@ -91,10 +89,10 @@ def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulat
         loss=loss,
         fracture_energy=energy,
     )
-    workpiece = replace(AISI_1045, flow_stress=law, damage=damage, nonlocal_viscosity=VISCOSITY)
+    steel = replace(AISI_1045, flow_stress=law, damage=damage)
     tool = cut.tool if experiment.name == "paper" else replace(cut.tool, edge_radius=edge)
     return replace(
-        cut, workpiece=workpiece, tool=tool, friction=replace(cut.friction, coefficient=friction)
+        cut, workpiece=steel, tool=tool, friction=replace(cut.friction, coefficient=friction)
     )
 
 

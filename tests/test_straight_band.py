@@ -65,7 +65,8 @@ def test_the_error_grows_with_rise_and_with_narrowness():
 
 
 def test_the_band_of_known_readings_is_found():
-    found, read = band_with(CAMERA, 0.5, BAND.beside, read_straight_band(CAMERA, 0.5, BAND))
+    found = band_with(CAMERA, 0.5, BAND.beside, read_straight_band(CAMERA, 0.5, BAND))
+    read = read_straight_band(CAMERA, 0.5, found)
     assert read == pytest.approx(read_straight_band(CAMERA, 0.5, BAND), rel=1e-3)
     assert found.width == pytest.approx(BAND.width, rel=0.01)
     assert found.rise == pytest.approx(BAND.rise, rel=0.01)

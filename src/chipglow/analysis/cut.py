@@ -24,7 +24,6 @@ from chipglow.laboratory.chip import (
     inertia,
 )
 from chipglow.scene import ENERGY_UNITS, Frame, Scene
-from chipglow.scene.scene import FORCE_UNITS
 
 Progress: TypeAlias = Callable[[str, float], None]
 """Told what is being done and which fraction of it, 0 to 1, is done."""
@@ -45,12 +44,8 @@ _NEEDED: Final = {
 
 @dataclass(frozen=True, eq=False)
 class CuttingForces:
-    """Forces per width of cut in N/m over time in s, shape (n,), and the segments with them."""
+    """Forces and segments of a cut, and what limits them."""
 
-    time: NDArray[np.float64]
-    cutting: NDArray[np.float64]
-    thrust: NDArray[np.float64]
-    thickness: NDArray[np.float64]  # of the chip in m
     history: CutHistory
     unaccounted: float  # part of the drive's work, NaN without an energy account
     inertia: Inertia
@@ -133,11 +128,7 @@ def cutting_forces(scene: Scene) -> CuttingForces | None:
     history, inert = cut_history(scene), inertia(scene)
     if history is None or inert is None:
         return None
-    time, cutting, thrust, thickness = (
-        np.asarray(scene.data[name].values, dtype=np.float64)
-        for name in ("force_time", *FORCE_UNITS)
-    )
-    return CuttingForces(time, cutting, thrust, thickness, history, _unaccounted(scene), inert)
+    return CuttingForces(history, _unaccounted(scene), inert)
 
 
 def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:

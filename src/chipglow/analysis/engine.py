@@ -414,11 +414,12 @@ def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Varia
 
 def _history_variables(cut: Cut) -> Variables:
     variables: Variables = {}
-    if forces := cut.forces:
+    if cut.forces:
+        history = cut.forces.history
         variables |= {
-            "force_time": ("force_time", forces.time, {"units": "s"}),
-            "cutting_force": ("force_time", forces.cutting, {"units": "N/m"}),
-            "thrust_force": ("force_time", forces.thrust, {"units": "N/m"}),
+            "force_time": ("force_time", history.time, {"units": "s"}),
+            "cutting_force": ("force_time", history.cutting, {"units": "N/m"}),
+            "thrust_force": ("force_time", history.thrust, {"units": "N/m"}),
         }
     if cut.chip:
         scan = cut.chip.scan

@@ -122,8 +122,8 @@ def band_chart(
 
 def band_with(
     camera: Camera, emissivity: float, beside: float, readings: Sequence[float]
-) -> tuple[StraightBand, Array]:
-    """Return the band whose `READINGS` come closest to given ones, and its readings."""
+) -> StraightBand:
+    """Return the band whose `READINGS` come closest to given ones."""
     wanted, spread = np.array(readings), np.array(_SPREAD)
     spread[:2] *= np.abs(wanted[:2])
 
@@ -135,5 +135,4 @@ def band_with(
         read = read_straight_band(camera, emissivity, band(logs))
         return np.asarray((read - wanted) / spread)
 
-    found = band(least_squares(differences, np.log(_STARTS), diff_step=1e-3).x)
-    return found, read_straight_band(camera, emissivity, found)
+    return band(least_squares(differences, np.log(_STARTS), diff_step=1e-3).x)

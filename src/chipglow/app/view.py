@@ -26,7 +26,7 @@ from chipglow.app.figures import TITLES, Figures
 from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
-from chipglow.drawing.drawing import draw_chip, style
+from chipglow.drawing.drawing import data_url, draw_chip, style
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 from chipglow.scene import Scene
@@ -384,4 +384,4 @@ def _chip(scene: Scene) -> str:
     file = BytesIO()
     with style():
         draw_chip(scene.overview, scene.raster, scene.tool).savefig(file, dpi=110)
-    return f"data:image/png;base64,{b64encode(file.getvalue()).decode()}"
+    return data_url(file.getvalue())

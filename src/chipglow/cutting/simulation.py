@@ -196,32 +196,26 @@ class CuttingSimulation:
         if isinstance(self.tool_temperature, ToolBody) and resume is None:
             state.warm(self.steady_tool(), self.tool_temperature)
         picture = state.picture(raster)
-        whole = state.picture(self.overview_raster)
         coarse = state.picture(preview.raster) if preview is not None else None
         last = recorder.last
         records = np.empty((last, 3 + ENERGIES))
         done = restore(state, resume, records) if resume is not None else 0
         recorder.replay(records[:done, 0])
         for record in range(done + 1, last + 1):
+            state.mark()
             records[record - 1] = state.advance()
             if recorder.wants(record, records[record - 1, 0]):
                 on_frame(state.frame(picture))
             if preview is not None and coarse is not None and preview.shows(record, last):
                 preview.on_frame(state.frame(coarse))
-            if record == last:
-                overview = state.frame(whole)
-                break
-            state.mark()
             if on_checkpoint is not None:
                 on_checkpoint(capture(state, records[:record], record / last))
             if on_progress is not None:
                 on_progress(record / last)
-        if on_progress is not None:
-            on_progress(1.0)
         time = window.interval * np.arange(1, last + 1, dtype=np.float64)
         cutting, thrust, thickness, *energies = records.T.copy()
-        energy = EnergyHistory(*energies)
-        return ForceHistory(time, cutting, thrust, thickness, energy, overview)
+        overview = state.frame(state.picture(self.overview_raster))
+        return ForceHistory(time, cutting, thrust, thickness, EnergyHistory(*energies), overview)
 
     @property
     def momentum_flow(self) -> float:

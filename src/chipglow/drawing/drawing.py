@@ -1,5 +1,6 @@
 """Style of figures: sizes, colours, images on micrometre axes."""
 
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,6 +72,11 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     figure.savefig(png, dpi=150)
     figure.savefig(svg, dpi=150, metadata={"Date": None})
     return png, svg
+
+
+def data_url(png: bytes) -> str:
+    """Return the address of a PNG that holds the PNG itself."""
+    return f"data:image/png;base64,{b64encode(png).decode('ascii')}"
 
 
 def show_image(

@@ -214,26 +214,26 @@ def _draw_chart(axes: Axes, chart: xr.Dataset) -> None:
 
 def forces(facts: Facts) -> Figure | None:
     """Draw the force history with its segments."""
-    history = _cut(facts).forces
-    if history is None:
+    known = _cut(facts).forces
+    if known is None:
         return None
-    means, time = history.history, history.time * 1e6
+    history, time = known.history, known.history.time * 1e6
     figure = drawing.new_figure(3.3)
     axes = figure.subplots()
     axes.plot(time, history.cutting * 1e-3, color=BLUE, label="cutting force", linewidth=1.2)
     axes.plot(time, history.thrust * 1e-3, color=VERMILLION, label="thrust force", linewidth=1.2)
-    for i, peak in enumerate(means.segmentation.peaks * 1e6):
+    for i, peak in enumerate(history.segmentation.peaks * 1e6):
         axes.axvline(
             peak, color=GREY, linewidth=0.8, linestyle=":", label="" if i else "peaks of the chip"
         )
-    axes.axvspan(time[0], means.start * 1e6, color=scales.VOID, label="first build-up")
+    axes.axvspan(time[0], history.start * 1e6, color=scales.VOID, label="first build-up")
     duration = facts.analysis.camera.integration_time
     for i, start in enumerate(facts.data.instant.values):
         ends = (start * 1e6, (start + duration) * 1e6)
         axes.axvspan(*ends, ymax=0.03, color=GREEN, label="" if i else "exposures")
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(0.0)
-    period = means.segmentation.period * 1e6
+    period = history.segmentation.period * 1e6
     axes.set_title(f"period {period:.0f} µs" if np.isfinite(period) else "no period")
     axes.set(xlabel="time / µs", ylabel="force per width / (N/mm)")
     figure.legend(loc="outside lower center", ncols=3)
@@ -259,8 +259,9 @@ def chip_thickness(facts: Facts) -> Figure | None:
     left.set_title(f"a) at {frame.time * 1e6:.0f} µs")
     time, passed = scan.time, scan.thickness
     if cut.forces is not None:
-        later = cut.forces.time >= cut.forces.history.start
-        time, passed = cut.forces.time[later], cut.forces.thickness[later]
+        history = cut.forces.history
+        later = history.time >= history.start
+        time, passed = history.time[later], history.thickness[later]
     right.plot(time * 1e6, passed * 1e6, color=VERMILLION)
     place: Any = {"xycoords": ("axes fraction", "data"), "va": "center"}
     levels = {"peak": cut.chip.peak, "mean": cut.chip.thickness, "valley": cut.chip.valley}

@@ -63,6 +63,7 @@ class Facts:
             "cut": cut,
             "data": data,
             "exposure": time_text(camera.integration_time),
+            "facts": self,
             "forces": cut.forces if cut else None,
             "image_error": image_error(data),
             "is_compared": self.is_compared,
@@ -87,7 +88,6 @@ class Facts:
             self.psf_fractions,
             self.contact_reaches_border,
         )
-        values |= {"facts": self}
         values |= {function.__name__: function for function in functions}
         definition = template(texts()["definition"]).render(values)
         return {**values, "definition": definition}
@@ -115,8 +115,7 @@ class Facts:
         numbers = [paper.PAPER[key].value for key in paper.BAND_KEYS]
         numbers[-1] /= 100.0
         beside = float(np.mean([band.beside for band in self.bands]))
-        found, _ = band_with(self.analysis.camera, self.band_emissivity, beside, numbers)
-        return found
+        return band_with(self.analysis.camera, self.band_emissivity, beside, numbers)
 
     @cached_property
     def straight_readings(self) -> Array:

@@ -1,18 +1,17 @@
 """The Jinja2 environment of the report: its page, and the texts and expressions in YAML."""
 
 import re
-from base64 import b64encode
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
 from math import degrees, isfinite
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
+from chipglow.drawing.drawing import data_url
 from chipglow.quantities.format import quantity_text
 from chipglow.text.yaml_file import parse_yaml
 
@@ -49,7 +48,7 @@ def environment() -> Environment:
         undefined=StrictUndefined,
     )
     made.filters |= {
-        "data_url": _data_url,
+        "data_url": lambda png: data_url(png.read_bytes()),
         "degrees": degrees,
         "mean": lambda values: float(np.mean(list(values))),
         "median": lambda values: float(np.median(list(values))),
@@ -60,10 +59,6 @@ def environment() -> Environment:
     }
     made.tests["numeric"] = lambda text: any(map(str.isdigit, text))
     return made
-
-
-def _data_url(png: Path) -> str:
-    return f"data:image/png;base64,{b64encode(png.read_bytes()).decode('ascii')}"
 
 
 def _number(value: float, unit: str, decimals: int = 0) -> str:

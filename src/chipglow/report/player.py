@@ -1,6 +1,5 @@
 """Images of all exposures on the page: reference, measurement and error, with one slider."""
 
-from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -69,7 +68,7 @@ class View:
         image.putpalette(np.round(palette * 255).astype(np.uint8).tobytes())
         file = BytesIO()
         image.save(file, "PNG", optimize=True)
-        return f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+        return drawing.data_url(file.getvalue())
 
 
 @dataclass(frozen=True)

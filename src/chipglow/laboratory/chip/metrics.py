@@ -2,13 +2,18 @@
 
 from dataclasses import dataclass
 from math import nan
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.laboratory.chip.segment import contact_length, shear_band
-from chipglow.laboratory.chip.segmentation import cut_history, resolution, segmentation
+from chipglow.laboratory.chip.segmentation import (
+    Segmentation,
+    cut_history,
+    resolution,
+    segmentation,
+)
 from chipglow.laboratory.chip.shear_band import ShearBand
 from chipglow.quantities import Array
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
@@ -26,12 +31,6 @@ _DEVELOPED: Final = 0.5
 _FORCES: Final = ("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing")
 """Metrics that a `CutHistory` states."""
 
-_SEGMENTS: Final = (
-    *("period", "period_uncertainty", "degree", "degree_uncertainty"),
-    *("peak", "peak_standard_deviation", "valley", "valley_standard_deviation"),
-)
-"""Metrics that a `Segmentation` states."""
-
 
 @dataclass(frozen=True)
 class ChipScan:
@@ -48,15 +47,12 @@ class ChipScan:
 
 
 @dataclass(frozen=True)
-class ChipMetrics:
-    """Description of a segmented chip; lengths in m, times in s, forces in N/m of width.
+class ChipMetrics(Segmentation):
+    """Segments and more of a chip; lengths in m, times in s, forces in N/m of width.
 
     A ``…_standard_deviation`` is that of the values averaged, NaN for one value.
     """
 
-    period: float
-    period_uncertainty: float
-    """Time from segment to segment and its standard uncertainty, by the chip's thickness."""
     frequency: float
     """Segments per second in Hz."""
     speed: float
@@ -70,14 +66,6 @@ class ChipMetrics:
     """Uncut chip thickness, as given or from the scene; NaN if out of view."""
     thickness: float
     """Mean thickness of the chip at right angles to the rake face."""
-    peak: float
-    peak_standard_deviation: float
-    valley: float
-    valley_standard_deviation: float
-    """Thickness at the peaks and valleys of a `Segmentation`."""
-    degree: float
-    degree_uncertainty: float
-    """Degree of segmentation, 1 - valley / peak, and its standard uncertainty."""
     ratio: float
     """Chip ratio, `feed` / `thickness`."""
     chip_speed: float
@@ -105,8 +93,6 @@ class ChipMetrics:
     thrust_mean: float
     thrust_swing: float
     """Forces as in `CutHistory`; NaN without a force history."""
-    segments: int
-    """Whole segments: valleys between two peaks."""
     scan: ChipScan
     """Where and when the thickness was read. The thickness is NaN if the chip is cut by the
     border of the view at every height at some time, or the scene is shorter than a period.
@@ -144,12 +130,15 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     period = segments.period
     passing = _passing(scene, tool, frames, scan, period)
     bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
-    return ChipMetrics(
+    measured: dict[str, Any] = {
         **{name: getattr(history, name, nan) for name in _FORCES},
-        **{name: getattr(segments, name) for name in _SEGMENTS},
+        **vars(segments),
         **passing,
         **_with_deviation("shear_angle", [_angle(band) for band in bands]),
         **_with_deviation("band_width", [band.width for band in bands]),
+    }
+    return ChipMetrics(
+        **measured,
         frequency=1 / period,
         speed=speed,
         spacing=period * speed,
@@ -160,7 +149,6 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
         contact_standard_deviation=_deviation(contacts),
         ratio=feed / passing["thickness"],
         band_rate=max((band.middle_rate for band in bands), default=nan),
-        segments=segments.segments,
         scan=scan,
     )
 

@@ -18,7 +18,6 @@ from chipglow.scene.scene import FORCE_UNITS
 _SMOOTH: Final = 1e-6
 """Standard deviation in s of the Gaussian that smooths single points of the thickness."""
 
-
 _STANDING_OUT: Final = 0.25
 """Least rise of a peak over the range of the thickness: less is a ripple between segments."""
 
@@ -101,8 +100,15 @@ def _mean_and_uncertainty(values: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class CutHistory:
-    """Forces per width of cut in N/m and segments after the first build-up of the chip."""
+    """Forces per width of cut in N/m and thickness of the chip in m over time in s, shape (n,).
 
+    Means, swings and segments are those after the first build-up of the chip.
+    """
+
+    time: Array
+    cutting: Array
+    thrust: Array
+    thickness: Array
     start: float
     """Time in s from which the history counts."""
     cutting_mean: float
@@ -117,13 +123,15 @@ def cut_history(scene: Scene) -> CutHistory | None:
     """Return means and segments of a scene's history; None without one."""
     if "cutting_force" not in scene.data:
         return None
-    time, cutting, thrust, thickness = (
-        np.asarray(scene.data[name].values, np.float64) for name in ("force_time", *FORCE_UNITS)
-    )
+    time, cutting, thrust, thickness = (_values(scene, n) for n in ("force_time", *FORCE_UNITS))
     first = end_of_build_up(cutting)
     segments = segmentation(time[first:], thickness[first:], resolution(scene))
     ends = np.searchsorted(time, segments.peaks)
     return CutHistory(
+        time,
+        cutting,
+        thrust,
+        thickness,
         float(time[first]),
         *_mean_and_swing(cutting, first, ends),
         *_mean_and_swing(thrust, first, ends),
