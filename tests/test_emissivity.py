@@ -487,6 +487,8 @@ def test_assumptions_and_warnings_are_printed(folder):
         *("Nothing changes between frames", "Warning: shear band: 18 of 180 pixels are left out"),
     ):
         assert words in result.stderr
+    stated = command("dead.nc", *AT_391, "--reflected-uncertainty", "5 K").stderr
+    assert "reflects 19.85 ± 5 degC and nothing hotter; 100 K more would shift" in stated
 
 
 # A study's surface of what was measured

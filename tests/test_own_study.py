@@ -7,9 +7,9 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
-from chipglow.camera import AnnularAperturePSF
+from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress
-from chipglow.quantities import adapter
+from chipglow.quantities import adapter, changed
 from chipglow.radiometry import Band
 from chipglow.report import result_rows, write_report
 from chipglow.scene import Raster
@@ -123,9 +123,9 @@ def test_data_sheets_that_cannot_be_are_refused(camera, wrong):
 
 def test_what_is_left_to_the_paper_is_said():
     told = " ".join(left_to_the_paper(Study(**TITANIUM)))
-    for name in ("of cutting", "tool", "friction", "of surface", "chips", "lower_limit 300 degC"):
+    for name in ("of cutting", "tool", "friction", "of surface", "chips", "psf_order"):
         assert name in told, told
-    for name in ("workpiece ti-6al-4v", "feed", "integration_time", "detector_pitch"):
+    for name in ("workpiece ti-6al-4v", "feed", "integration_time", "lower_limit"):
         assert name not in told, told
     assert list(left_to_the_paper(Study())) == []
     assert list(left_to_the_paper(Study.quick())) == []
@@ -214,3 +214,16 @@ def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand(
         built = Study(camera={"preset": name, "magnification": 1.0}).camera
         assert f"{built.array[0]} x {built.array[1]}" in preset["source"]
         assert f"{1e6 * built.build().pitch:g} um" in preset["source"]
+        assert ("microbolometer" in preset["source"]) <= (built.time_constant == 10e-3)
+
+
+@pytest.mark.parametrize("band", ["1.5-1.6 um", (1.5e-6, 1.6e-6)])
+def test_another_band_has_its_own_psf_and_no_limit_of_the_papers(band):
+    study = Study(camera={"band": band})
+    assert study.camera.build() == Camera(band=Band(1.5e-6, 1.6e-6), psf_order="detector")
+    assert "numerical_aperture 0.28" in " ".join(left_to_the_paper(study))
+    stated = changed(study, {"camera.psf": {"kind": "annular-aperture"}, "camera.lower_limit": 500})
+    assert stated.camera.build().psf == AnnularAperturePSF()
+    assert stated.camera.build().lower_limit == 500.0
+    papers = Study(camera={"band": "3.8-5.1 um", "pitch": "6 um"}).camera
+    assert papers.build() == Camera.paper()

@@ -104,11 +104,15 @@ def _line_row(line: EmissivityLine) -> Mapping[str, float | str]:
 
 def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivity]]) -> Notes:
     heating = maps[0].heating
-    room, change = heating.reflected - ZERO_CELSIUS, _of_reflected(maps[0])
+    reflects, change = f"{heating.reflected - ZERO_CELSIUS:.4g}", _of_reflected(maps[0])
+    if heating.reflected_uncertainty:
+        reflects += f" ± {heating.reflected_uncertainty:.3g} degC and nothing hotter"
+    else:
+        reflects = f"exactly {reflects} degC"
     texts = {
         "The true temperature is exact (reference_uncertainty).": not heating.reference_uncertainty,
-        f"The object reflects exactly {room:.4g} degC; 100 K more would shift the emissivity by "
-        f"{change:+.2g} (reflected, reflected_uncertainty).": not heating.reflected_uncertainty,
+        f"The object reflects {reflects}; 100 K more would shift the emissivity by {change:+.2g} "
+        "(reflected, reflected_uncertainty).": True,
         "The camera does not drift between recordings: a single image does not show it, and u "
         "does not include it (drift).": (
             heating.drift is None and any(one.recordings == 1 for one in maps)
