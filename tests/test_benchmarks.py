@@ -26,7 +26,7 @@ STUDIES = {
 cutting:
   cutting_length: 0.5 mm
   window: {start: 0.45 mm, end: 0.5 mm, interval: 0.5 us, later_bands: 0}
-  field_of_view: {spacing: 1.5 um, rows: 360, columns: 440}
+  field_of_view: {spacing: 1.5 um, rows: 520, columns: 460}
 analysis: {exposures: 2, phases: 1, textures: 1, psf_widths: [12 um]}
 """,
     ),

@@ -41,9 +41,37 @@ def test_view_window_and_length_of_cut_follow_the_feed():
         assert ours == pytest.approx(papers / 3, rel=1e-3)  # written in um and mm
     view = own.field_of_view
     assert view.spacing == pytest.approx(6e-6 / 9, rel=1e-5)
-    assert view.rows * view.spacing == pytest.approx(180e-6, abs=view.spacing)
+    assert view.rows * view.spacing == pytest.approx(260e-6, abs=view.spacing)
     # In the time between frames the chip moves a third as far, at a quarter of the speed.
     assert own.window.interval == pytest.approx(0.2e-6 * (250 / 60) / 3, rel=1e-3)
+
+
+MEASURED = [
+    (-20, 895e-6, -688e-6),
+    (-7, 662e-6, -616e-6),
+    (0, 603e-6, -527e-6),
+    (10, 518e-6, -414e-6),
+    (20, 442e-6, -355e-6),
+]
+"""Rake angle in degrees; greatest contact and leftmost chip or band of a cut at a cell of 20 um."""
+
+
+@pytest.mark.parametrize(("rake", "contact", "left"), MEASURED)
+def test_the_default_view_holds_contact_and_band_at_any_rake_angle(rake, contact, left):
+    cutting = Study(cutting={"tool": {"rake_angle": f"{rake} deg"}}).cutting
+    view, simulation = cutting.field_of_view.build(), cutting.simulation()
+    x, y = simulation.tool.rake_point(contact)
+    rim = 2 * 8e-6  # two widths of the paper's PSF
+    assert view.extent[0] <= left
+    assert x <= view.extent[1] - rim
+    assert y <= view.extent[3] - rim
+    simulation.lattice(view)  # an error if the view were outside the region
+
+
+def test_the_computed_region_holds_the_view_of_a_large_feed():
+    cutting = Study(cutting={"feed": "0.5 mm"}).cutting
+    assert cutting.numerics.upstream < -cutting.field_of_view.left
+    cutting.simulation().lattice(cutting.field_of_view.build())
 
 
 def test_an_exposure_fits_into_what_is_kept():

@@ -94,7 +94,7 @@ class Study(Part):
         title = "Quick look at the study of Heigel and Whitenton (2010)"
         cutting = {
             "window": {"interval": "0.5 us", "later_bands": 1},
-            "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 440},
+            "field_of_view": {"spacing": "1.5 um", "rows": 520, "columns": 460},
         }
         widths = ["4 um", "8 um", "12 um", "20 um"]
         draws = {"exposures": 5, "phases": 2, "textures": 2, "psf_widths": widths}
