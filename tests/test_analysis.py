@@ -617,7 +617,7 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
             across.points[across.distance == 0.0],
         )
         first = data.sel(psf_order=order, reading="rake").isel(
-            psf_width=at, exposure=0, pixel_phase=0
+            psf_width=at, exposure=0, varied_phase=0
         )
         error = first.varied_measured.sel(effects="all") - first.varied_reference
         assert float(error) == pytest.approx(face[0], abs=1e-4)
