@@ -24,6 +24,7 @@ from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, R
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.camera.exposure import sparse_frames
 from chipglow.laboratory.chip import (
     NoContactError,
     NoShearBandError,
@@ -195,6 +196,8 @@ def analyse(
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
     warnings = list(_image_warnings(task, looked))
+    if sparse := sparse_frames(scene, task.camera.integration_time):
+        warnings = [sparse, *warnings]
     if cut is not None:
         cut = _completed(task, cut)
         warnings = [*resolution_warnings(scene, cut.band_width), *warnings]
