@@ -194,7 +194,9 @@ def analyse(
         "error_reference": plan.reference,
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
-    warnings = list(_image_warnings(task, looked))
+    origins = [surface.origin for surface in surfaces.values()]
+    doubts = dict.fromkeys(text for one in origins for text in one.doubts(camera.band, scene))
+    warnings = [*doubts, *_image_warnings(task, looked)]
     if cut is not None:
         cut = _completed(task, cut)
         warnings = [*resolution_warnings(scene, cut.band_width), *warnings]
