@@ -38,7 +38,7 @@ from chipglow.scene.lines import nearest
 from chipglow.surface import CHIP_1, CHIP_2, UniformSurface
 
 BAND = Band(3.8e-6, 5.1e-6)
-CAMERA = Camera(band=BAND, pitch=6e-6, psf=GaussianPSF(12e-6), psf_order="detector")
+CAMERA = replace(Camera.paper(), psf=GaussianPSF(12e-6))
 GRID = Raster(left=-300e-6, top=300e-6, spacing=2e-6, rows=180, columns=180)
 TOOL = ToolGeometry()
 SURFACES = {"chip 1": CHIP_1, "chip 2": CHIP_2}

@@ -606,5 +606,5 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
         tmp_path / "even.hcc",
         Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
     )
-    fields = [*CAMERA, "flat_field.low=even.hcc"]
+    fields = [*CAMERA, f"flat_field.low={tmp_path / 'even.hcc'}"]
     assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)

@@ -128,7 +128,7 @@ def test_the_default_study_has_the_librarys_defaults():
     assert cutting.friction == Friction()
     assert cutting.numerics == Numerics()
     assert cutting.window == OutputWindow()
-    assert camera == Camera(psf_order="detector")
+    assert camera == Camera.paper()
     assert study.analysis == Plan()
     chips = study.surface.build(study.seed)
     assert list(chips.values()) == [CHIP_1, CHIP_2]

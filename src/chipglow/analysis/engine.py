@@ -195,8 +195,10 @@ def analyse(
         "error_reference": plan.reference,
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
-    warnings = list(_image_warnings(task, looked))
-    if sparse := sparse_frames(scene, task.camera.integration_time):
+    origins = [surface.origin for surface in surfaces.values()]
+    doubts = dict.fromkeys(text for one in origins for text in one.doubts(camera.band, scene))
+    warnings = [*doubts, *_image_warnings(task, looked)]
+    if sparse := sparse_frames(scene, camera.integration_time):
         warnings = [sparse, *warnings]
     if cut is not None:
         cut = _completed(task, cut)

@@ -41,6 +41,8 @@ class Exposure:
     """Apparent radiance at the middle of the integration."""
     effects: Mapping[str, str] = field(default_factory=dict)
     """Attributes of its measurements about the surface: `Surface.effects`."""
+    warnings: tuple[str, ...] = ()
+    """Why the surface may have another emissivity: `Origin.doubts`."""
 
     def __post_init__(self) -> None:
         for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):

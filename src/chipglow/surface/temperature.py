@@ -12,7 +12,7 @@ from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import TEMPERATURE, Temperature
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
-from chipglow.surface.surface import SURFACES, EmissivityField, Surface
+from chipglow.surface.surface import SURFACES, UNKNOWN, EmissivityField, Origin, Surface
 
 
 class HomogeneousSurface(Surface):
@@ -168,6 +168,7 @@ class TrendSurface(HomogeneousSurface):
 
     trend: EmissivityTrend
     draw: int = 0
+    origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @property
     def effects(self) -> dict[str, str]:
