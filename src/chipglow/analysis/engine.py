@@ -25,6 +25,7 @@ from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, R
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.camera.exposure import sparse_frames
 from chipglow.laboratory.chip import (
     NoContactError,
     NoShearBandError,
@@ -198,7 +199,11 @@ def analyse(
         "error_reference": plan.reference,
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
-    warnings = list(_image_warnings(task, looked))
+    origins = [surface.origin for surface in surfaces.values()]
+    doubts = dict.fromkeys(text for one in origins for text in one.doubts(camera.band, scene))
+    warnings = [*doubts, *_image_warnings(task, looked)]
+    if sparse := sparse_frames(scene, camera.integration_time):
+        warnings = [sparse, *warnings]
     if cut is not None:
         cut = _completed(task, cut)
         warnings = [*resolution_warnings(scene, cut.band_width), *warnings]

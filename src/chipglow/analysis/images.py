@@ -130,6 +130,11 @@ class ExposureImages:
     def __init__(
         self, exposure: Exposure, kind: ReferenceKind = "maximum", shares_blur: bool = False
     ) -> None:
+        if not isinstance(exposure, Exposure):
+            raise ValueError(
+                f"exposure: {type(exposure).__name__}, expected an Exposure as Camera.expose "
+                "returns: a measurement no longer holds the scene's true temperatures"
+            )
         self.exposure, self.kind = exposure, kind
         blurred = lru_cache(1)(partial(_blurred, exposure)) if shares_blur else None
         self._formed = lru_cache(8)(partial(_formed, exposure, blurred))
