@@ -180,7 +180,7 @@ def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():
-    """Measured: 13 MB, 1.5 GB of memory, and 2 min with two threads, of which a third is the cut."""
+    """Measured: 13 MB, 1.5 GB of memory, 2 min with two threads, of which a third is the cut."""
     cost = expected_cost(Study())
     assert 7e6 < cost.disk < 22e6
     assert cost.memory == pytest.approx(1.47e9, rel=0.2)
