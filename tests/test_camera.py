@@ -553,7 +553,7 @@ def test_the_papers_camera_is_that_of_a_study():
         (Camera(pitch=50e-6), 0.0, r"pitch of 5e-05 m .* scene of 1.2e-05 x 1.2e-05 m"),
         (Camera(offset=(11e-6, 0.0)), 0.0, r"offset of 1.1e-05, 0 m does not fit"),
         (Camera(shape=(3, 1)), 0.0, r"shape is 3 x 1 pixels, but only 2 x 2"),
-        (Camera(), 0.0, r"0 s to 1e-05 s is not within the scene, which lasts from 0 s to 1e-06"),
+        (Camera(), 0.0, r"0 us to 10 us is not within the scene, which lasts from 0 us to 1 us"),
         (Camera(integration_time=STEP), -STEP, "not within the scene"),
         (Camera(integration_time=STEP), 4.5 * STEP, "not within the scene"),
         (Camera(integration_time=STEP), float("nan"), "not within the scene"),
