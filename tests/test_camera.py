@@ -244,6 +244,16 @@ def test_a_scene_of_one_frame_does_not_change():
     np.testing.assert_allclose(measured.radiance_temperature(), 700.0, atol=ROUNDING)
 
 
+@pytest.mark.parametrize(
+    ("step", "rise", "doubted"), [(1.0, 9, True), (1.0, 0, False), (1e-5, 9, False)]
+)
+def test_times_in_another_unit_are_doubted(step, rise, doubted):
+    temperature = np.full((3, 18, 18), 700.0) + rise * np.arange(3)[:, None, None]
+    scene = make_scene(temperature, times=step * np.arange(3))
+    warnings = Camera().measure(scene, BLACK, 0.0).notes.warnings
+    assert any("1 s apart, 1e+05 times the exposure of 10 µs" in one for one in warnings) == doubted
+
+
 @given(
     pitch=st.floats(0.3e-6, 15e-6),
     offset=st.floats(0, 5e-6),

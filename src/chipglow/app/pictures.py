@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
+from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
@@ -220,14 +221,14 @@ class SceneModel:
             starts=np.array([state.start]),
             drawn=(0,),
             shown=0,
-            views=(View(CURSOR, [places], noise),),
+            views=(View(CURSOR, [places], noise, ()),),
             phases=phases,
             reference=state.study.analysis.reference,
             effects={ALL: CASES[ALL]},
         )
         laid = {CURSOR: camera.lay(surface.redrawn(0), scene)}
         looked = look(scene, {CURSOR: surface}, laid, camera, schedule, progress)
-        reference, measured = np.moveaxis(looked.read[0, 0], -1, 0)
+        reference, measured, _ = np.moveaxis(looked.read[0, 0], -1, 0)
         error = measured - reference
         return Drawn(
             state,
@@ -235,7 +236,7 @@ class SceneModel:
                 name: np.concatenate(looked.along[row, 0, :, :, 1]) - KELVIN
                 for row, name in enumerate(LINES)
             },
-            Distribution(error, ("texture", "pixel phase")) if np.isfinite(error).all() else None,
+            Distribution(error, ("texture", PIXEL_PHASE)) if np.isfinite(error).all() else None,
         )
 
     def _exposure_key(self, state: State) -> Hashable:

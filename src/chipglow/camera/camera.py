@@ -14,7 +14,7 @@ from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.detector.terms import Lag, follows, lagged
-from chipglow.camera.exposure import Exposure, View, expose
+from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.convolution import Beyond, blur, blurs, images_on_pixels
@@ -276,8 +276,14 @@ class Camera(Part):
 
         A ValueError if the integration reaches beyond the scene, or the pixels do not fit it.
         """
-        (exposure,) = self.expose_fields(scene, (self.lay(surface, scene),), start)
-        return replace(exposure, effects=surface.effects)
+        return self._expose(scene, surface, self.lay(surface, scene), start)
+
+    def _expose(
+        self, scene: Scene, surface: Surface, field: EmissivityField, start: float
+    ) -> Exposure:
+        (exposure,) = self.expose_fields(scene, (field,), start)
+        warnings = tuple(surface.origin.doubts(self.band, scene))
+        return replace(exposure, effects=surface.effects, warnings=warnings)
 
     def expose_fields(
         self,
@@ -308,6 +314,7 @@ class Camera(Part):
         """
         images: list[Array] = []
         alike, starts, effects, grids = [], [], [], set()
+        warnings: dict[str, None] = {}
         for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
             scene = exposure.raster
             pixels = self.pixels(scene)
@@ -316,15 +323,14 @@ class Camera(Part):
             alike.append(self._show(within / self._own_light(scene), pixels))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
+            warnings |= dict.fromkeys(exposure.warnings)
             grids.add(pixels)
         if len(grids) != 1:
             raise ValueError("camera: one or more exposures of the same grid are required")
         measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
-        warnings = [
-            *self._lag_warning(measured.times),
-            *self._border_warning(np.stack(images), np.stack(alike), scene),
-        ]
+        warnings |= dict.fromkeys(self._lag_warning(measured.times))
+        warnings |= dict.fromkeys(self._border_warning(np.stack(images), np.stack(alike), scene))
         if warnings:
             measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured
@@ -350,11 +356,14 @@ class Camera(Part):
             As many frames as starts, with the scene's tool, and attributes of camera and surface.
         """
         self.pixels(scene.raster)
-        fields = (self.lay(surface, scene),)
+        field = self.lay(surface, scene)
         measured = self.form_measurement(
-            replace(self.expose_fields(scene, fields, at)[0], effects=surface.effects)
+            self._expose(scene, surface, field, at)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
+        if sparse := sparse_frames(scene, self.integration_time):
+            known = filter(None, (measured.data.attrs.get("warnings"), sparse))
+            measured.data.attrs["warnings"] = "\n".join(known)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
     def light_from_beyond(self, scene: Raster) -> Array:

@@ -19,6 +19,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 from chipglow.laboratory.emissivity.observations import check_same_pixels, uncertainty_columns
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Region, areas, shared_pixels
+from chipglow.surface import Origin
 from chipglow.text import Notes
 
 
@@ -31,6 +32,13 @@ class RegionEmissivities:
     lines: tuple[EmissivityLine, ...] = ()
     """Each area over the temperature; empty for one heating."""
     notes: Notes = field(default_factory=Notes)
+    metal: str = ""
+    """What the object is made of, if it is known."""
+
+    @property
+    def origin(self) -> Origin:
+        """Band and metal of the measurement."""
+        return Origin((self.maps[0].band.lower, self.maps[0].band.upper), self.metal)
 
     def to_frame(self) -> pd.DataFrame:
         """Return every region at every temperature; one row each."""
@@ -46,6 +54,7 @@ def determine_emissivities(
     heatings: Sequence[Heating],
     regions: Sequence[Region],
     names: Sequence[str] = (),
+    metal: str = "",
 ) -> RegionEmissivities:
     """Determine the emissivity of regions of a heated object."""
     if len(heatings) != len(measurements):
@@ -67,7 +76,7 @@ def determine_emissivities(
         f"{one} and {other} share {count} pixels, which count in both."
         for (one, other), count in shared_pixels(regions, maps[0].raster).items()
     )
-    return RegionEmissivities(maps, rows, tuple(lines), notes)
+    return RegionEmissivities(maps, rows, tuple(lines), notes, metal)
 
 
 def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
