@@ -38,7 +38,7 @@ from chipglow.scene.lines import nearest
 from chipglow.surface import CHIP_1, CHIP_2, UniformSurface
 
 BAND = Band(3.8e-6, 5.1e-6)
-CAMERA = Camera(band=BAND, pitch=6e-6, psf=GaussianPSF(12e-6), psf_order="detector")
+CAMERA = replace(Camera.paper(), psf=GaussianPSF(12e-6))
 GRID = Raster(left=-300e-6, top=300e-6, spacing=2e-6, rows=180, columns=180)
 TOOL = ToolGeometry()
 SURFACES = {"chip 1": CHIP_1, "chip 2": CHIP_2}
@@ -144,6 +144,8 @@ def test_a_rounded_pitch_adds_no_samples_to_a_pixel(rounding, phase, seed):
 
 
 def test_the_mean_as_reference_leaves_no_error_without_a_psf():
+    with pytest.raises(ValueError, match="exposure: Measurement, expected an Exposure"):
+        error_images(CAMERA, CAMERA.form_measurement(random_exposure(2)))
     errors = error_images(CAMERA, random_exposure(2), "mean")
     np.testing.assert_allclose(errors.case_2, 0.0, atol=1e-9)
 
@@ -617,7 +619,7 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
             across.points[across.distance == 0.0],
         )
         first = data.sel(psf_order=order, reading="rake").isel(
-            psf_width=at, exposure=0, pixel_phase=0
+            psf_width=at, exposure=0, varied_phase=0
         )
         error = first.varied_measured.sel(effects="all") - first.varied_reference
         assert float(error) == pytest.approx(face[0], abs=1e-4)

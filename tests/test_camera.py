@@ -244,6 +244,16 @@ def test_a_scene_of_one_frame_does_not_change():
     np.testing.assert_allclose(measured.radiance_temperature(), 700.0, atol=ROUNDING)
 
 
+@pytest.mark.parametrize(
+    ("step", "rise", "doubted"), [(1.0, 9, True), (1.0, 0, False), (1e-5, 9, False)]
+)
+def test_times_in_another_unit_are_doubted(step, rise, doubted):
+    temperature = np.full((3, 18, 18), 700.0) + rise * np.arange(3)[:, None, None]
+    scene = make_scene(temperature, times=step * np.arange(3))
+    warnings = Camera().measure(scene, BLACK, 0.0).notes.warnings
+    assert any("1 s apart, 1e+05 times the exposure of 10 µs" in one for one in warnings) == doubted
+
+
 @given(
     pitch=st.floats(0.3e-6, 15e-6),
     offset=st.floats(0, 5e-6),
@@ -443,7 +453,8 @@ def test_result_does_not_depend_on_the_number_of_threads():
 def test_under_the_floor_is_flagged_not_returned():
     temperature = np.full((1, 18, 27), 900.0)
     temperature[:, :, :9] = 500.0
-    measured = Camera(psf=None).measure(make_scene(temperature), BLACK, 0.0)
+    camera = Camera(psf=None, lower_limit=573.15)
+    measured = camera.measure(make_scene(temperature), BLACK, 0.0)
     assert measured.flags.dtype == np.uint8
     np.testing.assert_array_equal(measured.flags[0], [[Flag.UNDER_RANGE, 0, 0]] * 2)
     np.testing.assert_array_equal(np.isnan(temperature_of(measured)), measured.flags[0] == 1)
@@ -544,7 +555,15 @@ def test_what_is_no_surface_is_refused(look, surface):
 
 def test_the_papers_camera_is_that_of_a_study():
     assert Camera.paper() == Study().camera.build()
-    assert Camera.paper() == replace(Camera(), psf_order="detector")
+
+
+def test_what_is_the_papers_comes_with_its_camera_only():
+    near = Camera(band=Band(1.5e-6, 1.6e-6))
+    assert near.psf.wavelength == pytest.approx(1.55e-6)
+    assert near.psf.fwhm == pytest.approx(Camera.paper().psf.fwhm * 1.55 / 4.5)
+    assert (near.lower_limit, Camera().lower_limit) == (None, None)
+    with pytest.raises(ValueError, match="wavelength is none"):
+        AnnularAperturePSF(None).kernel(1e-6)
 
 
 @pytest.mark.parametrize(

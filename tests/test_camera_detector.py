@@ -231,6 +231,19 @@ def test_lag_without_a_frame_before_is_said():
     assert made.form_measurement([exposure(float(start)) for start in at]).notes.warnings == []
 
 
+def test_a_microbolometer_lags_by_its_time_constant():
+    """Each frame keeps exp(−T / τ) of the one before: 19 % at 60 Hz and 10 ms."""
+    made = replace(PLAIN, frame_rate=60.0, time_constant=10e-3)
+    starts = made.frame_times(0.0, 4)
+    radiance = np.broadcast_to(np.array([1.0, 3.0, 3.0, 3.0])[:, None, None], (4, 2, 3))
+    left = np.exp(-np.arange(4) / 60.0 / 10e-3)
+    read, _ = made.read(radiance, starts)
+    np.testing.assert_allclose(read[:, 0, 0], 3.0 - 2.0 * left, rtol=1e-12)
+    np.testing.assert_array_equal(made.read(radiance, 7.0 * starts)[0], radiance)
+    (warning,) = made.form_measurement(exposure()).notes.warnings
+    assert "thermal time constant is 10 ms" in warning
+
+
 def test_error_images_have_the_noise_in_both_cases_and_the_psf_does_not():
     """The same deviates with and without the point spread function: it alone makes its portion."""
     noisy = camera(ShotNoise(), ReadNoise(900.0), psf=AnnularAperturePSF())

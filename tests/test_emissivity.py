@@ -422,7 +422,7 @@ def study_of(output):
 def test_the_command_writes_table_map_and_picture(folder):
     outputs = ["--out", "one.nc", "--table", "t.csv", "--plot", "p.png"]
     spread = ["--reference-uncertainty", "2 K", "--reflected-uncertainty", "1 degC"]
-    result = command("a.nc", *AT_391, *spread, *outputs)
+    result = command("a.nc", *AT_391, *spread, "--metal", "Ti-6Al-4V", *outputs)
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines()[-3:] == ["one.nc", "t.csv", "p.png"]
     lines = pd.read_csv("t.csv", index_col="region")
@@ -434,6 +434,9 @@ def test_the_command_writes_table_map_and_picture(folder):
     chip = study_of(result.stdout).surface.chips["measured chip"]
     assert chip.body.mean == pytest.approx(lines["mean"]["chip body"], abs=6e-5)
     surface, found = read_emissivity_map("one.nc"), determine_emissivity([image], heating)
+    known = (pytest.approx(BAND.lower), pytest.approx(BAND.upper)), "Ti-6Al-4V"
+    for one in (surface, *surfaces_of(study_of(result.stdout).surface, 1).values()):
+        assert (one.origin.band, one.origin.metal) == known
     np.testing.assert_allclose(surface.values, found.emissivity, rtol=1e-15)
     np.testing.assert_allclose(surface.raster.extent, RASTER.extent, atol=1e-12)
     assert (folder / "p.png").stat().st_size > 10_000
@@ -487,6 +490,8 @@ def test_assumptions_and_warnings_are_printed(folder):
         *("Nothing changes between frames", "Warning: shear band: 18 of 180 pixels are left out"),
     ):
         assert words in result.stderr
+    stated = command("dead.nc", *AT_391, "--reflected-uncertainty", "5 K").stderr
+    assert "reflects 19.85 ± 5 degC and nothing hotter; 100 K more would shift" in stated
 
 
 # A study's surface of what was measured

@@ -16,7 +16,7 @@ from analytic_chip import AnalyticChip
 from documented import ROOT
 
 import chipglow
-from chipglow.camera import Camera, LinearCalibration
+from chipglow.camera import AnnularAperturePSF, Camera, LinearCalibration
 from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.laboratory.emissivity.figure import draw_emissivity
 from chipglow.laboratory.measurement.figures import draw_calibrations
@@ -36,6 +36,9 @@ def scene():
     return AnalyticChip(frames=61, frame_spacing=0.5e-6).scene()
 
 
+CAMERA = Camera(psf=AnnularAperturePSF(), lower_limit=573.15)
+
+
 @compared
 def test_scene(scene):
     return draw_scene(scene, scene.times[56])
@@ -43,13 +46,13 @@ def test_scene(scene):
 
 @compared
 def test_measurement(scene):
-    measured = Camera().measure(scene, chipglow.CHIP_2, scene.times[36])
+    measured = CAMERA.measure(scene, chipglow.CHIP_2, scene.times[36])
     return measured.plot().figure
 
 
 @compared
 def test_rake_grid(scene):
-    camera = replace(Camera(), integration_time=5e-6)
+    camera = replace(CAMERA, integration_time=5e-6)
     measured = camera.measure(scene, chipglow.CHIP_2, scene.times[[10, 30, 50]])
     return draw_rake_grid(measured, chipglow.rake_grid(measured, measured.tool))
 

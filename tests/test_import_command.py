@@ -209,6 +209,32 @@ def test_a_table_with_names_is_points_and_one_without_a_grid(tmp_path):
     assert load_import(tmp_path / "grid.csv").kind_of_source() == "grid"
 
 
+def test_an_hdf5_file_of_vtk_is_a_mesh(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    grid = pyvista.ImageData(dimensions=(4, 4, 1)).cast_to_unstructured_grid()
+    grid["temperature"] = np.linspace(300.0, 400.0, 16)
+    grid.save(tmp_path / "mesh.vtkhdf")
+    for name in ("mesh.hdf", "mesh.h5"):
+        path = tmp_path / name
+        path.write_bytes((tmp_path / "mesh.vtkhdf").read_bytes())
+        wanted = load_import(path, ["units.length=mm"])
+        assert wanted.kind_of_source() == "mesh"
+        assert prospect(wanted.build()).survey.kind == "mesh, 1 file of VTK HDF"
+
+
+def test_files_of_settings_are_beside_the_shell_and_those_of_a_file_beside_it(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "camera").mkdir()
+    described = tmp_path / "camera" / "import.yaml"
+    described.write_text("source: cut.npz\ntool: none\n")
+    (tmp_path / "edge.csv").write_text("x_um,y_um\n0,100\n0,0\n100,10\n")
+    monkeypatch.chdir(tmp_path)
+    wanted = load_import(described, ["tool.outline=edge.csv"])
+    assert wanted.source == str(tmp_path / "camera" / "cut.npz")
+    assert wanted.tool.outline == str(tmp_path / "edge.csv")
+
+
 def test_units_that_follow_from_others_are_said(arrays, tmp_path):
     np.savez(tmp_path / "v.npz", T=np.full((4, 6), 300.0), vx=np.ones((4, 6)))
     settings = ["grid.spacing=5 um", "units={length: mm, time: us}"]
@@ -224,11 +250,17 @@ def test_units_that_follow_from_others_are_said(arrays, tmp_path):
         (np.full((4, 6), np.nan), "has no number in the frames"),
         (np.full((4, 6), np.inf), "T: has infinite numbers"),
         (np.full((4, 6), 25.0), "if it is in °C, expected units.temperature: degC"),
+        (
+            np.full((4, 6), -120.0),
+            "153.15 in T, expected kelvin of 200 or more; units.temperature is degC",
+        ),
     ],
 )
 def test_temperatures_that_are_none_are_refused(tmp_path, values, wrong):
     np.savez(tmp_path / "t.npz", T=values)
     arguments = ["import", str(tmp_path / "t.npz"), "--set", "grid.spacing=5 um"]
+    if values[0, 0] < 0:
+        arguments += ["--set", "units.temperature=degC"]
     result = RUNNER.invoke(app, [*arguments, "--out", str(tmp_path / "s.nc")])
     assert result.exit_code == 2
     assert wrong in " ".join(result.output.split())

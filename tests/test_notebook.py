@@ -58,7 +58,9 @@ def test_a_measurement_in_a_line():
         "the first; with tool; 2 warnings: see .notes>"
     )
     assert measurement().notes.warnings == ["A.", "B."]
-    cold = Camera(psf=None, integration_time=1e-6).measure(scene(), UniformSurface(0.1), 0.0)
+    cold = Camera(psf=None, integration_time=1e-6, lower_limit=573.15).measure(
+        scene(), UniformSurface(0.1), 0.0
+    )
     assert repr(cold) == (
         "<Measurement: 1 frame of 8 x 13 pixels of 6 µm; at 0 µs; no temperature; with tool>"
     )

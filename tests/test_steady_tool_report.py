@@ -9,7 +9,7 @@ import pytest
 from analytic_chip import AnalyticChip
 
 from chipglow.analysis import Plan, analyse
-from chipglow.camera import Camera
+from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.laboratory.chip import contact_temperatures
 from chipglow.report import write_report
 from chipglow.report.steady_tool import tool_rows
@@ -24,7 +24,7 @@ def analysed(scene):
     return analyse(
         scene,
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
-        Camera(psf_order="detector", lower_limit=None),
+        Camera(psf=AnnularAperturePSF(), psf_order="detector"),
         Plan(exposures=3, phases=1, textures=1, psf_widths=(12e-6,)),
     )
 

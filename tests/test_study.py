@@ -128,16 +128,16 @@ def test_the_default_study_has_the_librarys_defaults():
     assert cutting.friction == Friction()
     assert cutting.numerics == Numerics()
     assert cutting.window == OutputWindow()
-    assert camera == Camera(psf_order="detector")
+    assert camera == Camera.paper()
     assert study.analysis == Plan()
     chips = study.surface.build(study.seed)
     assert list(chips.values()) == [CHIP_1, CHIP_2]
 
 
-def test_the_default_view_holds_the_papers_sensors_and_ten_columns_more():
+def test_the_default_view_holds_more_than_the_papers_90_by_100_sensors():
     study = Study()
     raster = study.cutting.field_of_view.build()
-    assert study.camera.build().pixels(raster).shape == (90, 110)
+    assert study.camera.build().pixels(raster).shape == (130, 115)
     frames = study.cutting.duration / study.cutting.window.interval
     assert round(frames) == 455
 
@@ -222,7 +222,7 @@ REFUSED = [
         "{camera: {integration_time: 200 us}, cutting: {window: {start: 1.579 mm, end: 1.958 mm}}}",
         "camera.integration_time: 200 us is longer than the scene, expected up to the 90.96 us",
     ),
-    ("camera: {pitch: 2 mm}", "2000 um is larger than the field of view, expected up to the 540"),
+    ("camera: {pitch: 2 mm}", "2000 um is larger than the field of view, expected up to the 690"),
     ("camera: {fill_factor: yes}", "camera.fill_factor: True, expected a valid number"),
     ("camera: {fill_factor: .nan}", "camera.fill_factor: nan, expected a finite number"),
     (

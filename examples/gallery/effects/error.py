@@ -29,7 +29,7 @@ from chipglow.drawing.drawing import new_figure, show_image, style
 from chipglow.drawing.scales import SIGNED
 
 scene = closed_form_chip(40)
-camera = chipglow.Camera(integration_time=8e-6, psf=chipglow.AnnularAperturePSF(4.45e-6))
+camera = chipglow.Camera(integration_time=8e-6, lower_limit=573.15)
 exposure = camera.expose(scene, chipglow.CHIP_2, scene.times[24])
 errors, pixels = chipglow.error_images(camera, exposure), camera.pixels(scene.raster)
 

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
+from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
@@ -226,14 +227,14 @@ class SceneModel:
             starts=np.array([study.start]),
             drawn=(0,),
             shown=0,
-            views=(View(CURSOR, [places], noise),),
+            views=(View(CURSOR, [places], noise, ()),),
             phases=phases,
             reference=study.analysis.reference,
             effects={ALL: CASES[ALL]},
         )
         laid = {CURSOR: camera.lay(surface.redrawn(0), scene)}
         looked = look(scene, {CURSOR: surface}, laid, camera, schedule, progress)
-        reference, measured = np.moveaxis(looked.read[0, 0], -1, 0)
+        reference, measured, _ = np.moveaxis(looked.read[0, 0], -1, 0)
         error = measured - reference
         lines = {
             name: np.concatenate(looked.along[row, 0, :, :, 1]) - KELVIN
@@ -241,7 +242,7 @@ class SceneModel:
         }
         is_known = np.isfinite(error).all()
         return Drawn(
-            state, lines, Distribution(error, ("texture", "pixel phase")) if is_known else None
+            state, lines, Distribution(error, ("texture", PIXEL_PHASE)) if is_known else None
         )
 
     def _exposure_key(self, state: State) -> Hashable:

@@ -17,6 +17,7 @@ from chipglow.camera.calibration.fit import (
     fit_calibration as fit_calibration,
 )
 from chipglow.camera.camera import (
+    PAPER_LIMIT as PAPER_LIMIT,
     Camera as Camera,
     ChipglowWarning as ChipglowWarning,
 )

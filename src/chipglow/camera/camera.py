@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from math import exp
 from typing import Annotated, Final, Literal
 from warnings import warn
 
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
 from chipglow.camera.detector.response import OperationPoint
-from chipglow.camera.detector.terms import Lag, follows
-from chipglow.camera.exposure import Exposure, View, expose
+from chipglow.camera.detector.terms import Lag, follows, lagged
+from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.convolution import Beyond, blur, blurs, images_on_pixels
@@ -38,6 +39,9 @@ from chipglow.surface import EmissivityField, Surface
 BORDER_TOLERANCE: Final = 1.0
 """Change in K of a pixel from which on it is said that the border of the scene matters."""
 
+PAPER_LIMIT: Final = 573.15
+"""Lower limit in K of the paper's camera."""
+
 _ROUNDING: Final = 1e-13
 _COLD_FLOOR: Final = 373.15
 """Floor in K up to which a round number is probably one of degrees Celsius."""
@@ -51,8 +55,8 @@ class ChipglowWarning(UserWarning):
 class Camera(Part):
     """An infrared camera looking at a scene (Figure 6 of Heigel and Whitenton, 2010).
 
-    The defaults are those of the paper except for the order of blur and pixels; `paper` returns the
-    paper's camera.
+    By default it has no lower limit, and its point spread function is the diffraction of a
+    reflecting objective in the camera's band; `paper` returns the paper's camera.
 
     Raises
     ------
@@ -100,7 +104,7 @@ class Camera(Part):
             "optics and pixel together: a pixel then reads the blurred image at its centre and "
             "does not integrate again."
         ),
-    ] = field(default_factory=AnnularAperturePSF)
+    ] = field(default_factory=partial(AnnularAperturePSF, None))
     psf_order: Annotated[
         Literal["optics", "detector"],
         Parameter(
@@ -119,6 +123,15 @@ class Camera(Part):
             over=0.0,
         ),
     ] = None
+    time_constant: Annotated[
+        float | None,
+        Parameter(
+            "Thermal time constant of a microbolometer's elements, by which each frame lags; none: "
+            "a photon detector, which has none.",
+            TIME,
+            over=0.0,
+        ),
+    ] = None
     lower_limit: Annotated[
         float | None,
         Parameter(
@@ -127,7 +140,7 @@ class Camera(Part):
             least=COLDEST,
             most=HOTTEST,
         ),
-    ] = 573.15
+    ] = None
     reflected: Annotated[
         float | None,
         Parameter(
@@ -161,6 +174,8 @@ class Camera(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.psf is not None:
+            object.__setattr__(self, "psf", self.psf.of_camera(self.band, None))
         included = self.psf.includes if self.psf else ()
         if included and not set(included) <= {"footprint", *BLURS.kinds}:
             known = ", ".join(("footprint", *BLURS.kinds))
@@ -194,11 +209,12 @@ class Camera(Part):
     def paper(cls) -> "Camera":
         """Return the camera of the paper's simulation, as far as the paper states it.
 
-        The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6;
-        that changes temperatures by up to 7 K. The point spread function, which the paper prints as
-        a picture only, is an assumption: see `AnnularAperturePSF`.
+        It measures from 300 °C on. The blur is applied from pixel to pixel (`psf_order` is
+        ``detector``), as in its Figure 6; that changes temperatures by up to 7 K. The point spread
+        function, which the paper prints as a picture only, is an assumption: see
+        `AnnularAperturePSF`.
         """
-        return cls(psf_order="detector")
+        return cls(psf=AnnularAperturePSF(), psf_order="detector", lower_limit=PAPER_LIMIT)
 
     def pixels(self, scene: Raster) -> Raster:
         """Return the raster of the pixels on a scene."""
@@ -260,8 +276,14 @@ class Camera(Part):
 
         A ValueError if the integration reaches beyond the scene, or the pixels do not fit it.
         """
-        (exposure,) = self.expose_fields(scene, (self.lay(surface, scene),), start)
-        return replace(exposure, effects=surface.effects)
+        return self._expose(scene, surface, self.lay(surface, scene), start)
+
+    def _expose(
+        self, scene: Scene, surface: Surface, field: EmissivityField, start: float
+    ) -> Exposure:
+        (exposure,) = self.expose_fields(scene, (field,), start)
+        warnings = tuple(surface.origin.doubts(self.band, scene))
+        return replace(exposure, effects=surface.effects, warnings=warnings)
 
     def expose_fields(
         self,
@@ -292,6 +314,7 @@ class Camera(Part):
         """
         images: list[Array] = []
         alike, starts, effects, grids = [], [], [], set()
+        warnings: dict[str, None] = {}
         for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
             scene = exposure.raster
             pixels = self.pixels(scene)
@@ -300,15 +323,14 @@ class Camera(Part):
             alike.append(self._show(within / self._own_light(scene), pixels))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
+            warnings |= dict.fromkeys(exposure.warnings)
             grids.add(pixels)
         if len(grids) != 1:
             raise ValueError("camera: one or more exposures of the same grid are required")
         measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
-        warnings = [
-            *self._lag_warning(measured.times),
-            *self._border_warning(np.stack(images), np.stack(alike), scene),
-        ]
+        warnings |= dict.fromkeys(self._lag_warning(measured.times))
+        warnings |= dict.fromkeys(self._border_warning(np.stack(images), np.stack(alike), scene))
         if warnings:
             measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured
@@ -334,11 +356,14 @@ class Camera(Part):
             As many frames as starts, with the scene's tool, and attributes of camera and surface.
         """
         self.pixels(scene.raster)
-        fields = (self.lay(surface, scene),)
+        field = self.lay(surface, scene)
         measured = self.form_measurement(
-            replace(self.expose_fields(scene, fields, at)[0], effects=surface.effects)
+            self._expose(scene, surface, field, at)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
+        if sparse := sparse_frames(scene, self.integration_time):
+            known = filter(None, (measured.data.attrs.get("warnings"), sparse))
+            measured.data.attrs["warnings"] = "\n".join(known)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
     def light_from_beyond(self, scene: Raster) -> Array:
@@ -429,8 +454,11 @@ class Camera(Part):
     def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
         """Return radiance and flags that detector and calibration make of images (time, y, x).
 
-        Without a detector the images themselves, and None.
+        Without a detector the images, with the lag of a thermal time constant, and None.
         """
+        if self.time_constant is not None:
+            frame_time = 1 / self.frame_rate
+            images = lagged(images, starts, frame_time, exp(-frame_time / self.time_constant))
         calibration = self.calibration(images.shape[1:])
         if self.detector is None or calibration is None:
             return images, None
@@ -444,11 +472,18 @@ class Camera(Part):
 
     def _lag_warning(self, starts: Array) -> Iterator[str]:
         """Warn where no frame follows another, so that there is no lag."""
-        lags = self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms)
-        if lags and not follows(starts, 1 / self.frame_rate).any():
+        if follows(starts, 1 / self.frame_rate).any():
+            return
+        if self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms):
             yield (
                 "Lag: no two frames are one frame period apart, so each frame is taken as its own "
                 "predecessor: there is no lag in them."
+            )
+        if self.time_constant is not None:
+            yield (
+                f"The elements' thermal time constant is {1e3 * self.time_constant:.3g} ms, and no "
+                "two frames are one frame period apart: each frame is computed as if its scene had "
+                "lasted long. A real one shows far less of what is over sooner."
             )
 
     def _border_warning(self, images: Array, alike: Array, scene: Raster) -> Iterator[str]:
@@ -481,6 +516,7 @@ class Camera(Part):
             "psf_order": self.psf_order,
             "integration_time": self.integration_time,
             "frame_rate": self.frame_rate,
+            "time_constant": self.time_constant,
             "shutter": (
                 "global" if self.line_time is None else f"rolling, {self.line_time:g} s a row"
             ),

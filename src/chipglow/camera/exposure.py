@@ -18,6 +18,8 @@ from chipglow.scene.splines import SplineFrame
 from chipglow.surface import EmissivityField, EmissivityStack
 
 _ROUNDING: Final = 1e-6
+_SPARSE: Final = 1e-3
+"""Fraction of the time between frames under which an exposure hardly fits a scene that changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,8 @@ class Exposure:
     """Apparent radiance at the middle of the integration."""
     effects: Mapping[str, str] = field(default_factory=dict)
     """Attributes of its measurements about the surface: `Surface.effects`."""
+    warnings: tuple[str, ...] = ()
+    """Why the surface may have another emissivity: `Origin.doubts`."""
 
     def __post_init__(self) -> None:
         for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
@@ -109,6 +113,20 @@ def expose(
     return tuple(
         Exposure(start, duration, scene.raster, of_view, peak, hottest, centre)
         for of_view, peak, centre in zip(mean, sums.peak, sums.centre, strict=True)
+    )
+
+
+def sparse_frames(scene: Scene, duration: float) -> str:
+    """Return a warning if a scene changes and its frames are far apart for an exposure in s."""
+    if duration >= _SPARSE * scene.frame_spacing:
+        return ""
+    first, last = (scene.field("temperature", index) for index in (0, len(scene) - 1))
+    if np.array_equal(first, last):
+        return ""
+    return (
+        f"The scene changes, and its frames are {scene.frame_spacing:.3g} s apart, "
+        f"{scene.frame_spacing / duration:.2g} times the exposure of {1e6 * duration:.4g} µs: "
+        "are its times in another unit?"
     )
 
 

@@ -39,6 +39,9 @@ def emissivity(
         ),
     ] = None,
     drift: opt.Drift = None,
+    metal: Annotated[
+        str, opt.value("NAME", "Metal of the object, e.g. 'Ti-6Al-4V': stored with the emissivity.")
+    ] = "",
     out: Annotated[Path | None, opt.file("Write maps and regions, NetCDF.")] = None,
     table: Annotated[Path | None, opt.file("Write the table of regions, CSV.")] = None,
     plot: Annotated[Path | None, opt.picture("Draw image, regions and map")] = None,
@@ -68,7 +71,8 @@ def emissivity(
     ]
     named = lab.load_regions(regions)
     measurements = [load_measurement(image, settings or ()) for image in images]
-    result = lab.determine_emissivities(measurements, heatings, named, list(map(str, images)))
+    names = list(map(str, images))
+    result = lab.determine_emissivities(measurements, heatings, named, names, metal)
     _print_tables(result)
     _print_study(result, out)
     whole = {row.name for row in result.rows[0] if row.whole}
@@ -108,7 +112,7 @@ def _print_tables(result: "lab.RegionEmissivities") -> None:
 def _print_study(result: "lab.RegionEmissivities", out: Path | None) -> None:
     from chipglow.laboratory import emissivity as lab
 
-    text, head = lab.surface_text(result.rows[0]), "For a study"
+    text, head = lab.surface_text(result), "For a study"
     if text and len(result.maps) > 1:
         if out is not None and "chips" in text:
             text = lab.measured_text(out)

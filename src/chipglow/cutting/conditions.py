@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Final
+from typing import Annotated, Final, Self
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import (
@@ -13,6 +13,7 @@ from chipglow.quantities.units import (
     TEMPERATURE,
     TIME,
 )
+from chipglow.scene import Raster
 
 CELLS_NEEDED: Final = 5.0
 """Cells across a length from which its shape, and what happens along it, is resolved."""
@@ -218,6 +219,15 @@ class Numerics(Part):
         for name in ("upstream", "downstream", "depth", "height"):
             if not 8 * self.cell <= getattr(self, name) <= 0.1:
                 raise ValueError(f"{name}: {getattr(self, name)!r} m, expected 8 cells to 0.1 m")
+
+    def around(self, view: Raster) -> Self:
+        """Return them with a region that holds a field of view."""
+        left, right, bottom, top = view.extent
+        rim = 2 * self.cell
+        reach = {"upstream": -left, "downstream": right, "depth": -bottom, "height": top}
+        return replace(
+            self, **{name: max(getattr(self, name), at + rim) for name, at in reach.items()}
+        )
 
 
 def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:

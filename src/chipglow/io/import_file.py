@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 from chipglow.io.importing import Import, View
+from chipglow.io.measurement_file import holds
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, Units
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.mesh_vtk import OTHER_HDF
 from chipglow.io.sources.movie import (
     FieldMovie,
     MovieSource,
@@ -243,6 +245,8 @@ class ImportDescription(Part):
         name = Path(self.file).name.lower()
         if name.endswith((".csv", ".tsv")) and _has_header(Path(self.file)):
             return "points"
+        if name.endswith(OTHER_HDF) and holds(self.file, ("VTKHDF",)):
+            return "mesh"
         for kind, source in IMPORT_SOURCES.parts.items():
             if name.endswith(source.endings):
                 return kind

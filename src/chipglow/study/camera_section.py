@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from chipglow.camera import (
     BLURS,
     OPTICS_TERMS,
+    PAPER_LIMIT,
     PSFS,
     AnnularAperturePSF,
     BlurredPSF,
@@ -27,6 +28,8 @@ from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.study.scaling import with_pitch
 from chipglow.text import read_yaml
+
+PAPER_BAND: Final = 3.8e-6, 5.1e-6
 
 _FILE: Final = Path(__file__).with_name("cameras.yaml")
 CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)
@@ -48,10 +51,7 @@ class CameraSection(Part):
             allowed=f"none, {', '.join(CAMERAS)}",
         ),
     ] = None
-    band: Annotated[tuple[float, float], Parameter("Spectral band.", WAVELENGTHS)] = (
-        3.8e-6,
-        5.1e-6,
-    )
+    band: Annotated[tuple[float, float], Parameter("Spectral band.", WAVELENGTHS)] = PAPER_BAND
     response: Annotated[
         FileBeside | None,
         Parameter(
@@ -106,6 +106,7 @@ class CameraSection(Part):
     )
     frame_rate: Annotated[float, Camera.parameter("frame_rate")] = Camera.frame_rate
     line_time: Annotated[float | None, Camera.parameter("line_time")] = None
+    time_constant: Annotated[float | None, Camera.parameter("time_constant")] = None
     lower_limit: Annotated[
         float | Literal["detector"] | None,
         replace(
@@ -114,7 +115,7 @@ class CameraSection(Part):
             "detector it is the detector's, unless it is said.",
             allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
-    ] = Camera.lower_limit
+    ] = PAPER_LIMIT
     reflected: Annotated[float | None, Camera.parameter("reflected")] = None
     detector: Annotated[Detector | None, Camera.parameter("detector")] = None
 
@@ -134,9 +135,9 @@ class CameraSection(Part):
                 raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
             preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
             data = {**preset, **data}
-        camera = with_pitch(data, from_file)
-        if camera.get("detector") not in (None, "none"):
-            return {"lower_limit": "detector", **camera}
+        camera = _of_its_band(with_pitch(data, from_file), from_file)
+        if camera.get("detector") not in (None, "none") and "lower_limit" not in data:
+            return {**camera, "lower_limit": "detector"}
         return camera
 
     def build(self, seed: int = 2010) -> Camera:
@@ -180,3 +181,15 @@ class CameraSection(Part):
             return None
         psf = self.psf.of_camera(band, self.magnification)
         return BlurredPSF(psf, self.blur) if self.blur else psf
+
+
+def _of_its_band(camera: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
+    """Return a camera's data; in another band than the paper's, without its PSF and limit."""
+    try:
+        band = WAVELENGTHS.parse_range(camera.get("band", PAPER_BAND), not from_file)
+    except ValueError:  # which reading the field reports
+        band = PAPER_BAND
+    if band == PAPER_BAND:
+        return dict(camera)
+    psf = {"kind": AnnularAperturePSF.kind, "wavelength": "none"}
+    return {"psf": psf, "lower_limit": "none", **camera}

@@ -24,8 +24,6 @@ from chipglow.quantities import Parameter, Part, beside_the_study
 from chipglow.quantities.units import LENGTH, POSITION, TEMPERATURE
 from chipglow.scene import Raster
 
-_IN_REGION: Final = "the whole scene within the simulated region"
-
 STEADY: Final = "steady"
 """Temperature of a tool that has been cutting for long."""
 
@@ -34,12 +32,8 @@ STEADY: Final = "steady"
 class FieldOfViewSection(Part):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
-    left: Annotated[
-        float, Parameter("Left edge of the scene.", POSITION, allowed=_IN_REGION)
-    ] = -620e-6
-    top: Annotated[float, Parameter("Upper edge of the scene.", POSITION, allowed=_IN_REGION)] = (
-        460e-6
-    )
+    left: Annotated[float, Parameter("Left edge of the scene.", POSITION)] = -650e-6
+    top: Annotated[float, Parameter("Upper edge of the scene.", POSITION)] = 700e-6
     spacing: Annotated[
         float,
         Parameter(
@@ -48,8 +42,8 @@ class FieldOfViewSection(Part):
             over=0.0,
         ),
     ] = 2 / 3e6
-    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)] = 810
-    columns: Annotated[int, Parameter("Samples from left to right.", least=1)] = 990
+    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)] = 1170
+    columns: Annotated[int, Parameter("Samples from left to right.", least=1)] = 1035
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -142,6 +136,7 @@ class CuttingSection(CuttingConditions):
         return float((self.window.end - self.window.start) / self.speed)
 
     def simulation(self) -> CuttingSimulation:
+        """Return the simulation of a region that holds the field of view."""
         conditions = {one.name: getattr(self, one.name) for one in fields(CuttingConditions)}
         return CuttingSimulation(
             conditions=CuttingConditions(**conditions),
@@ -149,7 +144,7 @@ class CuttingSection(CuttingConditions):
             workpiece=workpiece(self.workpiece),
             tool_material=tool_material(self.tool.material),
             friction=self.friction,
-            numerics=self.numerics,
+            numerics=self.numerics.around(self.field_of_view.build()),
             surroundings=self.surroundings,
             tool_temperature=self.tool.start(),
         )

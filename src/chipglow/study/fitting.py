@@ -4,7 +4,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
+from chipglow.analysis import Plan
 from chipglow.quantities import Part, own_settings
+from chipglow.quantities.units import LENGTH
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import FeaturesSection, surfaces_of
@@ -25,8 +27,9 @@ _FEW_CELLS: Final = 10
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
-    "camera": {"offset_right", "offset_down"},
     "surface": {"kind", "measured_in", "maps", "measured", "follow", "restore_standard_deviation"},
+    "camera": {"offset_right", "offset_down"},
+    "analysis": set(Plan.declared()) - {"reference", "rake_chip", "band_chip"},
 }
 """Fields whose defaults are no property of the paper's experiment."""
 
@@ -148,14 +151,19 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
     """Yield what is the paper's in a study that is another, a sentence for each section."""
     if study.is_papers:
         return
-    sections = ["surface", "camera"] if study.scene else ["cutting", "surface", "camera"]
-    for name in sections:
-        section = getattr(study, name)
-        if name == "surface" and not isinstance(section, FeaturesSection):
-            continue
-        left = list(_unset(section, _HOW_FINELY[name], ""))
+    without = dict(_HOW_FINELY)
+    if study.scene:
+        del without["cutting"]
+    if not isinstance(study.surface, FeaturesSection):
+        del without["surface"]
+        without["analysis"] = without["analysis"] | {"rake_chip", "band_chip"}
+    for name, fields in without.items():
+        left = list(_unset(getattr(study, name), fields, ""))
         if left:
             yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
+    if "psf_widths" not in study.analysis.given:
+        low, *_, high = (LENGTH.text(width) for width in study.plan.psf_widths)
+        yield f"PSF widths from {low} to {high} go round the camera's own (analysis.psf_widths)."
 
 
 def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:

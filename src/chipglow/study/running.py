@@ -188,7 +188,13 @@ def wavelengths(
         data = wavelength_errors(
             scene, fitted.surfaces, camera, study.wavelengths, spots, *draws, progress
         )
-        return data.assign_attrs(fitted.notes.attrs())
+        doubts = [
+            text
+            for band in study.wavelengths.bands
+            for surface in fitted.surfaces.values()
+            for text in surface.origin.doubts(band, scene)
+        ]
+        return data.assign_attrs((fitted.notes + Notes(warnings=doubts)).attrs())
 
 
 @contextmanager
@@ -245,6 +251,7 @@ def _compute(
         "mass_scaling": simulation.mass_scaling,
         "cell": simulation.numerics.cell,
         "resolution_warnings": "\n".join(simulation.resolution_warnings),
+        "metal": simulation.workpiece.name.partition(", flow stress ")[0],
     }
     left = unfinished_scenes(path) if resume else []
     start = left[0] if left and left[0].progress > 0 else None

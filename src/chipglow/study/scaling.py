@@ -1,14 +1,26 @@
-"""Defaults that follow what a study says: view, window and cutting length, as the feed asks."""
+"""Defaults that follow from feed, rake angle, speed and exposure: view, window, cutting length."""
 
 from collections.abc import Mapping
-from math import ceil
+from math import ceil, degrees, radians, tan
 from typing import Any, Final
 
-from chipglow.quantities.units import CUT_LENGTH, LENGTH, POSITION, SPEED, TIME, Quantity
+from chipglow.quantities.units import (
+    ANGLE,
+    CUT_LENGTH,
+    LENGTH,
+    POSITION,
+    SPEED,
+    TIME,
+    Quantity,
+)
 
 _FEED, _SPEED, _PITCH, _EXPOSURE = 0.3e-3, 250 / 60, 6e-6, 10e-6
+_RAKE: Final = radians(-7.0)
 _START, _END, _LENGTH = 1.579e-3, 1.958e-3, 2.6e-3
-_LEFT, _TOP, _WIDTH, _HEIGHT = -620e-6, 460e-6, 660e-6, 540e-6
+_LEFT, _RIGHT, _BOTTOM, _TOP = -650e-6, 40e-6, -80e-6, 700e-6
+_LEFT_A_DEGREE, _TOP_A_DEGREE = 6e-6, 15e-6
+"""The chip is thicker and its contact longer by so much for each degree below the paper's rake."""
+
 _INTERVAL, _BAND = 0.2e-6, 10e-6
 _ACROSS: Final = 9
 """Samples along a pixel, as in the paper."""
@@ -25,8 +37,8 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
     cutting, camera = (study.get(name) or {} for name in ("cutting", "camera"))
     if study.get("scene", "none") not in ("none", None) or not isinstance(cutting, Mapping):
         return dict(study)
-    window, view = (cutting.get(name) or {} for name in ("window", "field_of_view"))
-    if not all(isinstance(one, Mapping) for one in (camera, window, view)):
+    window, view, tool = (cutting.get(name) or {} for name in ("window", "field_of_view", "tool"))
+    if not all(isinstance(one, Mapping) for one in (camera, window, view, tool)):
         return dict(study)
 
     def value(section: Mapping[str, Any], name: str, quantity: Quantity, default: float) -> float:
@@ -42,6 +54,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
         end = value(window, "end", CUT_LENGTH, start + travel)
         pitch = value(camera, "pitch", LENGTH, _PITCH)
         spacing = value(view, "spacing", LENGTH, pitch / _ACROSS)
+        rake = value(tool, "rake_angle", ANGLE, _RAKE)
     except ValueError:
         return dict(study)
     slower = _SPEED / speed
@@ -56,13 +69,16 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
         times["interval"] = TIME.text(interval)
     if exposure > _BAND:
         times["band_duration"] = TIME.text(exposure)
-    if ratio != 1.0:
+    if ratio != 1.0 or rake != _RAKE:
+        below = max(degrees(_RAKE - rake), 0.0)
+        left, top = _LEFT - below * _LEFT_A_DEGREE, _TOP + below * _TOP_A_DEGREE
+        width = max(_RIGHT, top * tan(rake) + _RIGHT) - left
         grid = {
-            "left": POSITION.text(ratio * _LEFT),
-            "top": POSITION.text(ratio * _TOP),
+            "left": POSITION.text(ratio * left),
+            "top": POSITION.text(ratio * top),
             "spacing": LENGTH.text(spacing),
-            "rows": ceil(ratio * _HEIGHT / spacing - 1e-6),
-            "columns": ceil(ratio * _WIDTH / spacing - 1e-6),
+            "rows": ceil(ratio * (top - _BOTTOM) / spacing - 1e-6),
+            "columns": ceil(ratio * width / spacing - 1e-6),
         }
     inner = {"window": {**times, **window}, "field_of_view": {**grid, **view}}
     filled = {name: section for name, section in inner.items() if section}

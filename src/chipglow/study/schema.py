@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Self
 
 from chipglow.analysis import Plan, WavelengthPlan
+from chipglow.camera import AnnularAperturePSF
 from chipglow.quantities import FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
@@ -64,11 +65,16 @@ class Study(Part):
 
     @property
     def plan(self) -> Plan:
-        """What to analyse; a surface that is the only one is seen everywhere."""
+        """What to analyse: PSF widths about the camera's; a single surface is seen everywhere."""
+        plan, psf = self.analysis, self.camera.build().psf
+        ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
+        if "psf_widths" not in plan.given and ratio != 1.0:
+            widths = [float(f"{ratio * width:.3g}") for width in plan.psf_widths]
+            plan = replace(plan, psf_widths=tuple(widths))
         if isinstance(self.surface, FeaturesSection):
-            return self.analysis
+            return plan
         (name,) = surface_names(self.surface)
-        return replace(self.analysis, rake_chip=name, band_chip=name)
+        return replace(plan, rake_chip=name, band_chip=name)
 
     def with_steady_tool(self) -> Self:
         """Return the same study with a tool that has been cutting for long."""
@@ -94,10 +100,10 @@ class Study(Part):
         title = "Quick look at the study of Heigel and Whitenton (2010)"
         cutting = {
             "window": {"interval": "0.5 us", "later_bands": 1},
-            "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 440},
+            "field_of_view": {"spacing": "1.5 um", "rows": 520, "columns": 460},
         }
         widths = ["4 um", "8 um", "12 um", "20 um"]
-        draws = {"exposures": 5, "phases": 2, "textures": 2, "psf_widths": widths}
+        draws = {"exposures": 5, "phases": 4, "textures": 2, "psf_widths": widths}
         paths = {f"cutting.{path}": value for path, value in cutting.items()}
         return changed(cls(), {"title": title, **paths, "analysis": draws})
 

@@ -10,6 +10,7 @@ from chipglow.laboratory.emissivity import (
     measured_features,
     read_emissivity_lines,
     read_emissivity_map,
+    read_origin,
 )
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import WAVELENGTHS
@@ -20,6 +21,7 @@ from chipglow.surface import (
     DIRECTIONS,
     MODIFIERS,
     OXIDES,
+    PAPER_ORIGIN,
     REFLECTIONS,
     SPECTRA,
     SURFACES,
@@ -29,6 +31,7 @@ from chipglow.surface import (
     FeatureSurface,
     FeatureTrends,
     Modifier,
+    Origin,
     Oxide,
     SideShape,
     SpectralSurface,
@@ -114,10 +117,12 @@ class FeaturesSection(Part):
     ] = None
     measured_in: Annotated[
         tuple[float, float],
-        Parameter(
-            "Band in which they are as they stand here, where they are not grey.", WAVELENGTHS
-        ),
+        Parameter("Band in which they are as they stand here.", WAVELENGTHS),
     ] = (3.8e-6, 5.1e-6)
+    measured_on: Annotated[
+        str | None,
+        Parameter("Metal on which they were measured, such as Ti-6Al-4V; or none: not known."),
+    ] = None
     modifiers: Annotated[
         tuple[Annotated[Modifier, MODIFIERS], ...],
         Parameter("Laws of other packages that modify all these emissivities, in order, or []."),
@@ -174,7 +179,13 @@ class FeaturesSection(Part):
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
         shared = FeatureSurface.declared().keys() & self.declared().keys()
         values = {name: getattr(self, name) for name in shared}
-        return FeatureSurface(chip=chip, shear_band=shear_band, seed=seed, **values)
+        papers = any((chip, shear_band) == (one.chip, one.shear_band) for one in CHIPS.values())
+        origin = PAPER_ORIGIN if papers else Origin()
+        if "measured_in" in self.given:
+            origin = replace(origin, band=self.measured_in)
+        if self.measured_on is not None:
+            origin = replace(origin, metal=self.measured_on)
+        return FeatureSurface(chip, shear_band, seed=seed, origin=origin, **values)
 
     def _measured(self, file: str, seed: int) -> Surface:
         try:
@@ -187,6 +198,7 @@ class FeaturesSection(Part):
         except ValueError as error:
             raise ValueError(f"surface.measured: {file}: {error}") from None
         bare = self._features(means["body"], means["shear_band"], seed)
+        bare = replace(bare, origin=read_origin(file))
         workpiece, tool = means.get("workpiece", bare.workpiece), means.get("tool", bare.tool)
         trends = {"chip" if name == "body" else name: trend for name, trend in trends.items()}
         return replace(bare, workpiece=workpiece, tool=tool).modified(FeatureTrends(trends))

@@ -9,6 +9,7 @@ from chipglow.surface.exchange import Exchange as Exchange
 from chipglow.surface.feature import (
     CHIP_1 as CHIP_1,
     CHIP_2 as CHIP_2,
+    PAPER_ORIGIN as PAPER_ORIGIN,
     EmissivityStack as EmissivityStack,
     Features as Features,
     FeatureSurface as FeatureSurface,
@@ -44,6 +45,7 @@ from chipglow.surface.surface import (
     EmissivityField as EmissivityField,
     ModifiedSurface as ModifiedSurface,
     Modifier as Modifier,
+    Origin as Origin,
     Surface as Surface,
 )
 from chipglow.surface.temperature import (

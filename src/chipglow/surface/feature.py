@@ -23,7 +23,7 @@ from chipglow.surface.blend import (
     blend_row,
     in_blocks,
 )
-from chipglow.surface.surface import Change, EmissivityField, Modifier, Surface
+from chipglow.surface.surface import UNKNOWN, Change, EmissivityField, Modifier, Origin, Surface
 from chipglow.surface.temperature import EmissivityTrend, draw_text, drawn_trends
 from chipglow.surface.texture import Emissivity, Texture, padded
 
@@ -76,6 +76,7 @@ class FeatureSurface(Surface, Part):
         bool,
         Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
     ] = True
+    origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @cached_property
     def textures(self) -> Mapping[str, Texture]:
@@ -138,9 +139,16 @@ class FeatureSurface(Surface, Part):
         return replace(self, **means)
 
 
-CHIP_1: Final = FeatureSurface(chip=Emissivity(0.42, 0.07), shear_band=Emissivity(0.53, 0.05))
+PAPER_ORIGIN: Final = Origin((3.8e-6, 5.1e-6), "AISI 1045")
+"""Where the emissivities of the paper's Table 1 come from."""
+
+CHIP_1: Final = FeatureSurface(
+    chip=Emissivity(0.42, 0.07), shear_band=Emissivity(0.53, 0.05), origin=PAPER_ORIGIN
+)
 """The thinly oxidised chip of the paper's Table 1."""
-CHIP_2: Final = FeatureSurface(chip=Emissivity(0.77, 0.03), shear_band=Emissivity(0.85, 0.02))
+CHIP_2: Final = FeatureSurface(
+    chip=Emissivity(0.77, 0.03), shear_band=Emissivity(0.85, 0.02), origin=PAPER_ORIGIN
+)
 """The more oxidised chip of the paper's Table 1."""
 
 

@@ -11,7 +11,7 @@ from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.regrid import Taps, taps
-from chipglow.surface.surface import EmissivityField, Surface
+from chipglow.surface.surface import UNKNOWN, EmissivityField, Origin, Surface
 
 _KNOWN: Final = 1e-9
 """Least weight of known pixels with which a sample is known."""
@@ -39,6 +39,8 @@ class MapSurface(Surface):
         it is taken as one error of all pixels.
     draw : int
         Number of the draw; 0 is without an error.
+    origin : Origin
+        Band and metal of the measurement.
 
     Raises
     ------
@@ -60,6 +62,7 @@ class MapSurface(Surface):
     middle: float = 0.0
     uncertainty: NDArray[np.floating] | None = None
     draw: int = 0
+    origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @property
     def effects(self) -> Mapping[str, str]:

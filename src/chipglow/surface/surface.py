@@ -1,7 +1,8 @@
 """A surface, what modifies it, and its emissivity on a scene: what the camera needs of it."""
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, Self, TypeAlias
 
@@ -17,6 +18,9 @@ SURFACES: Final = Family("surface")
 
 MODIFIERS: Final = Family("modifier")
 """Modifiers by their kind; other packages add theirs in the group ``chipglow.modifier``."""
+
+_SAME_BAND: Final = 0.01
+"""Part of a wavelength by which the limits of a band may differ."""
 
 Change: TypeAlias = Callable[[NDArray[np.float32], Frame], NDArray[Any]]
 """The emissivity of a frame's samples, shape (y, x), of that without the modifier."""
@@ -54,8 +58,37 @@ class EmissivityField:
         return bare
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Band and metal of the measurement that emissivities come from, as far as they are known."""
+
+    band: tuple[float, float] | None = None
+    """Limits in m."""
+    metal: str = ""
+
+    def doubts(self, band: Band, scene: Scene) -> Iterator[str]:
+        """Yield where a camera's band or the metal of a scene is another, a sentence each."""
+        seen, metal = (band.lower, band.upper), str(scene.data.attrs.get("metal", ""))
+        if self.band is not None and not np.allclose(self.band, seen, rtol=_SAME_BAND, atol=0.0):
+            measured, used = (
+                f"{1e6 * low:.3g} µm to {1e6 * high:.3g} µm" for low, high in (self.band, seen)
+            )
+            yield f"Emissivities measured in {measured} are taken to hold in {used}."
+        if self.metal and metal and _plain(self.metal) != _plain(metal):
+            yield f"Emissivities measured on {self.metal} are taken to hold on {metal}."
+
+
+UNKNOWN: Final = Origin()
+
+
+def _plain(metal: str) -> str:
+    return re.sub("[^a-z0-9]", "", metal.lower())
+
+
 class Surface(Part, ABC):
     """A model of emissivity, before it is laid on a scene."""
+
+    origin: ClassVar[Origin] = UNKNOWN
 
     @property
     def is_grey(self) -> bool:
@@ -155,6 +188,12 @@ class ModifiedSurface(Surface):
     @property
     def is_grey(self) -> bool:
         return self.bare.is_grey and all(one.is_grey for one in self.modifiers)
+
+    @property
+    def origin(self) -> Origin:  # type: ignore[override]
+        """That of the bare surface; of any band if a modifier converts it."""
+        spectral = any(one.effect == "spectral" for one in self.modifiers)
+        return replace(self.bare.origin, band=None) if spectral else self.bare.origin
 
     @property
     def effects(self) -> Mapping[str, str]:

@@ -12,7 +12,7 @@ from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import TEMPERATURE, Temperature
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
-from chipglow.surface.surface import SURFACES, EmissivityField, Surface
+from chipglow.surface.surface import SURFACES, UNKNOWN, EmissivityField, Origin, Surface
 
 
 class HomogeneousSurface(Surface):
@@ -48,7 +48,10 @@ class UniformSurface(HomogeneousSurface):
 @SURFACES.part
 @dataclass(frozen=True)
 class TemperatureSurface(HomogeneousSurface):
-    """A table over the true temperature, linear between, constant beyond its ends."""
+    """A table over the true temperature, linear between, constant beyond its ends.
+
+    Two rows of one temperature are a jump.
+    """
 
     kind: ClassVar[str] = "temperature"
     example: ClassVar[str] = (
@@ -64,8 +67,13 @@ class TemperatureSurface(HomogeneousSurface):
         temperatures, emissivities = self.columns
         if len(self.table) < 2:
             raise ValueError(f"table: {len(self.table)} rows, expected 2 or more")
-        if not (np.isfinite(temperatures).all() and np.diff(temperatures).min() > 0):
-            raise ValueError(f"table: temperatures are {temperatures} K, expected ascending ones")
+        steps = np.diff(temperatures)
+        jumps_once = (temperatures[2:] > temperatures[:-2]).all()
+        if not (np.isfinite(temperatures).all() and steps.min() >= 0 and jumps_once):
+            raise ValueError(
+                f"table: temperatures are {temperatures} K, expected ascending ones, one of them "
+                "twice for a jump"
+            )
         if not (emissivities.min() >= 0 and emissivities.max() <= 1):
             raise ValueError(f"table: emissivities are {emissivities}, expected 0 to 1")
 
@@ -160,6 +168,7 @@ class TrendSurface(HomogeneousSurface):
 
     trend: EmissivityTrend
     draw: int = 0
+    origin: Origin = UNKNOWN  # type: ignore[misc]
 
     @property
     def effects(self) -> dict[str, str]:

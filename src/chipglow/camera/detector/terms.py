@@ -143,10 +143,9 @@ class DeadElements(DetectorTerm):
 class Lag(DetectorTerm):
     """A part of the frame before that is still there.
 
-    m(i) = (1 − a) n(i) + a m(i − 1): charge that is left, or, with a = exp(−T / τ) and the time T
-    between frames, the thermal time constant τ of a microbolometer. The frame before is the one
-    that began one time between frames earlier; where it is not among the frames, the scene is taken
-    to have been as it is.
+    m(i) = (1 − a) n(i) + a m(i − 1), such as charge that is left; the camera's `time_constant` does
+    it for a microbolometer. The frame before is the one that began one time between frames earlier;
+    where it is not among the frames, the scene is taken to have been as it is.
     """
 
     kind: ClassVar[str] = "lag"
@@ -155,10 +154,15 @@ class Lag(DetectorTerm):
     fraction: Annotated[float, Parameter("Of the frame before.", least=0.0, under=1.0)]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
-        result = electrons.copy()
-        for i in np.flatnonzero(follows(readout.times, readout.point.frame_time)):
-            result[i] += self.fraction * (result[i - 1] - electrons[i])
-        return result
+        return lagged(electrons, readout.times, readout.point.frame_time, self.fraction)
+
+
+def lagged(frames: Array, times: Array, frame_time: float, fraction: float) -> Array:
+    """Return frames (time, y, x) with a fraction of the frame before: a first-order lag."""
+    result = frames.copy()
+    for i in np.flatnonzero(follows(times, frame_time)):
+        result[i] += fraction * (result[i - 1] - frames[i])
+    return result
 
 
 def follows(times: Array, frame_time: float) -> NDArray[np.bool_]:

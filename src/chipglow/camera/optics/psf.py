@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from errno import ENOENT
+from functools import cached_property
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
 from typing import Annotated, ClassVar, Final
@@ -50,6 +51,17 @@ _FAR: Final = 30.0
 
 PSFS: Final = Family("psf")
 """Point spread functions by their kind; other packages add theirs in the group ``chipglow.psf``."""
+
+
+DiffractionWavelength = Annotated[
+    float | None,
+    Parameter(
+        "Wavelength of the diffraction; none: the middle of the camera's band.",
+        WAVELENGTH,
+        over=0.0,
+        most=0.1,
+    ),
+]
 
 
 class PSFChoice(Part, ABC):
@@ -133,28 +145,26 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     kind: ClassVar[str] = "annular-aperture"
     example: ClassVar[str] = "{kind: annular-aperture, numerical_aperture: 0.28}"
-    wavelength: Annotated[
-        float, Parameter("Wavelength of the diffraction.", WAVELENGTH, over=0.0, most=0.1)
-    ] = 4.5e-6
+    wavelength: DiffractionWavelength = 4.5e-6
     numerical_aperture: Annotated[
         float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
     ] = 0.28
     obscuration: Annotated[
         float, Parameter("Diameter of the central obstruction, as a fraction.", least=0.0, most=0.9)
     ] = 0.35
-    fwhm: float = field(init=False, repr=False, compare=False)
 
     def __str__(self) -> str:
         of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""
-        return (
-            f"diffraction of a round pupil of NA {self.numerical_aperture:.3g}{of}, at "
-            f"{self.wavelength * 1e6:g} µm"
-        )
+        at = "" if self.wavelength is None else f", at {self.wavelength * 1e6:g} µm"
+        return f"diffraction of a round pupil of NA {self.numerical_aperture:.3g}{of}{at}"
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    @cached_property
+    def fwhm(self) -> float:  # type: ignore[override]
         half = scipy.optimize.brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
-        object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
+        return 2 * float(half) * self._unit
+
+    def of_camera(self, band: Band, magnification: float | None) -> "AnnularAperturePSF":
+        return self if self.wavelength is not None else self.in_band(band)
 
     def in_band(self, band: Band) -> "AnnularAperturePSF":
         """Return the diffraction at the band's middle wavelength."""
@@ -183,6 +193,8 @@ class AnnularAperturePSF(PointSpreadFunction):
     @property
     def _unit(self) -> float:
         """Radius in m where v is 1."""
+        if self.wavelength is None:
+            raise ValueError("psf: wavelength is none, expected it or a camera with a band")
         return self.wavelength / (2 * pi * self.numerical_aperture)
 
     @property
@@ -353,15 +365,7 @@ class AiryAperture(ApertureChoice):
 
     kind: ClassVar[str] = "airy"
     example: ClassVar[str] = "{kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture"
-    wavelength: Annotated[
-        float | None,
-        Parameter(
-            "Wavelength of the diffraction; none: the middle of the camera's band.",
-            WAVELENGTH,
-            over=0.0,
-            most=0.1,
-        ),
-    ] = None
+    wavelength: DiffractionWavelength = None
 
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         wavelength = self.wavelength or (band.lower + band.upper) / 2

@@ -1,5 +1,6 @@
 """Size of source: what each pixel integrates, by exact area weights."""
 
+from functools import lru_cache
 from math import sqrt
 from typing import Final
 
@@ -65,6 +66,7 @@ def integrate(radiance: Array, scene: Raster, sensors: Raster, fill_factor: floa
     return np.asarray((across @ (down @ radiance).T).T)
 
 
+@lru_cache(maxsize=256)  # an analysis returns to each of its pixel phases many times
 def line_weights(
     scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[sparse.csr_array, sparse.csr_array]:

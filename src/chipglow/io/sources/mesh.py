@@ -62,7 +62,10 @@ class MeshSource(Source, Part):
     """
 
     title: ClassVar[str] = "a mesh"
-    endings: ClassVar[tuple[str, ...]] = (*MESH_READERS, "d3plot")
+    endings: ClassVar[tuple[str, ...]] = (
+        *(ending for ending in MESH_READERS if ending not in mesh_vtk.OTHER_HDF),
+        "d3plot",
+    )
     files: Path = Path()
     names: Mapping[str, str] = field(default_factory=dict)
     units: Units = field(default_factory=Units)

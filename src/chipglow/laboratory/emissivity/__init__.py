@@ -18,6 +18,7 @@ from chipglow.laboratory.emissivity.file import (
     measured_text as measured_text,
     read_emissivity_lines as read_emissivity_lines,
     read_emissivity_map as read_emissivity_map,
+    read_origin as read_origin,
     surface_text as surface_text,
     write_emissivity as write_emissivity,
 )

@@ -3,7 +3,7 @@
 import os
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
@@ -19,16 +19,16 @@ from chipglow.laboratory.emissivity.emissivity import (
     COMMON,
     EmissivityLine,
     Heating,
-    RegionEmissivity,
     emissivity_covariance,
     emissivity_line,
 )
 from chipglow.laboratory.emissivity.observations import RANDOM, with_drift
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
 from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities.units import WAVELENGTHS
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
-from chipglow.surface import SURFACES, EmissivityTrend, MapSurface, Surface, TrendSurface
+from chipglow.surface import SURFACES, EmissivityTrend, MapSurface, Origin, Surface, TrendSurface
 from chipglow.uncertainty import Cause, Component, Estimate
 from chipglow.uncertainty.dataset import correlation_forms
 
@@ -90,7 +90,13 @@ def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) ->
             "other_region": ("other_region", names),
             "region": ("region", names),
         },
-        attrs={"kind": _KIND, "pitch": maps[0].raster.spacing},
+        attrs={
+            "kind": _KIND,
+            "pitch": maps[0].raster.spacing,
+            "band_lower": maps[0].band.lower,
+            "band_upper": maps[0].band.upper,
+            "metal": found.metal,
+        },
     ).drop_vars("time")
     parts = {cause: data[f"region_{cause}_uncertainty"] for cause in _FORMS}
     for cause, part in parts.items():
@@ -183,9 +189,22 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
         middle, scatter = float(data["reference"].values.mean()), float((away**2).sum())
         slopes = np.tensordot(away, values, axes=1) / scatter if scatter else None
         mean = np.clip(values.mean(axis=0), 0.0, 1.0)
-        return MapSurface(mean, raster, 0.0, slopes, middle, spread)
+        return MapSurface(mean, raster, 0.0, slopes, middle, spread, origin=_origin(data))
 
     return _read(Path(path), surface)
+
+
+def read_origin(path: str | os.PathLike[str]) -> Origin:
+    """Read the band and the metal of the measurement of a file of `write_emissivity`."""
+    return _read(Path(path), _origin)
+
+
+def _origin(data: xr.Dataset) -> Origin:
+    limits = [
+        float(data.attrs[name]) for name in ("band_lower", "band_upper") if name in data.attrs
+    ]
+    band = (limits[0], limits[1]) if len(limits) == 2 else None
+    return Origin(band, str(data.attrs.get("metal", "")))
 
 
 def emissivity_trend(line: EmissivityLine) -> EmissivityTrend:
@@ -251,17 +270,18 @@ class MeasuredEmissivity(SurfaceFile):
             raise ValueError(
                 f"region: {self.region!r} is not in {self.file}, expected one of {', '.join(areas)}"
             )
-        return TrendSurface(emissivity_trend(areas[self.region]))
+        trend = emissivity_trend(areas[self.region])
+        return TrendSurface(trend, origin=read_origin(self.file))
 
 
-def surface_text(rows: Iterable[RegionEmissivity]) -> str:
+def surface_text(result: RegionEmissivities) -> str:
     """Return sections of a study with the emissivities of its features, as YAML."""
     found = {
         _FIELDS[row.feature.lower()]: {
             "mean": round(row.mean, _DIGITS),
             "standard_deviation": round(row.standard_deviation, _DIGITS),
         }
-        for row in rows
+        for row in result.rows[0]
         if row.whole and row.feature.lower() in _FIELDS
         if 0 <= row.mean <= 1 and row.standard_deviation <= _GREATEST_DEVIATION
     }
@@ -273,6 +293,10 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
     surface |= {name: found[name] for name in ("workpiece", "tool") if name in found}
     if not surface:
         return ""
+    if result.origin.band is not None:
+        surface["measured_in"] = WAVELENGTHS.range_text(result.origin.band)
+    if result.metal:
+        surface["measured_on"] = result.metal
     return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
 
 

@@ -19,6 +19,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 from chipglow.laboratory.emissivity.observations import check_same_pixels, uncertainty_columns
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Region, areas, shared_pixels
+from chipglow.surface import Origin
 from chipglow.text import Notes
 
 
@@ -31,6 +32,13 @@ class RegionEmissivities:
     lines: tuple[EmissivityLine, ...] = ()
     """Each area over the temperature; empty for one heating."""
     notes: Notes = field(default_factory=Notes)
+    metal: str = ""
+    """What the object is made of, if it is known."""
+
+    @property
+    def origin(self) -> Origin:
+        """Band and metal of the measurement."""
+        return Origin((self.maps[0].band.lower, self.maps[0].band.upper), self.metal)
 
     def to_frame(self) -> pd.DataFrame:
         """Return every region at every temperature; one row each."""
@@ -46,6 +54,7 @@ def determine_emissivities(
     heatings: Sequence[Heating],
     regions: Sequence[Region],
     names: Sequence[str] = (),
+    metal: str = "",
 ) -> RegionEmissivities:
     """Determine the emissivity of regions of a heated object."""
     if len(heatings) != len(measurements):
@@ -67,7 +76,7 @@ def determine_emissivities(
         f"{one} and {other} share {count} pixels, which count in both."
         for (one, other), count in shared_pixels(regions, maps[0].raster).items()
     )
-    return RegionEmissivities(maps, rows, tuple(lines), notes)
+    return RegionEmissivities(maps, rows, tuple(lines), notes, metal)
 
 
 def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
@@ -104,11 +113,15 @@ def _line_row(line: EmissivityLine) -> Mapping[str, float | str]:
 
 def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivity]]) -> Notes:
     heating = maps[0].heating
-    room, change = heating.reflected - ZERO_CELSIUS, _of_reflected(maps[0])
+    reflects, change = f"{heating.reflected - ZERO_CELSIUS:.4g}", _of_reflected(maps[0])
+    if heating.reflected_uncertainty:
+        reflects += f" ± {heating.reflected_uncertainty:.3g} degC and nothing hotter"
+    else:
+        reflects = f"exactly {reflects} degC"
     texts = {
         "The true temperature is exact (reference_uncertainty).": not heating.reference_uncertainty,
-        f"The object reflects exactly {room:.4g} degC; 100 K more would shift the emissivity by "
-        f"{change:+.2g} (reflected, reflected_uncertainty).": not heating.reflected_uncertainty,
+        f"The object reflects {reflects}; 100 K more would shift the emissivity by {change:+.2g} "
+        "(reflected, reflected_uncertainty).": True,
         "The camera does not drift between recordings: a single image does not show it, and u "
         "does not include it (drift).": (
             heating.drift is None and any(one.recordings == 1 for one in maps)

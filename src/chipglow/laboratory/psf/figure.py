@@ -156,6 +156,7 @@ def _study_section(found: KnifeEdge) -> str | None:
     if isinstance(psf, GaussianPSF):
         return f"{{kind: gaussian, fwhm: {psf.fwhm * 1e6:.4g} um}}"
     if isinstance(psf, AnnularAperturePSF):
+        assert psf.wavelength is not None
         return (
             f"{{kind: annular-aperture, wavelength: {psf.wavelength * 1e6:.4g} um, "
             f"numerical_aperture: {psf.numerical_aperture:.4g}, "
