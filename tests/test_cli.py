@@ -359,7 +359,7 @@ def test_a_scene_that_is_too_short_for_the_study_is_named(folder, scene):
         "scene: scene.nc\ncamera: {integration_time: 1 ms, frame_rate: 600 Hz}\n"
     )
     assert_refused(
-        chipglow("run", "study.yaml", "--out", "results"), "scene.nc", "lasts 40 us", "0.001 s"
+        chipglow("run", "study.yaml", "--out", "results"), "scene.nc", "lasts 40 us", "1000 us"
     )
     assert not (folder / "results").exists()
 
