@@ -233,14 +233,6 @@ def test_a_wrong_band_shows_in_the_residuals_and_the_criterion():
     assert right.information_criterion < planckian.information_criterion
 
 
-def test_residuals_in_kelvins_are_those_in_counts_over_the_slope():
-    counts = counts_of("linear", KELVINS)
-    counts[4] += 10.0
-    fit = fit_linear(KELVINS, counts, BAND, count_uncertainty=1.0)
-    expected = BAND.temperature(BAND.radiance(KELVINS[4]) + fit.residuals[4] / GAIN) - KELVINS[4]
-    assert fit.residuals_temperature[4] == pytest.approx(expected, rel=0.02)
-
-
 def test_counts_without_radiance_have_none():
     line = fit_linear(KELVINS, counts_of("linear", KELVINS), BAND).calibration
     assert np.isnan(line.temperature([OFFSET - 1.0, np.nan])).all()

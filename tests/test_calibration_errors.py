@@ -27,7 +27,6 @@ X, Y = np.meshgrid(RASTER.x, RASTER.y)
 SLOPE = np.array([2e5, 1e5])
 CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
 FOUND = ToolUncertainty(along=3e-6, across=1e-6, angle=radians(0.3), pivot=70e-6)
-WIDE = ToolUncertainty(along=16e-6, across=2e-6, angle=radians(1.5), pivot=70e-6)
 BODIES = np.arange(300.0, 701.0, 50.0) + 273.15
 DRAWS = 20_000
 

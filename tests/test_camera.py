@@ -202,22 +202,6 @@ def test_exposures_beside_a_gap_are_taken():
         np.testing.assert_allclose(weights, 1 / 3)
 
 
-def test_peaks_count_only_what_the_exposure_covers():
-    temperature = np.full((4, 9, 9), 800.0)
-    temperature[3] = 1500.0
-    scene = make_scene(temperature)
-    (exposure,) = expose(scene, [View(BLACK.on(scene), Camera().band)], 0.0, 3 * STEP)
-    assert exposure.peak_temperature.max() == 800.0
-
-
-@given(st.integers(0, 405))
-def test_fifty_sub_frames_of_one_weight(first):
-    times = STEP * np.arange(455)
-    indices, weights = frame_weights(times, STEP, times[first], 10e-6)
-    assert indices == range(first, first + 50)
-    np.testing.assert_allclose(weights, 1 / 50, rtol=1e-9)
-
-
 @given(st.floats(0, 81e-6), st.floats(0.01e-6, 10e-6))
 def test_weights_are_shares_of_the_exposure(start, duration):
     times = STEP * np.arange(455)

@@ -56,12 +56,6 @@ def test_view_factor_of_a_groove(angle):
     assert found == pytest.approx(1 - np.sin(np.radians(angle) / 2), abs=5e-4)
 
 
-def test_view_factor_of_opposite_strips():
-    exchange = Exchange(*lines([[1, 0.7], [0, 0.7]], [[0, 0], [1, 0]]))
-    expected = np.hypot(1, 0.7) - 0.7  # within two of 2048 rays
-    np.testing.assert_allclose(exchange.view_factors[[0, 1], [1, 0]], expected, atol=1e-3)
-
-
 @given(st.floats(0.3, 3.0), st.floats(0.1, 0.9), st.integers(2, 9))
 @settings(max_examples=25)
 def test_rows_have_the_sum_one_and_are_reciprocal(angle, radius, count):

@@ -85,14 +85,6 @@ def test_without_restoring_enlarging_takes_a_fifth():
     assert found == pytest.approx(0.05 * 57 / 70, rel=0.022)
 
 
-@pytest.mark.parametrize("restore", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_mean_is_that_asked_for(restore, seed):
-    map_ = texture(0.42, 0.07, seed=seed, restore=restore)
-    # 16384 deviates, widened by at most a quarter: four standard errors of the mean.
-    assert map_.mean == pytest.approx(0.42, abs=4 * 0.07 * 1.25 / MAP_SIZE)
-
-
 @pytest.mark.parametrize(
     ("mean", "standard_deviation"),
     [(0.05, 0.04), (0.03, 0.03), (0.95, 0.06), (0.5, 0.3), (0.42, 0.09)],
