@@ -477,36 +477,6 @@ def test_broken_measurements_are_refused(broken):
         Measurement(data).radiance_temperature(flagged=True)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"pitch": 0.0},
-        {"pitch": 6.0},
-        {"shape": (0, 5)},
-        {"offset": (-1e-6, 0.0)},
-        {"fill_factor": 1.1},
-        {"psf": 12e-6},
-        {"psf_order": "both"},
-        {"integration_time": 10e-3},
-        {"frame_rate": -600.0},
-        {"detector": 3},
-        {"seed": -1},
-        {"lower_limit": 20.0},
-        {"band": "3-5 um"},
-        {"shape": 5},
-        {"shape": (5.0, 5.0)},
-        {"offset": 6e-6},
-        {"integration_time": "10 um"},
-        {"frame_rate": float("inf")},
-        {"reflected": "-300 degC"},
-    ],
-    ids=str,
-)
-def test_impossible_cameras_are_refused(values):
-    with pytest.raises(ValueError, match=rf"Camera.{next(iter(values))}(.\d)?: .*, expected"):
-        Camera(**values)
-
-
 @pytest.mark.parametrize("lower_limit", [300.0, 250, 370.0])
 def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
     with pytest.warns(

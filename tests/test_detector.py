@@ -264,34 +264,3 @@ def test_a_recording_knows_the_camera():
     measured.data.attrs["detector"] = "another"
     with pytest.raises(ValueError, match="the measurement has one already"):
         made.record(measured, generator())
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"gain": 0.0}, "Detector.gain: 0, expected over 0"),
-        ({"gain": None}, "Detector.gain: none, expected it or full_well"),
-        ({"offset": np.nan}, "Detector.offset: nan, expected 0 or more"),
-        ({"offset": 5000.0}, "Detector.offset: 5000, expected under the 4095 of 12 bits"),
-        ({"bits": 0}, "Detector.bits: 0, expected 1 to 32"),
-        ({"full_well": -1.0}, "Detector.full_well: -1, expected over 0"),
-        (
-            {"correction": "three-point"},
-            "Detector.correction: 'three-point', expected 'two-point'",
-        ),
-        ({"response": 3.0}, "Detector.response: kind: 3.0, expected one of photon, energy, range"),
-        ({"terms": (3,)}, "Detector.terms.0: kind: 3, expected one of gain-pattern"),
-        ({"terms": (ReadNoise(1.0),) * 2}, "two are of kind 'read-noise', expected one of each"),
-        ({"cold": 900.0, "hot": 800.0}, "Detector.hot: 800 K, expected over the 900 K of cold"),
-        ({"seed": -1}, "Detector.seed: -1, expected 0 or more"),
-        (lambda: ReadNoise(-1.0), "ReadNoise.standard_deviation: -1, expected 0 or more"),
-        (lambda: Lag(1.0), "Lag.fraction: 1, expected 0 or more, under 1"),
-        (lambda: PhotonResponse(1.5, 15e-6, 2.0), "quantum_efficiency: 1.5, expected over 0, up"),
-        (lambda: OperationPoint(frame_rate=0.0), "frame_rate: 0 Hz, expected over 0"),
-    ],
-)
-def test_impossible_detectors_are_refused(fields, message):
-    with pytest.raises(ValueError, match=message):
-        if callable(fields):
-            fields()
-        Detector(**{"response": EnergyResponse(1.0), "gain": 1.0, **fields})

@@ -214,21 +214,3 @@ def test_an_f_number_is_a_numerical_aperture():
     assert airy.wavelength == pytest.approx(4.45e-6)
     with pytest.raises(ValueError, match="magnification: is missing"):
         Pupil(f_number=2.5).of_camera(MWIR, None)
-
-
-@pytest.mark.parametrize(
-    ("make", "expected"),
-    [
-        (lambda: PupilPSF(MWIR, 1.2), "numerical_aperture: 1.2, expected over 0, up to 1"),
-        (lambda: PupilPSF(MWIR, 0.3, 0.95), r"obscuration: 0.95, expected 0 to 0.9"),
-        (lambda: PupilPSF(MWIR, 0.3, zernike=((3, 1e-7),)), r"zernike: \(3, 1e-07\), expected"),
-        (lambda: PupilPSF(MWIR, 0.3, zernike=((4, 1e-7), (4, 1e-7))), "each once"),
-        (lambda: PupilPSF(MWIR, 0.3, zernike=((4, float("nan")),)), "its rms in m"),
-        (lambda: PupilPSF(MWIR, 0.5, defocus=2e-3), "expected some 10 wavelengths or less"),
-        (lambda: Pupil(), "expected one of numerical_aperture and f_number"),
-        (lambda: Pupil(numerical_aperture=0.3, f_number=2.0), "expected one of"),
-    ],
-)
-def test_impossible_pupils_are_refused(make, expected):
-    with pytest.raises(ValueError, match=expected):
-        make()

@@ -381,31 +381,3 @@ def test_a_study_switches_it_on():
         (shape,) = on[name].modifiers
         assert shape.angle == pytest.approx(np.radians(60))
         assert replace(shape, angle=Wedge().angle) == Wedge()
-
-
-def reflecting(**section):
-    return Study(surface={"reflections": {"kind": "wedge", **section}})
-
-
-WITHOUT_TOOL = {"temperature": np.full((1, *RASTER.shape), HOT)}
-MIRRORED = UniformSurface(0.4).modified(Wedge())
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Wedge(overhang=-40e-6), "covers the rake face"),
-        (lambda: MIRRORED.on(a_scene()), "no band is given"),
-        (
-            lambda: CAMERA.lay(MIRRORED, Scene.from_fields(RASTER, [0.0], WITHOUT_TOOL)),
-            "does not state its tool",
-        ),
-        (lambda: reflecting(kind="groove"), "expected one of wedge"),
-        (lambda: reflecting(angle="95 deg"), "up to 90 deg"),
-        (lambda: reflecting(angle="90 deg"), "covers the rake face"),
-        (lambda: reflecting(mirror=1.5), "0 to 1"),
-    ],
-)
-def test_what_cannot_reflect_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
