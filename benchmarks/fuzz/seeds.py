@@ -16,7 +16,7 @@ from chipglow.io.sources import Source
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
+from chipglow.io.sources.movie import FieldMovie, MovieSource
 
 ROWS, COLUMNS, FRAMES = 24, 32, 3
 
@@ -149,8 +149,8 @@ def _clouds(folder: Path) -> list[Seed]:
 
 
 def _movie(path: Path) -> MovieSource:
-    movie = FieldMovie(path, (293.15, 1400.0), NamedMap("jet"))
-    return MovieSource({"temperature": movie}, 1.0 / 64, (0.0, 64.0), frame_interval=1e-6)
+    movie = FieldMovie(str(path), 293.15, 1400.0, "jet")
+    return MovieSource(movie, pixel=1.0 / 64, origin=(0.0, 64.0), interval=1e-6)
 
 
 def _movies(folder: Path) -> list[Seed]:
