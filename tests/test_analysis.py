@@ -619,7 +619,7 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
             across.points[across.distance == 0.0],
         )
         first = data.sel(psf_order=order, reading="rake").isel(
-            psf_width=at, exposure=0, pixel_phase=0
+            psf_width=at, exposure=0, varied_phase=0
         )
         error = first.varied_measured.sel(effects="all") - first.varied_reference
         assert float(error) == pytest.approx(face[0], abs=1e-4)
@@ -691,7 +691,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
     with pytest.raises(ValueError, match="surface 'chip 2' is not one of"):
         analyse(scene, surfaces, CAMERA, Plan())
     plan = Plan(rake_chip="chip 1")
-    with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
+    with pytest.raises(ValueError, match="expected an exposure's 20 us"):
         analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
     for name in ("exposures", "phases", "textures"):
         with pytest.raises(ValueError, match=f"{name}: 0, expected"):

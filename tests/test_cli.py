@@ -155,7 +155,15 @@ def test_run_writes_a_report_and_prints_the_comparison(finished):
     work, result = finished
     assert result.exit_code == 0, result.output
     assert "results/report.html" in result.output
-    for heading in ("quantity", "the paper", "this study", "95 % interval", "differs", "−42", "90"):
+    for heading in (
+        "quantity",
+        "the paper",
+        "this study",
+        "single frame (95 %)",
+        "differs",
+        "−42",
+        "90",
+    ):
         assert heading in result.output
     assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
