@@ -15,14 +15,12 @@ import xarray as xr
 from PIL import Image
 
 from chipglow.analysis import Distribution, one_draw, with_errors
-from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
-from chipglow.scene import Line
 from chipglow.study import Study
 
 TITLE = "My <i>own</i> study"
@@ -240,19 +238,6 @@ def test_the_parts_of_an_error_are_all_of_it(result, facts):
     assert all("motion" not in row.parts for row in all_rows(mean)["errors"])
 
 
-def test_inertia_that_is_too_much_is_said(result):
-    def rows(fraction):
-        inert = Inertia(kinetic_fraction=fraction, force_fraction=0.004, mass_scaling=300.0)
-        forces = replace(result.cut.forces, inertia=inert)
-        return {row.key: row for row in result_rows(of_cut(result, forces=forces))}
-
-    assert rows(0.02)["kinetic_fraction_percent"].cells["mean"] == "2.00 %"
-    assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_fraction_percent"].explanation
-    assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
-    assert rows(0.009)["inertia_force_fraction_percent"].cells["mean"] == "0.40 %"
-    assert "1/300 of this" in rows(0.009)["inertia_force_fraction_percent"].explanation
-
-
 def test_the_answer_states_interval_and_whether_the_paper_differs(facts):
     sentences = sentences_of(facts)
     error = facts.headlines["rake"].error
@@ -399,18 +384,6 @@ def test_the_comparison_holds_what_the_paper_states(result):
     error = frame.loc["rake_error_degC"]
     assert (error["least"], error["greatest"]) == draws.range
     assert error["standard_deviation"] == draws.standard_deviation
-
-
-def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
-    whole = result.cut.band
-    ridge = Line(whole.ridge.distance[20:], whole.ridge.points[20:])
-    values = {name: getattr(whole, name)[20:] for name in ("normals", "rate", "widths")}
-    segment = replace(result.cut.segments[0], band=replace(whole, ridge=ridge, **values))
-    shorter = of_cut(result, segments=(segment,))
-    row = next(r for r in result_rows(shorter) if r.key == "band_length_um")
-    begins = whole.ridge.distance[20]
-    assert row.here == pytest.approx(1e6 * (whole.ridge.distance[-1] - begins))
-    assert f"begins {1e6 * begins:.0f} µm from the cutting edge" in row.explanation
 
 
 def test_numbers_are_printed_with_sign_unit_and_dash():
