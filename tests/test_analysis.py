@@ -144,6 +144,8 @@ def test_a_rounded_pitch_adds_no_samples_to_a_pixel(rounding, phase, seed):
 
 
 def test_the_mean_as_reference_leaves_no_error_without_a_psf():
+    with pytest.raises(ValueError, match="exposure: Measurement, expected an Exposure"):
+        error_images(CAMERA, CAMERA.form_measurement(random_exposure(2)))
     errors = error_images(CAMERA, random_exposure(2), "mean")
     np.testing.assert_allclose(errors.case_2, 0.0, atol=1e-9)
 
@@ -617,7 +619,7 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
             across.points[across.distance == 0.0],
         )
         first = data.sel(psf_order=order, reading="rake").isel(
-            psf_width=at, exposure=0, pixel_phase=0
+            psf_width=at, exposure=0, varied_phase=0
         )
         error = first.varied_measured.sel(effects="all") - first.varied_reference
         assert float(error) == pytest.approx(face[0], abs=1e-4)
@@ -689,7 +691,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
     with pytest.raises(ValueError, match="surface 'chip 2' is not one of"):
         analyse(scene, surfaces, CAMERA, Plan())
     plan = Plan(rake_chip="chip 1")
-    with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
+    with pytest.raises(ValueError, match="expected an exposure's 20 us"):
         analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
     for name in ("exposures", "phases", "textures"):
         with pytest.raises(ValueError, match=f"{name}: 0, expected"):

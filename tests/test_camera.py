@@ -228,6 +228,16 @@ def test_a_scene_of_one_frame_does_not_change():
     np.testing.assert_allclose(measured.radiance_temperature(), 700.0, atol=ROUNDING)
 
 
+@pytest.mark.parametrize(
+    ("step", "rise", "doubted"), [(1.0, 9, True), (1.0, 0, False), (1e-5, 9, False)]
+)
+def test_times_in_another_unit_are_doubted(step, rise, doubted):
+    temperature = np.full((3, 18, 18), 700.0) + rise * np.arange(3)[:, None, None]
+    scene = make_scene(temperature, times=step * np.arange(3))
+    warnings = Camera().measure(scene, BLACK, 0.0).notes.warnings
+    assert any("1 s apart, 1e+05 times the exposure of 10 µs" in one for one in warnings) == doubted
+
+
 @given(
     pitch=st.floats(0.3e-6, 15e-6),
     offset=st.floats(0, 5e-6),
@@ -513,10 +523,10 @@ def test_what_is_the_papers_comes_with_its_camera_only():
 @pytest.mark.parametrize(
     ("camera", "start", "message"),
     [
-        (Camera(pitch=50e-6), 0.0, r"pitch of 5e-05 m .* scene of 1.2e-05 x 1.2e-05 m"),
-        (Camera(offset=(11e-6, 0.0)), 0.0, r"offset of 1.1e-05, 0 m does not fit"),
+        (Camera(pitch=50e-6), 0.0, r"pitch of 50 um .* scene of 12 x 12 um"),
+        (Camera(offset=(11e-6, 0.0)), 0.0, r"offset of 11, 0 um does not fit"),
         (Camera(shape=(3, 1)), 0.0, r"shape is 3 x 1 pixels, but only 2 x 2"),
-        (Camera(), 0.0, r"0 s to 1e-05 s is not within the scene, which lasts from 0 s to 1e-06"),
+        (Camera(), 0.0, r"0 us to 10 us is not within the scene, which lasts from 0 us to 1 us"),
         (Camera(integration_time=STEP), -STEP, "not within the scene"),
         (Camera(integration_time=STEP), 4.5 * STEP, "not within the scene"),
         (Camera(integration_time=STEP), float("nan"), "not within the scene"),

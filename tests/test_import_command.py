@@ -1,5 +1,7 @@
 """The command import: its description, what it says, what it writes, what it refuses."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from chipglow.io import (
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import MovieSource, NamedMap
+from chipglow.io.sources.movie import MovieSource
 from chipglow.scene import Material, ToolGeometry
 from chipglow.text import DescriptionError
 
@@ -161,11 +163,11 @@ def test_movies_are_described_field_by_field(tmp_path):
     )
     source = description.build().source.source
     assert isinstance(source, MovieSource)
-    assert source.metre_per_pixel == pytest.approx(2e-6)
-    assert source.movies["temperature"].values == pytest.approx((293.15, 1400.15))
-    assert source.movies["temperature"].colours == NamedMap("jet")
-    assert source.movies["plastic_strain"].colours == (600, 40, 620, 400)
-    assert source.movies["plastic_strain"].path.name == "e.avi"
+    assert source._sides == pytest.approx((2e-6, 2e-6))
+    assert source.temperature.ends("temperature") == pytest.approx((293.15, 1400.15))
+    assert source.temperature.colours == "jet"
+    assert source.plastic_strain.legend == (600, 40, 620, 400)
+    assert Path(source.plastic_strain.file).name == "e.avi"
 
 
 def test_the_kind_is_told_by_the_name():
@@ -188,7 +190,7 @@ def test_a_movie_needs_no_source_beside_its_section(tmp_path):
         "movie: {temperature: {file: disc.avi, first: 80 degC, last: 600 degC}, pixel: 1 mm}\n"
     )
     source = load_import(path).build().source.source
-    assert source.inputs == (str(tmp_path / "disc.avi"),)
+    assert source.files == str(tmp_path / "disc.avi")
 
 
 def test_the_description_that_init_writes_says_every_field_and_is_read_back(arrays, tmp_path):
@@ -199,7 +201,7 @@ def test_the_description_that_init_writes_says_every_field_and_is_read_back(arra
     assert "# Units of the source" in path.read_text()
     assert "# What the source is" in path.read_text()
     path.write_text(path.read_text().replace("source: none", "source: cut.npz", 1))
-    assert load_import(path).file == str(arrays)
+    assert load_import(path).source == str(arrays)
 
 
 def test_a_table_with_names_is_points_and_one_without_a_grid(tmp_path):
@@ -207,6 +209,32 @@ def test_a_table_with_names_is_points_and_one_without_a_grid(tmp_path):
     (tmp_path / "grid.csv").write_text("300,3.1e2\n310,nan\n")
     assert load_import(tmp_path / "points.csv").kind_of_source() == "points"
     assert load_import(tmp_path / "grid.csv").kind_of_source() == "grid"
+
+
+def test_an_hdf5_file_of_vtk_is_a_mesh(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    grid = pyvista.ImageData(dimensions=(4, 4, 1)).cast_to_unstructured_grid()
+    grid["temperature"] = np.linspace(300.0, 400.0, 16)
+    grid.save(tmp_path / "mesh.vtkhdf")
+    for name in ("mesh.hdf", "mesh.h5"):
+        path = tmp_path / name
+        path.write_bytes((tmp_path / "mesh.vtkhdf").read_bytes())
+        wanted = load_import(path, ["units.length=mm"])
+        assert wanted.kind_of_source() == "mesh"
+        assert prospect(wanted.build()).survey.kind == "mesh, 1 file of VTK HDF"
+
+
+def test_files_of_settings_are_beside_the_shell_and_those_of_a_file_beside_it(
+    tmp_path, monkeypatch
+):
+    (tmp_path / "camera").mkdir()
+    described = tmp_path / "camera" / "import.yaml"
+    described.write_text("source: cut.npz\ntool: none\n")
+    (tmp_path / "edge.csv").write_text("x_um,y_um\n0,100\n0,0\n100,10\n")
+    monkeypatch.chdir(tmp_path)
+    wanted = load_import(described, ["tool.outline=edge.csv"])
+    assert wanted.source == str(tmp_path / "camera" / "cut.npz")
+    assert wanted.tool.outline == str(tmp_path / "edge.csv")
 
 
 def test_units_that_follow_from_others_are_said(arrays, tmp_path):
@@ -224,11 +252,17 @@ def test_units_that_follow_from_others_are_said(arrays, tmp_path):
         (np.full((4, 6), np.nan), "has no number in the frames"),
         (np.full((4, 6), np.inf), "T: has infinite numbers"),
         (np.full((4, 6), 25.0), "if it is in °C, expected units.temperature: degC"),
+        (
+            np.full((4, 6), -120.0),
+            "153.15 in T, expected kelvin of 200 or more; units.temperature is degC",
+        ),
     ],
 )
 def test_temperatures_that_are_none_are_refused(tmp_path, values, wrong):
     np.savez(tmp_path / "t.npz", T=values)
     arguments = ["import", str(tmp_path / "t.npz"), "--set", "grid.spacing=5 um"]
+    if values[0, 0] < 0:
+        arguments += ["--set", "units.temperature=degC"]
     result = RUNNER.invoke(app, [*arguments, "--out", str(tmp_path / "s.nc")])
     assert result.exit_code == 2
     assert wrong in " ".join(result.output.split())

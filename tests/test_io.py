@@ -25,23 +25,18 @@ from chipglow.io import (
     write_measurement,
     write_scene,
 )
-from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Frame, Raster, SceneError, ToolGeometry
 from chipglow.scene.scene import raster_coordinates
 
 RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27)
-# Half of what the file keeps, and a rounding in float32 for what is unpacked by a product.
 RELATIVE = {
-    # A unit in the last place of a 32-bit float.
-    "temperature": 2.0**-23,
-    "material_x": 2.0**-23,
-    "material_y": 2.0**-23,
+    "material_x": 2.0**-18,
+    "material_y": 2.0**-18,
     "plastic_strain": 2.0**-14,
     "plastic_strain_rate": 2.0**-12,
     "velocity_x": 2.0**-11,
     "velocity_y": 2.0**-11,
 }
-ABSOLUTE = {"temperature": 0.0125 + 1e-4, "material_x": 10e-9 + 1e-9, "material_y": 10e-9 + 1e-9}
 
 
 def a_frame(time=0.0, seed=1, raster=RASTER, **changed):
@@ -84,9 +79,7 @@ def assert_as_kept(found, expected):
         assert (one is None) == (other is None), name
         if one is not None:
             assert one.dtype == other.dtype
-            np.testing.assert_allclose(
-                one, other, rtol=RELATIVE.get(name, 0.0), atol=ABSOLUTE.get(name, 0.0), err_msg=name
-            )
+            np.testing.assert_allclose(one, other, rtol=RELATIVE.get(name, 0.0), err_msg=name)
 
 
 def leftovers(folder):
@@ -107,6 +100,25 @@ def test_scene_comes_back(tmp_path):
     np.testing.assert_array_equal(scene.data["thrust_force"], [1.5e5, 2.0e5])
     assert scene.data["thrust_force"].attrs["units"] == "N/m"
     assert leftovers(tmp_path) == ["scene.nc"]
+
+
+def test_a_scalar_in_degrees_is_not_rounded_to_steps(tmp_path):
+    share = 273.15 + np.linspace(0.0, 0.4402, RASTER.rows * RASTER.columns).reshape(RASTER.shape)
+    write_frame(tmp_path / "scene.nc", a_frame(temperature=share.astype(np.float32)))
+    found = open_scene(tmp_path / "scene.nc").celsius()
+    np.testing.assert_allclose(found, share - 273.15, atol=2e-5)
+
+
+def test_a_scene_packed_by_the_conventions_is_read(tmp_path):
+    """As chipglow itself wrote temperatures up to its version of 2026, and others do."""
+    scene = open_scene(a_file(tmp_path))
+    packed = {
+        "temperature": {"dtype": "i4", "scale_factor": 0.025, "add_offset": 200.0, "_FillValue": -1}
+    }
+    data = scene.data.load().drop_encoding()
+    data.to_netcdf(tmp_path / "packed.nc", engine="h5netcdf", encoding=packed)
+    for one, other in zip(open_scene(tmp_path / "packed.nc").frames(), scene.frames(), strict=True):
+        np.testing.assert_allclose(one.temperature, other.temperature, atol=0.0126)
 
 
 def test_fields_of_64_bits_are_kept_in_those_of_the_file(tmp_path):
@@ -175,23 +187,6 @@ def test_write_scene_keeps_all(tmp_path):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_a_pixel_keeps_its_radiance_temperature(tmp_path):
-    band, count = Band(3.8e-6, 5.1e-6), 20
-    with SceneWriter(tmp_path / "scene.nc", RASTER) as writer:
-        for index in range(count):
-            writer.append(a_frame(index * 0.2e-6, seed=index))
-    scene = open_scene(tmp_path / "scene.nc")
-
-    def pixels(frames):
-        radiance = np.mean([band.radiance(frame.temperature) for frame in frames], axis=0)
-        return band.temperature(radiance.reshape(2, 9, 3, 9).mean(axis=(1, 3)))
-
-    found = pixels(scene.frames())
-    expected = pixels(a_frame(index * 0.2e-6, seed=index) for index in range(count))
-    # design: 0.6 mK. The roundings, 7 mK each, average over the 1620 samples of a pixel.
-    np.testing.assert_allclose(found, expected, rtol=0, atol=0.6e-3)
-
-
 def test_scene_by_xarray_is_read_too(tmp_path):
     scene = open_scene(a_file(tmp_path))
     loaded = scene.data.load().drop_encoding()
@@ -206,7 +201,6 @@ def test_scene_by_xarray_is_read_too(tmp_path):
     [
         ({"temperature": 25.0}, "looks like °C"),
         ({"plastic_strain": np.nan}, "'plastic_strain' is not finite everywhere at 1e-06 s"),
-        ({"material_x": 50.0}, "'material_x' at 1e-06 s: 50 is beyond the file's range"),
         ({"material_y": None}, r"'material_y' is missing at 1e-06 s, expected \(18, 27\)"),
         ({"quality": 0.0}, "quality has type float32"),
     ],
@@ -421,7 +415,7 @@ def test_a_hot_scene_comes_back_and_survives_a_copy(tmp_path):
     one = open_scene(tmp_path / "one.nc")
     assert_as_kept(one.frame(0), frame)
     # As read by xarray, which does not know the fast way.
-    np.testing.assert_allclose(one.data["temperature"][0], hot, atol=0.0125 + 1e-3)
+    np.testing.assert_array_equal(one.data["temperature"][0], hot)
     write_scene(one, tmp_path / "two.nc")
     two = open_scene(tmp_path / "two.nc").frame(0)
     np.testing.assert_array_equal(two.temperature, one.frame(0).temperature)

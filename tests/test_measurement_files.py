@@ -318,10 +318,35 @@ def test_a_flir_sequence_by_its_makers_conversion(tmp_path, monkeypatch):
     assert "not known" in measured.data.attrs["warnings"]
 
 
+@pytest.mark.parametrize(("band", "warned"), [("3.8-5.1 um", False), ("3-5 um", True)])
+def test_a_band_that_the_file_states_is_compared_with_the_calibrations(
+    laboratory, tmp_path, band, warned
+):
+    (tmp_path / "chip.ptw").write_bytes(camera_files.ptw(camera_files.pictures()))
+    described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
+    (tmp_path / "cal.yaml").write_text(yaml.safe_dump({**described, "band": band}))
+    settings = ["pitch=6 um", "integration_time=10 us", f"calibration={tmp_path / 'cal.yaml'}"]
+    attributes = load_measurement(tmp_path / "chip.ptw", settings).data.attrs
+    warnings = attributes.get("warnings", "")
+    assert (
+        "The file states a band of 3.8-5.1 um, the calibration is for 3-5" in warnings
+    ) == warned
+
+
+def test_a_setting_names_a_file_beside_the_shell(laboratory, tmp_path, monkeypatch):
+    np.save(tmp_path / "shown.npy", np.full((1, 4, 5), 3000))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cal.yaml").write_text((laboratory / "calibration.yaml").read_text())
+    settings = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=cal.yaml"]
+    (tmp_path / "camera").mkdir()
+    (tmp_path / "shown.npy").rename(tmp_path / "camera" / "shown.npy")
+    assert load_measurement("camera/shown.npy", settings).band == BAND
+
+
 def test_a_response_takes_the_place_of_limits(tmp_path):
     np.save(tmp_path / "shown.npy", np.full((1, 4, 5), 900.0))
     (tmp_path / "response.csv").write_text("wavelength_um,response\n3,0\n4,1\n5,0\n")
-    settings = ["unit=K", "interval=1 ms", "pitch=6 um", "band=response.csv"]
+    settings = ["unit=K", "interval=1 ms", "pitch=6 um", f"band={tmp_path / 'response.csv'}"]
     measured = load_measurement(tmp_path / "shown.npy", settings)
     assert (measured.band.lower, measured.band.upper) == pytest.approx((3e-6, 5e-6))
     assert measured.radiance[0, 0, 0] < 0.6 * Band(3e-6, 5e-6).radiance(900.0)
@@ -581,5 +606,5 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
         tmp_path / "even.hcc",
         Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
     )
-    fields = [*CAMERA, "flat_field.low=even.hcc"]
+    fields = [*CAMERA, f"flat_field.low={tmp_path / 'even.hcc'}"]
     assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)

@@ -15,14 +15,12 @@ import xarray as xr
 from PIL import Image
 
 from chipglow.analysis import Distribution, one_draw, with_errors
-from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
-from chipglow.scene import Line
 from chipglow.study import Study
 
 TITLE = "My <i>own</i> study"
@@ -158,7 +156,7 @@ def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(pa
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2
     sentences = sentences_of(facts)
-    assert len(sentences) == 3
+    assert len(sentences) == 4
     assert "steady" not in shown.lower()
     later = (REMARKS[0], "Causes of the errors\n", "Figure 2:", "Table 1:", STUDY)
     places = [shown.index(text) for text in (TITLE, *sentences, *later)]
@@ -240,27 +238,65 @@ def test_the_parts_of_an_error_are_all_of_it(result, facts):
     assert all("motion" not in row.parts for row in all_rows(mean)["errors"])
 
 
-def test_inertia_that_is_too_much_is_said(result):
-    def rows(fraction):
-        inert = Inertia(kinetic_fraction=fraction, force_fraction=0.004, mass_scaling=300.0)
-        forces = replace(result.cut.forces, inertia=inert)
-        return {row.key: row for row in result_rows(of_cut(result, forces=forces))}
-
-    assert rows(0.02)["kinetic_fraction_percent"].cells["mean"] == "2.00 %"
-    assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_fraction_percent"].explanation
-    assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
-    assert rows(0.009)["inertia_force_fraction_percent"].cells["mean"] == "0.40 %"
-    assert "1/300 of this" in rows(0.009)["inertia_force_fraction_percent"].explanation
-
-
 def test_the_answer_states_interval_and_whether_the_paper_differs(facts):
     sentences = sentences_of(facts)
     error = facts.headlines["rake"].error
-    high, low = (f"{-end:.0f}".replace("-", "−") for end in error.interval)
-    assert f"{-error.mean:.0f} ± {error.standard_deviation:.0f} °C too low" in sentences[0]
-    assert f"8 draws; 95 % interval {low} °C to {high} °C" in sentences[0]
-    for sentence in sentences:
-        assert ("lies inside the interval" in sentence) != ("lies outside the interval" in sentence)
+    low, high = (f"{-end:.0f}" for end in error.interval[::-1])
+    mean = f"{-error.mean:.0f} ± {error.expanded_uncertainty:.0f} °C too low on average"
+    assert f"{mean}; in a single frame between {low} °C and {high} °C too low" in sentences[0]
+    for sentence in sentences[:-1]:
+        assert ("lies within the interval" in sentence) != ("lies outside the interval" in sentence)
+
+
+def test_the_answer_ends_with_the_true_temperature_without_and_with_emissivity(facts):
+    found = facts.headlines["rake"]
+    plain, corrected = found.true_error.mean, found.corrected_error.mean
+    assert plain < corrected < 0
+    emissivity = float(facts.data.set_emissivity.sel(surface="chip 2"))
+    assert 0.74 < emissivity < 0.88
+    assert sentences_of(facts)[-1] == (
+        f"At the first of these places (rake face) the reading is {-plain:.0f} °C too low against "
+        f"the true temperature with emissivity 1, and {-corrected:.0f} °C too low with emissivity "
+        f"{emissivity:.2f} set in the camera."
+    )
+    rows = {row.key: row for row in result_rows(facts.analysis)}
+    assert rows["rake_true_error_degC"].here == plain
+    assert rows["rake_corrected_error_degC"].here == corrected
+
+
+def test_a_period_of_three_intervals_is_judged_with_students_factor():
+    intervals = np.array([107.0, 94.6, 95.8])
+    uncertainty = intervals.std(ddof=1) / np.sqrt(3)
+    row = Row(
+        "segment_period_us", "Period", "µs", float(intervals.mean()),
+        uncertainty=float(uncertainty),
+        freedom=2, published=PaperValue(90.0, ""),
+    )  # fmt: skip
+    # A one-sample t test: t = 2.31, p = 0.15.
+    assert (intervals.mean() - 90) / uncertainty == pytest.approx(2.31, abs=0.01)
+    assert row.differs is False
+    assert replace(row, freedom=1).differs is None
+    assert replace(row, freedom=200).differs is True
+
+
+def test_one_phase_or_one_texture_leaves_no_interval_and_names_the_cause(result):
+    data = result.data.copy()
+    data["undrawn"] = data.undrawn.where(data.undrawn != "", "texture, pixel phase")
+    facts = Facts(replace(result, data=data), PAPERS)
+    (sentence, *_) = sentences_of(facts)
+    assert "no interval: only one texture and one pixel phase was drawn" in sentence
+    row = next(row for row in result_rows(facts.analysis, PAPERS) if row.key == "rake_error_degC")
+    assert (row.cells["interval"], row.differs) == ("–", None)
+    assert "±" not in row.cells["mean"]
+
+
+def test_a_contact_that_reaches_the_border_is_a_least_length(result, monkeypatch):
+    monkeypatch.setattr(Facts, "contact_reaches_border", lambda facts: True)
+    monkeypatch.setattr(Facts.contact_reaches_border, "__name__", "contact_reaches_border")
+    row = next(row for row in result_rows(result) if row.key == "contact_length_um")
+    assert row.cells["mean"] == f"more than {row.here:.0f} µm"
+    assert row.cells["interval"] == "–"
+    assert "continues beyond" in row.explanation
 
 
 def test_the_summary_keeps_its_schema(folder):
@@ -290,7 +326,7 @@ def test_the_summary_is_strict_json(folder, result, facts):
         key = f"{name}_error_degC"
         assert summary["results"][key] == summary["draws"][key]["mean"] == error.mean
         assert summary["draws"][key]["standard_deviation"] == error.standard_deviation
-        assert summary["draws"][key]["count"] == 8
+        assert summary["draws"][key]["count"] == 12
         assert summary["one_draw"][key] == one_draw(result.data, name).error
         celsius = facts.headlines[name].reference.mean - 273.15
         assert summary["references"][key] == pytest.approx(celsius, abs=1e-9)
@@ -298,7 +334,9 @@ def test_the_summary_is_strict_json(folder, result, facts):
         assert list(parts) == ["segment", "texture", "pixel phase", "causes together"]
         assert sum(part["fraction_percent"] for part in parts.values()) == pytest.approx(100.0)
     assert summary["paper"]["rake_error_degC"] == -42.0
-    low, high = (summary["draws"]["rake_error_degC"][f"interval_{end}"] for end in ("low", "high"))
+    drawn = summary["draws"]["rake_error_degC"]
+    assert drawn["expanded_uncertainty"] == facts.headlines["rake"].error.expanded_uncertainty
+    low, high = (drawn[f"interval_{end}"] for end in ("low", "high"))
     assert summary["differs"]["rake_error_degC"] is not (low <= -42.0 <= high)
     assert set(summary["explanation"]) == {*summary["results"], *summary["chip"]}
     parts = summary["parts"]["rake_error_degC"]
@@ -348,21 +386,9 @@ def test_the_comparison_holds_what_the_paper_states(result):
     assert error["standard_deviation"] == draws.standard_deviation
 
 
-def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
-    whole = result.cut.band
-    ridge = Line(whole.ridge.distance[20:], whole.ridge.points[20:])
-    values = {name: getattr(whole, name)[20:] for name in ("normals", "rate", "widths")}
-    segment = replace(result.cut.segments[0], band=replace(whole, ridge=ridge, **values))
-    shorter = of_cut(result, segments=(segment,))
-    row = next(r for r in result_rows(shorter) if r.key == "band_length_um")
-    begins = whole.ridge.distance[20]
-    assert row.here == pytest.approx(1e6 * (whole.ridge.distance[-1] - begins))
-    assert f"begins {1e6 * begins:.0f} µm from the cutting edge" in row.explanation
-
-
 def test_numbers_are_printed_with_sign_unit_and_dash():
     paper = PaperValue(-42.0, "abstract")
-    row = Row("error_degC", "Error", "°C", -35.4, uncertainty=3.1, published=paper)
+    row = Row("error_degC", "Error", "°C", -35.4, uncertainty=1.6, freedom=30, published=paper)
     names = ("paper", "mean", "interval", "one-draw", "differs")
 
     def cells(row):
@@ -370,21 +396,23 @@ def test_numbers_are_printed_with_sign_unit_and_dash():
 
     assert cells(row) == ("−42 °C", "−35 ± 3 °C", "–", "–", "yes")
     assert replace(row, uncertainty=3.4).differs is False
+    assert replace(row, freedom=None).cells["mean"] == "−35 ± 2 °C"
     rate = Row("rate_per_s", "Rate", "1/s", 123456.0, -3)
     assert cells(rate) == ("–", "123 000 1/s", "–", "–", "–")
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
     drawn = replace(row, here=draws.mean, draws=draws, one_draw=-30.0, uncertainty=None)
-    # Four draws of one cause: Student's t of 3 degrees of freedom, 3.182 times 8.4 times 1.118.
-    assert cells(drawn) == ("−42 °C", "−41 ± 8 °C", "−71 to −11 °C", "−30 °C", "no")
+    # Four pixel phases are all that there are: quantiles of 2.5 % and 97.5 % between them.
+    assert cells(drawn) == ("−42 °C", "−41 ± 0 °C", "−50 to −31 °C", "−30 °C", "no")
 
 
 def test_the_place_of_the_papers_figure_is_stated():
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
     near, far = (position(draws, paper, "°C") for paper in (-42.0, -120.0))
-    assert near.startswith("50 % of our 4 draws are below the paper's value")
     assert "lies within the 95 %" in near and "lies outside the 95 %" in far
-    single = Distribution(np.full((1, 1, 1), -40.0), CAUSES)
-    assert "does not show whether" in position(single, -42.0, "°C")
+    single = Distribution(np.full((1, 1, 1), -40.0), CAUSES, missing=("texture",))
+    assert "Only one texture was drawn, which does not show whether" in position(
+        single, -42.0, "°C"
+    )
 
 
 def test_a_width_is_found_where_the_series_meets_the_value():

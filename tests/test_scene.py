@@ -169,6 +169,12 @@ def test_the_edge_touches_the_cut_surface_and_a_steep_rake_the_upright(tool):
         assert outline[:, 0].min() > -1e-18
 
 
+def test_a_scene_of_temperature_alone_shows_itself():
+    made = Scene.from_fields(RASTER, TIMES, {"temperature": fields()["temperature"]})
+    assert "26.85 °C" in repr(made)
+    assert made.plot().get_images()
+
+
 def changed_coordinate(name, values):
     data = scene().data
     return Scene(data.assign_coords({name: (name, np.array(values), data[name].attrs)}))

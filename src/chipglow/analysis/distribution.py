@@ -1,20 +1,32 @@
 """A figure of merit over its draws: its scatter, and the causes of the scatter."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, nan, sqrt
+from math import inf, isfinite, nan, sqrt
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.optimize import brentq
+from scipy.special import expit, logit, stdtr, stdtrit
+
+PIXEL_PHASE: Final = "pixel phase"
+"""Position of the pixels on the scene: a known population, of which every value is as likely."""
 
 TOGETHER: Final = "causes together"
 """What no cause makes by itself: it needs two or three of them."""
 
 COVERAGE: Final = 0.95
-"""Probability with which one more draw lies within `Distribution.interval`."""
+"""Probability of `Distribution.interval` and `Distribution.expanded_uncertainty`."""
+
+_LEAST_FREEDOM: Final = 2.0
+"""Degrees of freedom from which an interval is stated: two values do not show their scatter."""
+
+
+def student_factor(freedom: float) -> float:
+    """Return the coverage factor with so many degrees of freedom; infinite below two."""
+    return float(stdtrit(freedom, (1 + COVERAGE) / 2)) if freedom >= _LEAST_FREEDOM else inf
 
 
 class VarianceComponent(NamedTuple):
@@ -27,10 +39,16 @@ class VarianceComponent(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Distribution:
-    """One finite number for each combination of its causes, which are the axes of the values."""
+    """One finite number for each combination of its causes, which are the axes of the values.
+
+    `missing` are causes of scatter of which only one value was drawn; `limits` are those between
+    which the number lies by its nature, such as 0 and infinity for a length.
+    """
 
     values: NDArray[np.float64]
     causes: tuple[str, ...]
+    missing: tuple[str, ...] = ()
+    limits: tuple[float, float] = (-inf, inf)
 
     def __post_init__(self) -> None:
         if self.values.ndim != len(self.causes) or self.values.size == 0:
@@ -40,6 +58,10 @@ class Distribution:
             )
         if not np.isfinite(self.values).all():
             raise ValueError("distribution: a value is not finite, expected numbers alone")
+
+    def having(self, values: NDArray[np.float64]) -> "Distribution":
+        """Return other values of the same draws, without limits."""
+        return replace(self, values=values, limits=(-inf, inf))
 
     @property
     def draws(self) -> int:
@@ -78,28 +100,73 @@ class Distribution:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Prediction interval for one more draw (JCGM 100, G.4); infinite for a single draw."""
-        terms = [
-            (part.standard_deviation**2 * (1 + 1 / part.draws), freedom)
-            for part, freedom in zip(self.parts.values(), self._freedoms, strict=True)
-            if freedom > 0
-        ]
-        variance = sum(term for term, _ in terms)
-        if not terms:
+        """Prediction interval for one further draw; infinite if that is not known.
+
+        The phases are a known population, the other causes random: t distributions around the mean
+        of each phase, with the sum of their variances (JCGM 100, G.4). With finite limits the
+        interval is that of the logarithm or the logit.
+        """
+        low, high = self.limits
+        if not isfinite(low) or not low < self.range[0] <= self.range[1] < high:
+            return self._interval
+        if isfinite(high):
+            transformed = self.having(logit((self.values - low) / (high - low)))
+        else:
+            transformed = self.having(np.log(self.values - low))
+        ends = np.array(transformed._interval)
+        if not np.isfinite(ends).all():
             return -inf, inf
-        if variance == 0.0:
-            return self.mean, self.mean
-        freedom = variance**2 / sum(term**2 / degrees for term, degrees in terms)
-        half = float(stdtrit(freedom, (1 + COVERAGE) / 2)) * sqrt(variance)
-        return self.mean - half, self.mean + half
+        ends = low + ((high - low) * expit(ends) if isfinite(high) else np.exp(ends))
+        return float(ends[0]), float(ends[1])
+
+    @property
+    def expanded_uncertainty(self) -> float:
+        """Expanded uncertainty of the mean at a coverage of 95 %; infinite if unknown."""
+        if self.missing or self.draws == 1:
+            return inf
+        variance, freedom = self._random(of_next=False)
+        return student_factor(freedom) * sqrt(variance) if variance else 0.0
 
     def differs_from(self, value: float) -> bool:
         low, high = self.interval
         return not low <= value <= high
 
-    def fraction_below(self, value: float) -> float:
-        """Return the part of the draws under a value, 0 to 1; equal draws count half."""
-        return float(((self.values < value) + 0.5 * (self.values == value)).mean())
+    @property
+    def _interval(self) -> tuple[float, float]:
+        if self.missing or self.draws == 1:
+            return -inf, inf
+        variance, freedom = self._random(of_next=True)
+        if freedom < _LEAST_FREEDOM:
+            return -inf, inf
+        known = PIXEL_PHASE in self.causes
+        others = tuple(i for i, name in enumerate(self.causes) if name != PIXEL_PHASE)
+        means = self.values.mean(axis=others).ravel() if known else np.array([self.mean])
+        tail = (1 - COVERAGE) / 2
+        if not variance:
+            return float(np.quantile(means, tail)), float(np.quantile(means, 1 - tail))
+        scale = sqrt(variance)
+
+        def quantile(probability: float) -> float:
+            reach = scale * float(stdtrit(freedom, probability))
+            low, high = means.min() + reach, means.max() + reach
+            if low == high:
+                return float(low)
+            excess = lambda x: float(stdtr(freedom, (x - means) / scale).mean()) - probability  # noqa: E731
+            return float(brentq(excess, low, high))
+
+        return quantile(tail), quantile(1 - tail)
+
+    def _random(self, of_next: bool) -> tuple[float, float]:
+        """Return variance and degrees of freedom by the random causes: of a draw or of the mean."""
+        terms = [
+            (part.standard_deviation**2 * (of_next + 1 / part.draws), freedom)
+            for (name, part), freedom in zip(self.parts.items(), self._freedoms, strict=True)
+            if freedom > 0 and name != PIXEL_PHASE
+        ]
+        variance = sum(term for term, _ in terms)
+        if not variance:
+            return 0.0, inf
+        return variance, variance**2 / sum(term**2 / degrees for term, degrees in terms)
 
     @property
     def _freedoms(self) -> list[int]:

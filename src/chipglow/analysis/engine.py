@@ -17,6 +17,7 @@ from chipglow.analysis.cut import (
     lacking,
     spread_starts,
 )
+from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect
 from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
@@ -24,6 +25,7 @@ from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, R
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.camera.exposure import sparse_frames
 from chipglow.laboratory.chip import (
     NoContactError,
     NoShearBandError,
@@ -54,9 +56,11 @@ _USUAL_SPACING: Final = 180e-6
 
 _SHOWN_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "material")
 _COORDINATES: Final = (
-    "place", "quantity", "seen_surface", "textures", "line_surface", "line_textures",
+    "place", "quantity", "seen_surface", "textures", "undrawn", "line_surface", "line_textures",
 )  # fmt: skip
 _KELVIN: Final = {"units": "K"}
+_LEAST_LIGHT: Final = 1e-30
+"""Radiance in W/(m² sr) that a camera shows where the surroundings account for all."""
 
 _Part = TypeVar("_Part")
 
@@ -189,6 +193,7 @@ def analyse(
         **_image_variables(measurements, looked, schedule.shown),
         **looked.variables(HEADLINES if cut else {}, "segment" if cut else "exposure"),
     }
+    variables |= _corrected(camera, variables)
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,
         "error_reference": plan.reference,
@@ -197,6 +202,8 @@ def analyse(
     origins = [surface.origin for surface in surfaces.values()]
     doubts = dict.fromkeys(text for one in origins for text in one.doubts(camera.band, scene))
     warnings = [*doubts, *_image_warnings(task, looked)]
+    if sparse := sparse_frames(scene, camera.integration_time):
+        warnings = [sparse, *warnings]
     if cut is not None:
         cut = _completed(task, cut)
         warnings = [*resolution_warnings(scene, cut.band_width), *warnings]
@@ -258,7 +265,10 @@ def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
         starts=np.array(starts),
         drawn=tuple(starts.index(segment.start) for segment in cut.segments),
         shown=cut.developed,
-        views=tuple(View(name, places, numbers[..., i]) for i, (name, places) in enumerate(used)),
+        views=tuple(
+            View(name, places, numbers[..., i], _undrawn(task, name))
+            for i, (name, places) in enumerate(used)
+        ),
         phases=plan.phases,
         reference=plan.reference,
         effects=task.effects,
@@ -282,7 +292,8 @@ def _scene_schedule(task: _Task) -> Schedule:
     for name in task.surfaces:
         shape = _textures(task, name), plan.phases**2
         numbers = first + np.arange(np.prod(shape)).reshape(shape)
-        views.append(View(name, [places] * len(starts), np.stack([numbers] * len(starts))))
+        numbered = np.stack([numbers] * len(starts))
+        views.append(View(name, [places] * len(starts), numbered, _undrawn(task, name)))
         first += numbers.size
     return Schedule(
         starts=starts,
@@ -297,8 +308,21 @@ def _scene_schedule(task: _Task) -> Schedule:
 
 def _textures(task: _Task, name: str) -> int:
     """Return how many textures of a surface are drawn: one if none is random."""
+    return task.plan.textures if _is_random(task, name) else 1
+
+
+def _is_random(task: _Task, name: str) -> bool:
     surface = task.surfaces[name]
-    return task.plan.textures if surface.redrawn(1) is not surface else 1
+    return surface.redrawn(1) is not surface
+
+
+def _undrawn(task: _Task, name: str) -> tuple[str, ...]:
+    """Return the causes of scatter of which the plan has a single value."""
+    single = {
+        "texture": _is_random(task, name) and task.plan.textures == 1,
+        PIXEL_PHASE: task.plan.phases == 1,
+    }
+    return tuple(cause for cause, holds in single.items() if holds)
 
 
 def _places(task: _Task, middle: int) -> Iterator[Place]:
@@ -379,6 +403,30 @@ def _image_variables(
             np.stack([~one.usable[shown] for one in every]),
             {"units": "1"},
         ),
+    }
+
+
+def _corrected(camera: Camera, variables: Variables) -> Variables:
+    """Return the emissivity to set in the camera, and the temperatures that it then shows.
+
+    It is the median of the surface's emissivity in the upper half of the range of temperatures.
+    """
+    emissivity, temperature = variables["emissivity"][1], variables["temperature"][1]
+    hot = temperature >= (np.nanmin(temperature) + np.nanmax(temperature)) / 2
+    assumed = np.nanmedian(np.where(hot, emissivity, np.nan), axis=(1, 2))
+    surfaces = variables["surface"][1]
+    number = [surfaces.index(name) for name in variables["seen_surface"][1]]
+    set_to = assumed[number][:, None, None, None]
+    band = camera.band
+    reflected = 0.0 if camera.reflected is None else band.radiance(camera.reflected)
+    measured = variables["measured"][1][..., 0]
+    light = (band.radiance(np.nan_to_num(measured)) - (1 - set_to) * reflected) / set_to
+    shown = np.where(
+        np.isfinite(measured), band.temperature(np.maximum(light, _LEAST_LIGHT)), np.nan
+    )
+    return {
+        "set_emissivity": ("surface", assumed, {"units": "1"}),
+        "corrected": (variables["reference"][0], shown, _KELVIN),
     }
 
 

@@ -130,19 +130,26 @@ class ExposureImages:
     def __init__(
         self, exposure: Exposure, kind: ReferenceKind = "maximum", shares_blur: bool = False
     ) -> None:
+        if not isinstance(exposure, Exposure):
+            raise ValueError(
+                f"exposure: {type(exposure).__name__}, expected an Exposure as Camera.expose "
+                "returns: a measurement no longer holds the scene's true temperatures"
+            )
         self.exposure, self.kind = exposure, kind
         blurred = lru_cache(1)(partial(_blurred, exposure)) if shares_blur else None
         self._formed = lru_cache(8)(partial(_formed, exposure, blurred))
         self._read = lru_cache(_KEPT)(partial(_read, self._formed, exposure.start))
         self._references: dict[tuple[object, ...], Array] = {}
 
-    def reference(self, camera: Camera) -> Array:
-        key = camera.pitch, camera.offset, camera.shape, camera.fill_factor
+    def reference(self, camera: Camera, kind: ReferenceKind | None = None) -> Array:
+        """Return the temperature in K of pixels without error, by default of the own kind."""
+        kind = kind or self.kind
+        key = kind, camera.pitch, camera.offset, camera.shape, camera.fill_factor
         reference = self._references.get(key)
         if reference is None:
             if len(self._references) >= _KEPT:
                 self._references.clear()
-            reference = reference_temperature(camera, self.exposure, self.kind)
+            reference = reference_temperature(camera, self.exposure, kind)
             self._references[key] = reference
         return reference
 

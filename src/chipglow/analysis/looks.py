@@ -26,6 +26,8 @@ from chipglow.surface import EmissivityField, Surface
 Variables: TypeAlias = dict[str, Any]
 
 _DRAWS: Final = ("exposure", "texture", "pixel_phase")
+_VARIED: Final = 3
+"""Positions of the pixels along each axis, or a few more, for the other cameras."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,7 @@ class View:
     surface: str
     places: Sequence[Sequence[Place]]  # by drawn exposure
     numbers: NDArray[np.int_]  # of the detector's noise, shape (exposure, texture, pixel phase)
+    undrawn: tuple[str, ...]  # causes of scatter of which only one value is drawn
 
     @property
     def textures(self) -> int:
@@ -54,6 +57,12 @@ class Schedule:
     effects: Mapping[str, Effect]  # the first switches nothing off
     vary: Sequence[Callable[[Camera], Camera]] = ()  # other cameras, for the first texture
 
+    @property
+    def varied_phases(self) -> tuple[int, ...]:
+        """Numbers of the pixel phases that the other cameras have."""
+        along = range(0, self.phases, max(self.phases // _VARIED, 1))
+        return tuple(row * self.phases + column for row in along for column in along)
+
 
 class Looked:
     """Images by surface, and readings of every view, NaN for nothing."""
@@ -72,12 +81,14 @@ class Looked:
         self.lines = [(n, i, name) for n, i, p in placed for name in p.lines(pitch)]
         every = [p for v in schedule.views for places in v.places for p in places]
         sizes = [line.distance.size for p in every for line in p.lines(pitch).values()]
-        points, rows = max(sizes, default=0), 1 + len(schedule.effects)
+        # Reference, measured temperature with each effect, true temperature.
+        points, rows = max(sizes, default=0), 2 + len(schedule.effects)
         exposures, phases = len(schedule.drawn), schedule.phases**2
         draws = exposures, max(view.textures for view in schedule.views)
         readings, lines = (len(self.readings),), (len(self.lines),)
         self.read = np.full((*readings, *draws, phases, rows), np.nan)
-        self.varied = np.full((*readings, len(schedule.vary), exposures, phases, rows), np.nan)
+        varied = len(schedule.vary), exposures, len(schedule.varied_phases)
+        self.varied = np.full((*readings, *varied, rows), np.nan)
         self.along = np.full((*lines, *draws, phases, rows, points), np.nan)
         self.places = np.full((*lines, exposures, 3, points), np.nan)
         self.scene = np.full((*lines, *draws, points), np.nan)
@@ -102,11 +113,17 @@ class Looked:
                 for i, place in enumerate(places):
                     index = exposure, texture
                     self._read_scene((number, i), place, index, images.exposure, noisy[0])
-                cases = (None, *schedule.vary) if texture == 0 else (None,)
-                looks = list(product(enumerate(cases), enumerate(noisy)))
+                others = enumerate(schedule.vary if texture == 0 else (), 1)
+                kept = [noisy[phase] for phase in schedule.varied_phases]
+                looks = [
+                    *product([(0, None)], enumerate(noisy)),
+                    *product(others, enumerate(kept)),
+                ]
                 for step, ((case, change), (phase, camera)) in enumerate(looks):
                     progress((finished + step / len(looks)) / textures)
-                    stack = images.stack(change(camera) if change else camera, schedule.effects)
+                    changed = change(camera) if change else camera
+                    stack = images.stack(changed, schedule.effects)
+                    stack = np.append(stack, images.reference(camera, "true")[None], axis=0)
                     pixels = camera.pixels(images.exposure.raster)
                     for i, place in enumerate(places):
                         indices = case, exposure, texture, phase
@@ -181,8 +198,10 @@ class Looked:
             "quantity": ("reading", [quantity for *_, quantity in readings]),
             "seen_surface": ("reading", [views[view].surface for view, *_ in readings]),
             "textures": ("reading", [views[view].textures for view, *_ in readings]),
+            "undrawn": ("reading", [", ".join(views[view].undrawn) for view, *_ in readings]),
             "reference": (("reading", *_DRAWS), self.read[..., 0], kelvin),
-            "measured": (("reading", *_DRAWS, "effects"), self.read[..., 1:], kelvin),
+            "measured": (("reading", *_DRAWS, "effects"), self.read[..., 1:-1], kelvin),
+            "true": (("reading", *_DRAWS), self.read[..., -1], kelvin),
         }
         if lines:
             over = "line", *_DRAWS
@@ -195,16 +214,17 @@ class Looked:
                     for i, name in enumerate(("distance", "x", "y"))
                 },
                 "line_reference": ((*over, "point"), self.along[..., 0, :], kelvin),
-                "line_measured": ((*over, "effects", "point"), self.along[..., 1:, :], kelvin),
+                "line_measured": ((*over, "effects", "point"), self.along[..., 1:-1, :], kelvin),
+                "line_true": ((*over, "point"), self.along[..., -1, :], kelvin),
                 "line_scene": ((*over[:3], "point"), self.scene, kelvin),
                 "line_motion": (over[:3], self.motion, kelvin),
             }
         if schedule.vary:
             shape = self.varied.shape
             varied = self.varied.reshape(shape[0], 2, shape[1] // 2, *shape[2:])
-            dims = ("reading", "psf_order", "psf_width", "exposure", "pixel_phase")
+            dims = ("reading", "psf_order", "psf_width", "exposure", "varied_phase")
             variables["varied_reference"] = dims, varied[..., 0], kelvin
-            variables["varied_measured"] = (*dims, "effects"), varied[..., 1:], kelvin
+            variables["varied_measured"] = (*dims, "effects"), varied[..., 1:-1], kelvin
         return variables
 
 

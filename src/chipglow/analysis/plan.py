@@ -37,10 +37,10 @@ class Plan(Part):
         int,
         Parameter(
             "Positions of the pixels along each axis, evenly over a pixel, on which each headline "
-            "is drawn anew: 3 makes 9.",
+            "is drawn anew: 9 makes 81.",
             least=1,
         ),
-    ] = 3
+    ] = 9
     textures: Annotated[
         int,
         Parameter(

@@ -1,14 +1,14 @@
 """Errors, portions, means and scatter: reductions of an analysis' Dataset over its axes."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from chipglow.analysis.distribution import Distribution
+from chipglow.analysis.distribution import PIXEL_PHASE, Distribution
 from chipglow.analysis.images import ALL, WITHOUT_PSF, Array
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
@@ -24,6 +24,10 @@ class Headline:
     reference: Distribution
     error: Distribution
     psf_portion: Distribution
+    true_error: Distribution
+    """Radiance temperature less the greatest true temperature in the pixel."""
+    corrected_error: Distribution
+    """The same, with the emissivity set in the camera."""
 
     @property
     def psf_fraction(self) -> Distribution | None:
@@ -31,7 +35,8 @@ class Headline:
         low, high = self.error.range
         if low <= 0 <= high:
             return None
-        return Distribution(self.psf_portion.values / self.error.values, self.error.causes)
+        part = self.error.having(self.psf_portion.values / self.error.values)
+        return replace(part, limits=(0.0, 1.0))
 
 
 class OneDraw(NamedTuple):
@@ -39,6 +44,8 @@ class OneDraw(NamedTuple):
 
     error: float
     psf_portion: float
+    true_error: float
+    corrected_error: float
 
 
 def error(data: xr.Dataset, kind: str = "", effects: str = ALL) -> xr.DataArray:
@@ -57,18 +64,27 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
     """Return one reading over all draws; None unless it is finite in each of them."""
     if reading not in data.reading.values:
         return None
-    one = data[["reference", "measured"]].sel(reading=reading)
+    one = data[["reference", "measured", "true", "corrected"]].sel(reading=reading)
     one = one.isel(texture=slice(int(one.textures)))
-    values = [
-        array.transpose(*_DRAWS).values for array in (one.reference, error(one), psf_portion(one))
-    ]
+    measured = one.measured.sel(effects=ALL, drop=True)
+    arrays = (
+        one.reference,
+        error(one),
+        psf_portion(one),
+        measured - one.true,
+        one.corrected - one.true,
+    )
+    values = [array.transpose(*_DRAWS).values for array in arrays]
     if not np.isfinite(values).all():
         return None
-    causes = (str(data.exposure.attrs["title"]), "texture", "pixel phase")
-    place, quantity, surface = (
-        str(one[name].item()) for name in ("place", "quantity", "seen_surface")
+    causes = (str(data.exposure.attrs["title"]), "texture", PIXEL_PHASE)
+    place, quantity, surface, undrawn = (
+        str(one[name].item()) for name in ("place", "quantity", "seen_surface", "undrawn")
     )
-    return Headline(place, quantity, surface, *(Distribution(array, causes) for array in values))
+    missing = tuple(filter(None, undrawn.split(", ")))
+    return Headline(
+        place, quantity, surface, *(Distribution(array, causes, missing) for array in values)
+    )
 
 
 def headlines(data: xr.Dataset) -> dict[str, Headline]:
@@ -80,7 +96,9 @@ def headlines(data: xr.Dataset) -> dict[str, Headline]:
 def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
     """Return a reading of the first exposure, texture and pixel phase."""
     one = data.sel(reading=reading).isel(dict.fromkeys(_DRAWS, 0))
-    return OneDraw(float(error(one)), float(psf_portion(one)))
+    measured = one.measured.sel(effects=ALL)
+    values = error(one), psf_portion(one), measured - one.true, one.corrected - one.true
+    return OneDraw(*map(float, values))
 
 
 def line_error(data: xr.Dataset, line: str) -> xr.DataArray:
@@ -184,4 +202,4 @@ def _scene_lines(data: xr.Dataset, line: str) -> Iterator[tuple[Array, Array]]:
 
 
 def _by_width(values: xr.DataArray) -> Array:
-    return np.asarray(values.mean(("exposure", "pixel_phase"), skipna=False).values)
+    return np.asarray(values.mean(("exposure", "varied_phase"), skipna=False).values)

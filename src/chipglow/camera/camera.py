@@ -14,7 +14,7 @@ from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.detector.terms import Lag, follows, lagged
-from chipglow.camera.exposure import Exposure, View, expose
+from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.convolution import Beyond, blur, blurs, images_on_pixels
@@ -361,6 +361,9 @@ class Camera(Part):
             self._expose(scene, surface, field, at)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
+        if sparse := sparse_frames(scene, self.integration_time):
+            known = filter(None, (measured.data.attrs.get("warnings"), sparse))
+            measured.data.attrs["warnings"] = "\n".join(known)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
     def light_from_beyond(self, scene: Raster) -> Array:

@@ -69,6 +69,8 @@ class Recording:
     """Measuring range, as the maker calls it."""
     fill_factor: float | None = None
     """Fraction of a pixel's square that takes light."""
+    stated_band: Band | None = None
+    """Band that the file states, in a unit that it does not: it is compared, not used."""
     notes: Notes = field(default_factory=Notes)
     """Assumptions and warnings of reading the file, and what else the file states."""
 

@@ -116,7 +116,7 @@ def _print_table(analysis: Analysis, study: Study) -> None:
         "quantity": "quantity",
         **({"the paper": "paper"} if compared else {"reference": "reference"}),
         "this study": "mean",
-        "95 % interval": "interval",
+        "single frame (95 %)": "interval",
         **({"differs": "differs"} if compared else {}),
     }
     frame = pd.DataFrame([[row.cells[name] for name in names.values()] for row in rows])

@@ -32,9 +32,6 @@ MOST_SAMPLES: Final = 100_000_000
 _CHECKPOINT_INTERVAL: Final = 30.0
 _KEY: Final = "import"
 _SMALLEST, _LARGEST = 5e-6, 0.05
-_KELVIN: Final = (
-    f"expected kelvin of {COLDEST:g} or more; if it is in °C, expected units.temperature: degC"
-)
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ def prospect(wanted: Import) -> Prospect:
             f"temperature: NAME with one of {listed}"
         )
     raster = wanted.view.raster(survey)
-    _check_temperatures(survey, raster)
+    _check_temperatures(wanted, survey, raster)
     assumed = [
         *_doubtful_size(survey),
         *(text for name, text in wanted.assumptions.items() if name in survey.found),
@@ -266,21 +263,28 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
     frames = complete(wanted.source.frames(raster, first), raster, wanted.completion)
     seen = done > 0
     for frame in islice(frames, done - first, None):
-        _check_kelvin(frame)
+        lowest = float(frame.temperature.min())
+        if -100.0 < lowest < COLDEST:
+            raise _not_kelvin(wanted, lowest, f"at {frame.time:.9g} s")
         seen = seen or bool(frame.material.any())
         yield frame
     if not seen:
         raise SourceError("import: no sample of any frame shows material, expected some in view")
 
 
-def _check_kelvin(frame: Frame) -> None:
-    """Refuse temperatures that look like °C, in the words of an import."""
-    lowest = float(frame.temperature.min())
-    if -100.0 < lowest < COLDEST:
-        raise SourceError(f"temperature: {lowest:.6g} at {frame.time:.9g} s, {_KELVIN}")
+def _not_kelvin(wanted: Import, value: float, place: str) -> SourceError:
+    unit = wanted.description.get("units", {}).get("temperature", "K")
+    other = (
+        "if it is in °C, expected units.temperature: degC"
+        if unit == "K"
+        else f"units.temperature is {unit}"
+    )
+    return SourceError(
+        f"temperature: {value:.6g} {place}, expected kelvin of {COLDEST:g} or more; {other}"
+    )
 
 
-def _check_temperatures(survey: Survey, raster: Raster) -> None:
+def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
     """Refuse what no import could take: no temperature at all, or what is none in kelvin.
 
     If only a part of the source is in view, the least temperature need not be.
@@ -295,7 +299,8 @@ def _check_temperatures(survey: Survey, raster: Raster) -> None:
         )
     if highest < COLDEST or (lowest < COLDEST and _holds_all(raster, survey)):
         worst = highest if highest < COLDEST else lowest
-        raise SourceError(f"temperature: {worst:.6g} in {survey.found['temperature']}, {_KELVIN}")
+        place = f"in {survey.found['temperature']}"
+        raise _not_kelvin(wanted, worst, place)
 
 
 def _holds_all(raster: Raster, survey: Survey) -> bool:

@@ -22,7 +22,7 @@ from chipglow.io import spline_file
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink, check_file, write_hdf5
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import COMPRESSION, PACKING, Packing, chunk_of, read_chunk
+from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk, rounded
 from chipglow.io.spool import UnfinishedScene, spooled
 from chipglow.scene import (
     ENERGY_UNITS,
@@ -85,9 +85,8 @@ class SceneWriter:
     `lattice` the splines of the frames are kept instead of their samples. `resume` begins with the
     frames of the last checkpoint of an earlier writer.
 
-    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK, material
-    coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are within 2⁻¹⁴,
-    2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
+    One NetCDF-4 file, a chunk per field and frame. Samples have the bits of `packing.KEPT_BITS`,
+    splines the steps of `spline_file.STEPS`.
     """
 
     path: str | os.PathLike[str]
@@ -179,11 +178,7 @@ class SceneWriter:
             raise SceneError(
                 f"scene: {name!r} is {found} at {frame.time:.9g} s, expected {self.raster.shape}"
             )
-        try:
-            packing = PACKING[name]
-            return np.asarray(packing.pack(values), packing.dtype)
-        except ValueError as error:
-            raise SceneError(f"scene: {name!r} at {frame.time:.9g} s: {error}") from None
+        return rounded(name, values)
 
     def _write(self, sink: HDF5Sink) -> None:
         with (
@@ -248,17 +243,17 @@ class SceneWriter:
     def _create_fields(self, file: h5netcdf.File) -> None:
         chunks = (1, *self.raster.shape)
         for name, unit in self._units.items():
-            packing = PACKING[name]
+            dtype = np.uint8 if name in ("material", QUALITY) else np.float32
             variable = file.create_variable(
-                name, ("time", "y", "x"), packing.dtype, chunks=chunks, **COMPRESSION
+                name, ("time", "y", "x"), dtype, chunks=chunks, **COMPRESSION
             )
-            variable.attrs.update(units=unit, long_name=_LONG_NAMES[name], **packing.attributes)
+            variable.attrs.update(units=unit, long_name=_LONG_NAMES[name])
 
 
 class StoredScene(Scene):
     """A scene in a file, read frame by frame; opened by `open_scene`.
 
-    Fields that are packed as `SceneWriter` packs them are read without the way through xarray,
+    Fields that are stored as `SceneWriter` stores them are read without the way through xarray,
     in half the time; what was read last stays in memory, up to `CACHED_BYTES`. `lattice` states
     where the nodes are if the file holds splines, None if it holds samples; `coarser` gives it
     another one, and some of the frames.
@@ -274,8 +269,7 @@ class StoredScene(Scene):
         self._kept = range(data.sizes.get("time", 0)) if kept is None else kept
         fields = (*CUT_FIELDS, QUALITY) if self.lattice is None else spline_file.CHUNKED
         datasets = {name: self._file[name] for name in fields if name in data}
-        packings = {name: Packing.stored(dataset) for name, dataset in datasets.items()}
-        self._direct = {name: packing for name, packing in packings.items() if packing}
+        self._direct = {name for name, dataset in datasets.items() if _is_plain(dataset)}
         if lattice is not None:
             places = raster_coordinates(lattice.raster, data["time"].values[self._kept])
             data = xr.Dataset(coords=places, attrs=data.attrs)
@@ -334,7 +328,15 @@ class StoredScene(Scene):
         if name not in self._direct:
             with _telling(self.path, name, index):
                 return super()._read(name, index)
-        return self._direct[name].unpack(self._chunk(name, index))
+        return self._chunk(name, index).copy()
+
+
+def _is_plain(dataset: h5py.Dataset) -> bool:
+    """Whether a dataset holds the values themselves, as files of other programs need not."""
+    encoded = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
+    return dataset.dtype in (np.float32, np.uint8) and not any(
+        map(dataset.attrs.__contains__, encoded)
+    )
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from chipglow.quantities.part import (
     Family as Family,
     FileBeside as FileBeside,
     Part as Part,
+    Typed as Typed,
     adapter as adapter,
     beside_the_study as beside_the_study,
     of_other_packages as of_other_packages,

@@ -24,7 +24,7 @@ from warnings import warn
 
 import numpy as np
 from pydantic import (
-    AfterValidator,
+    BeforeValidator,
     ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
@@ -291,9 +291,18 @@ def of_other_packages(group: str) -> dict[str, Any]:
     return found
 
 
-def beside_the_study(file: str, info: ValidationInfo) -> str:
+class Typed(str):
+    """Text that was typed in a shell: a file that it names is beside the shell's folder."""
+
+    __slots__ = ()
+
+
+def beside_the_study(file: Any, info: ValidationInfo) -> Any:
     """Return the path of a file that a description names, beside the description."""
-    path = Path((info.context or {}).get("folder") or ".", file)
+    if not isinstance(file, str):
+        return file
+    folder = "." if isinstance(file, Typed) else (info.context or {}).get("folder") or "."
+    path = Path(folder, file)
     # A link keeps its own name, which says what kind of file it is.
     try:
         return str(path.parent.resolve() / path.name)
@@ -301,7 +310,7 @@ def beside_the_study(file: str, info: ValidationInfo) -> str:
         raise ValueError(f"{file!r}: its folder is a link to itself") from None
 
 
-FileBeside = Annotated[str, AfterValidator(beside_the_study)]
+FileBeside = Annotated[str, BeforeValidator(beside_the_study)]
 """A file that a description names."""
 
 

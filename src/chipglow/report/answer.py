@@ -6,7 +6,6 @@ from math import isfinite
 from typing import Final, NamedTuple
 
 from chipglow.analysis import Distribution
-from chipglow.analysis.distribution import COVERAGE
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
@@ -24,12 +23,20 @@ class Statement(NamedTuple):
 
 
 def answer(facts: Facts, errors: Sequence[Row]) -> list[Statement]:
-    """Return a sentence for each main error: of a cut at fixed places, else at the first ones."""
+    """Return a sentence for each main error: of a cut at fixed places, else at the first ones.
+
+    The last one states the error of the true temperature at the first of these places.
+    """
     rows = {row.key: row for row in errors}
-    return [
+    names = list(islice(_main(facts), _MAX_SENTENCES))
+    statements = [
         Statement(_sentence(facts, name, rows), rows[f"{slug(name)}_error_degC"].link)
-        for name in islice(_main(facts), _MAX_SENTENCES)
+        for name in names
     ]
+    for name in names[:1]:
+        link = rows[f"{slug(name)}_corrected_error_degC"].link
+        statements.append(Statement(_of_true_temperature(facts, name), link))
+    return statements
 
 
 def _main(facts: Facts) -> Iterator[str]:
@@ -49,23 +56,41 @@ def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
     parts = [facts.text(template, **values)]
     fraction = found.psf_fraction
     if fraction is not None and fraction.mean > 0:  # blur may raise the temperature beside a band
-        percent = spread_text(100 * fraction.mean, 100 * fraction.standard_deviation, "%", 0)
+        percent = spread_text(100 * fraction.mean, 100 * fraction.expanded_uncertainty, "%", 0)
         parts.append(f"the point spread function accounts for {percent} of the error")
-    if row.paper is not None and found.error.draws > 1:
-        side = "outside" if row.differs else "inside"
-        parts.append(f"the paper's {-row.paper:.0f} °C lies {side} the interval")
+    if row.paper is not None and row.differs is not None:
+        side = "outside" if row.differs else "within"
+        parts.append(f"the paper's {-row.paper:.0f} °C lies {side} the interval of a single frame")
     return "; ".join(parts) + "."
 
 
+def _of_true_temperature(facts: Facts, name: str) -> str:
+    found = facts.headlines[name]
+    emissivity = float(facts.data.set_emissivity.sel(surface=found.surface))
+    return facts.text(
+        texts()["answers"]["true_temperature"],
+        place=found.place,
+        emissivity=f"{emissivity:.2f}",
+        plain=_side(found.true_error.mean),
+        corrected=_side(found.corrected_error.mean),
+    )
+
+
 def error_text(error: Distribution) -> str:
-    """Return how far a reading is too low or too high, with its interval."""
-    scale, way = (-1.0, "low") if error.mean < 0 else (1.0, "high")
+    """Return how far a reading is too low or too high on average and in a single frame."""
+    scale, way, other = (-1.0, "low", "high") if error.mean < 0 else (1.0, "high", "low")
     text = f"{draws_text(error, scale)} too {way}"
+    if error.missing:
+        return f"{text} (no interval: only one {' and one '.join(error.missing)} was drawn)"
     if error.draws < 2:
         return f"{text} (a single draw)"
-    ends = sorted(scale * end for end in error.interval)
-    if not all(map(isfinite, ends)):
+    low, high = sorted(scale * end for end in error.interval)
+    if not isfinite(low):
         return f"{text} ({error.draws} draws)"
-    low, high = (quantity_text(end, "°C", 0) for end in ends)
-    unknown = ", so its sign is not known" if ends[0] < 0 < ends[1] else ""
-    return f"{text} ({error.draws} draws; {COVERAGE * 100:.0f} % interval {low} to {high}{unknown})"
+    least = quantity_text(abs(low), "°C", 0) + (f" too {other}" if low < 0 else "")
+    most = f"{quantity_text(high, '°C', 0)} too {way}"
+    return f"{text} on average; in a single frame between {least} and {most}"
+
+
+def _side(error: float) -> str:
+    return f"{quantity_text(abs(error), '°C', 0)} too {'low' if error < 0 else 'high'}"

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -75,15 +76,15 @@ def comparison(
 
 
 def position(draws: Distribution, paper: float, unit: str) -> str:
-    """Return where a published value lies among the draws, and whether it differs."""
-    if draws.draws < 2:
-        return "A single draw does not show whether the paper's value differs."
+    """Return where a published value lies relative to the interval of a single frame."""
+    if not isfinite(draws.interval[0]):
+        cause = " and one ".join(draws.missing) or "draw"
+        return f"Only one {cause} was drawn, which does not show whether the paper's value differs."
     low, high = (f"{end:.0f}".replace("-", "−") for end in draws.interval)
     within = "outside" if draws.differs_from(paper) else "within"
     return (
-        f"{draws.fraction_below(paper) * 100:.0f} % of our {draws.draws} draws are below the "
-        f"paper's value, which lies {within} the {COVERAGE * 100:.0f} % prediction interval for "
-        f"one further draw, {low} to {high} {unit}."
+        f"The paper's value lies {within} the {COVERAGE * 100:.0f} % prediction interval of a "
+        f"single frame, {low} to {high} {unit}."
     )
 
 

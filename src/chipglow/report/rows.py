@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from chipglow.analysis import Analysis, Distribution, Headline, one_draw
+from chipglow.analysis.distribution import student_factor
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text
 from chipglow.report import paper
@@ -37,7 +38,9 @@ class Row:
     explanation: str = ""
     draws: Distribution | None = None
     one_draw: float | None = None  # of a single frame
-    uncertainty: float | None = None  # standard, or deviation over time or segments
+    uncertainty: float | None = None  # standard, or deviation over time
+    freedom: float | None = None  # degrees of freedom of a standard uncertainty
+    is_least: bool = False  # whether the true value may be greater, beyond the view
     reference: Distribution | None = None  # reading of a camera without error in °C
     published: PaperValue | None = None
     parts: Mapping[str, Distribution] = field(default_factory=dict)  # contributions to an error
@@ -48,30 +51,37 @@ class Row:
 
     @property
     def differs(self) -> bool | None:
-        """Whether the published value lies outside the prediction interval; None if unknown.
-
-        If the result was not drawn: whether the two are over two standard uncertainties apart.
-        """
+        """Whether the published value lies outside the 95 % interval; None if unknown."""
         if self.paper is None or self.here is None:
             return None
         if self.draws is not None:
-            return self.draws.differs_from(self.paper) if self.draws.draws > 1 else None
-        if self.uncertainty is None:
-            return None
-        return abs(self.here - self.paper) > 2 * self.uncertainty
+            return self.draws.differs_from(self.paper) if isfinite(self.draws.interval[0]) else None
+        reach = self.expanded_uncertainty
+        return abs(self.here - self.paper) > reach if isfinite(reach) else None
+
+    @property
+    def expanded_uncertainty(self) -> float:
+        """Expanded uncertainty of the result at a coverage of 95 %; infinite if unknown."""
+        if self.draws is not None:
+            return self.draws.expanded_uncertainty
+        if self.uncertainty is None or self.freedom is None:
+            return inf
+        return student_factor(self.freedom) * self.uncertainty
 
     @property
     def cells(self) -> Mapping[str, str]:
         """The row in tables: texts by column, a dash where nothing is known."""
         draws = self.draws
-        spread = draws.standard_deviation if draws else self.uncertainty
-        low, high = draws.interval if draws else (nan, nan)
+        has_draws = draws is not None or self.freedom is not None
+        spread = self.expanded_uncertainty if has_draws else self.uncertainty
+        low, high = draws.interval if draws and not self.is_least else (nan, nan)
         ends = (quantity_text(known(end), "", self.decimals) for end in (low, high))
+        mean = spread_text(self.here, None if self.is_least else spread, self.unit, self.decimals)
         causes = draws.parts if draws else {}
         return {
             "quantity": self.quantity,
             "paper": quantity_text(self.paper, self.unit, self.decimals),
-            "mean": spread_text(self.here, spread, self.unit, self.decimals),
+            "mean": f"more than {mean}" if self.is_least else mean,
             "interval": f"{' to '.join(ends)} {self.unit}".strip() if isfinite(low) else "–",
             "one-draw": quantity_text(self.one_draw, self.unit, self.decimals),
             "differs": {None: "–", True: "yes", False: "no"}[self.differs],
@@ -129,10 +139,11 @@ def _number_rows(facts: Facts, group: str) -> list[Row]:
         return []
     rows = []
     for key, template in texts()["rows"][group].items():
-        value, uncertainty = (
-            facts.value(template.get(name, "none")) for name in ("value", "uncertainty")
+        value, uncertainty, freedom = (
+            facts.value(template.get(name, "none")) for name in ("value", "uncertainty", "freedom")
         )
-        rows.append(_row(facts, key, template, value, uncertainty=known(uncertainty)))
+        more: Any = {"uncertainty": known(uncertainty), "freedom": known(freedom)}
+        rows.append(_row(facts, key, template, value, **more))
     return rows
 
 
@@ -144,20 +155,23 @@ def _segment_rows(facts: Facts) -> Iterator[Row]:
             [facts.value(template["value"], segment=one) for one in facts.analysis.cut.segments]
         )
         finite = every[np.isfinite(every)]
-        draws = Distribution(finite, ("segment",)) if finite.size else None
+        draws = Distribution(finite, ("segment",), limits=(0.0, inf)) if finite.size else None
         mean = draws.mean if draws else nan
-        yield _row(facts, key, template, mean, draws=draws, one_draw=known(every[0]))
+        is_least = bool(facts.value(template.get("is_least", "0")))
+        yield _row(
+            facts, key, template, mean, draws=draws, one_draw=known(every[0]), is_least=is_least
+        )
 
 
 def _reading(facts: Facts, name: str) -> Iterator[Row]:
     """Yield the rows of an error and of the contribution of the PSF to it."""
     found, one = facts.headlines.get(name), one_draw(facts.data, name)
+    is_main = name in MAIN or facts.analysis.cut is None
     if found is None:
         error = _drawn(facts, name, "error_degC", None, one.error)
         yield replace(error, explanation=texts()["unread"])
     else:
-        celsius = Distribution(found.reference.values - KELVIN, found.reference.causes)
-        is_main = name in MAIN or facts.analysis.cut is None
+        celsius = found.reference.having(found.reference.values - KELVIN)
         parts = _parts(facts, name, found) if is_main else {}
         more: Any = {"reference": celsius, "parts": parts}
         yield _drawn(facts, name, "error_degC", found.error, one.error, **more)
@@ -165,9 +179,14 @@ def _reading(facts: Facts, name: str) -> Iterator[Row]:
     if found and fraction is None and facts.analysis.cut is None:
         yield _drawn(facts, name, "psf_portion_degC", found.psf_portion, one.psf_portion)
     else:
-        draws = Distribution(100.0 * fraction.values, fraction.causes) if fraction else None
+        draws = fraction and replace(fraction, values=100 * fraction.values, limits=(0.0, 100.0))
         single = one.psf_portion / one.error if one.error else nan
         yield _drawn(facts, name, "psf_fraction_percent", draws, 100 * single)
+    if found and is_main:
+        yield _drawn(facts, name, "true_error_degC", found.true_error, one.true_error)
+        yield _drawn(
+            facts, name, "corrected_error_degC", found.corrected_error, one.corrected_error
+        )
 
 
 def _drawn(
@@ -177,8 +196,9 @@ def _drawn(
     key, readings = f"{slug(name)}_{kind}", texts()["rows"]["readings"]
     if key not in readings and draws:
         more["decimals"] = _decimals(draws)
-    surface = str(facts.data.seen_surface.sel(reading=name).item())
-    names = {"id": name, "name": name, "surface": surface}
+    reading = facts.data.sel(reading=name)
+    surface, place = (str(reading[one].item()) for one in ("seen_surface", "place"))
+    names = {"id": name, "name": name, "surface": surface, "place": place}
     more |= {"draws": draws, "one_draw": known(one)}
     mean = draws.mean if draws else nan
     return _row(facts, key, readings.get(key, readings[kind]), mean, names, **more)
@@ -213,9 +233,8 @@ def _parts(facts: Facts, name: str, found: Headline) -> Mapping[str, Distributio
         motion = facts.data.line_motion.sel(line=name).values[:, : rest.shape[1], None]
         if np.isfinite(motion).all():
             moved = np.broadcast_to(motion, rest.shape)
-            motion, footprint = (Distribution(one, psf.causes) for one in (moved, rest - moved))
-            return {"psf": psf, "motion": motion, "footprint": footprint}
-    return {"psf": psf, "rest": Distribution(rest, psf.causes)}
+            return {"psf": psf, "motion": psf.having(moved), "footprint": psf.having(rest - moved)}
+    return {"psf": psf, "rest": psf.having(rest)}
 
 
 def slug(name: str) -> str:
@@ -229,11 +248,10 @@ def known(value: float) -> float | None:
 
 
 def draws_text(draws: Distribution | None, scale: float = 1.0) -> str:
-    """Return mean and standard deviation of draws in °C, with a decimal for small numbers."""
+    """Return mean and its expanded uncertainty in °C, with a decimal for small numbers."""
     if draws is None:
         return "–"
-    spread = draws.standard_deviation
-    return spread_text(scale * draws.mean, spread, "°C", _decimals(draws))
+    return spread_text(scale * draws.mean, draws.expanded_uncertainty, "°C", _decimals(draws))
 
 
 def _decimals(draws: Distribution) -> int:

@@ -25,10 +25,12 @@ class Scatter(_Numbered):
     count: Annotated[int, Field(ge=1, description="Number of draws.")]
     mean: FiniteFloat
     standard_deviation: Annotated[_Known, Field(description="Sample standard deviation.")]
+    expanded_uncertainty: Annotated[_Known, Field(description="Of the mean, coverage 95 %.")]
     lowest: FiniteFloat
     highest: FiniteFloat
     interval_low: Annotated[
-        _Known, Field(description="Lower end of the 95 % prediction interval for one further draw.")
+        _Known,
+        Field(description="Lower end of the 95 % prediction interval for one further frame."),
     ]
     interval_high: Annotated[_Known, Field(description="Its upper end.")]
 
@@ -40,6 +42,7 @@ class Scatter(_Numbered):
             count=draws.draws,
             mean=draws.mean,
             standard_deviation=known(draws.standard_deviation),
+            expanded_uncertainty=known(draws.expanded_uncertainty),
             lowest=low,
             highest=high,
             interval_low=interval_low,

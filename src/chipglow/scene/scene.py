@@ -173,7 +173,7 @@ class Scene:
 
     def _shown(self, frame: int) -> NDArray[np.float64]:
         """Temperature of one frame in °C, NaN where there is no material."""
-        void = self._read("material", frame) == Material.VOID
+        void = self.field("material", frame) == Material.VOID
         return np.where(void, np.nan, self.celsius(frame))
 
     @property

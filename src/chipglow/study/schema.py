@@ -103,7 +103,7 @@ class Study(Part):
             "field_of_view": {"spacing": "1.5 um", "rows": 520, "columns": 460},
         }
         widths = ["4 um", "8 um", "12 um", "20 um"]
-        draws = {"exposures": 5, "phases": 2, "textures": 2, "psf_widths": widths}
+        draws = {"exposures": 5, "phases": 4, "textures": 2, "psf_widths": widths}
         paths = {f"cutting.{path}": value for path, value in cutting.items()}
         return changed(cls(), {"title": title, **paths, "analysis": draws})
 

@@ -48,7 +48,10 @@ class UniformSurface(HomogeneousSurface):
 @SURFACES.part
 @dataclass(frozen=True)
 class TemperatureSurface(HomogeneousSurface):
-    """A table over the true temperature, linear between, constant beyond its ends."""
+    """A table over the true temperature, linear between, constant beyond its ends.
+
+    Two rows of one temperature are a jump.
+    """
 
     kind = "temperature"
     example = "{kind: temperature, table: [[20 degC, 0.2], [1400 degC, 0.4]]}  linear between"
@@ -62,8 +65,13 @@ class TemperatureSurface(HomogeneousSurface):
         temperatures, emissivities = self.columns
         if len(self.table) < 2:
             raise ValueError(f"table: {len(self.table)} rows, expected 2 or more")
-        if not (np.isfinite(temperatures).all() and np.diff(temperatures).min() > 0):
-            raise ValueError(f"table: temperatures are {temperatures} K, expected ascending ones")
+        steps = np.diff(temperatures)
+        jumps_once = (temperatures[2:] > temperatures[:-2]).all()
+        if not (np.isfinite(temperatures).all() and steps.min() >= 0 and jumps_once):
+            raise ValueError(
+                f"table: temperatures are {temperatures} K, expected ascending ones, one of them "
+                "twice for a jump"
+            )
         if not (emissivities.min() >= 0 and emissivities.max() <= 1):
             raise ValueError(f"table: emissivities are {emissivities}, expected 0 to 1")
 

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from chipglow.quantities import Part, adapter, problem
+from chipglow.quantities import Part, Typed, adapter, problem
 from chipglow.text.yaml_file import DescriptionError, parse_yaml, read_yaml
 
 Kind = TypeVar("Kind", bound=Part)
@@ -28,7 +28,10 @@ def load_described(kind: type[Kind], path: str | Path) -> Kind:
 
 
 def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
-    """Read a part from a YAML file, or make one that names another file in a field."""
+    """Read a part from a YAML file, or make one that names another file in a field.
+
+    Files in `settings`, which were typed in a shell, are looked up in its folder.
+    """
     described = path.suffix.lower() in (".yaml", ".yml")
     data = read_yaml(path) if described else {field: path.name}
     for setting in settings:
@@ -42,9 +45,18 @@ def _with(data: Any, setting: str) -> Any:
     if not equals or not all(names):
         raise DescriptionError(f"--set {setting}: expected FIELD=VALUE such as units.length=mm")
     try:
-        return placed(data, names, parse_yaml(value))
+        return placed(data, names, _typed(parse_yaml(value)))
     except ValueError as error:
         raise DescriptionError(f"--set {setting}: {error}") from None
+
+
+def _typed(value: Any) -> Any:
+    """Return data whose texts are marked as typed in a shell."""
+    if isinstance(value, dict):
+        return {name: _typed(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_typed(part) for part in value]
+    return Typed(value) if isinstance(value, str) else value
 
 
 def placed(data: Any, names: list[str], value: Any) -> Any:

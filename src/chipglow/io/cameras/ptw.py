@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from chipglow.io.cameras.binary import Binary, CameraFile, check_picture, evenly, layout, text_of
 from chipglow.io.sources import SourceError
 from chipglow.quantities import Array
+from chipglow.radiometry import Band
 from chipglow.text import Notes
 
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
@@ -162,7 +163,13 @@ class Ptw(CameraFile):
                 transmittance=_positive(header["transmittance"]),
                 atmosphere=_positive(header["atmosphere"]),
             ),
+            "stated_band": self._stated_band(),
         }
+
+    def _stated_band(self) -> Band | None:
+        """Return the camera's band, whose unit the file does not state: um presumably."""
+        low, high = self.header["cut_on"], self.header["cut_off"]
+        return Band(1e-6 * low, 1e-6 * high) if 0.1 < low < high < 100 else None
 
     def _note_header(self, lock_in: bool) -> None:
         header, remarks = self.header, self.notes.remarks
@@ -173,7 +180,7 @@ class Ptw(CameraFile):
         for name in ("lens", "filter", "comment"):
             if text := text_of(header[name]):
                 remarks.append(f"{name.capitalize()}: {text}.")
-        if 0 < header["cut_on"] < header["cut_off"] < 100:
+        if self._stated_band():
             remarks.append(
                 f"The file says that the camera is sensitive from {header['cut_on']:g} to "
                 f"{header['cut_off']:g}, in um presumably."

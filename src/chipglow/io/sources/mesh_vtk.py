@@ -9,12 +9,15 @@ from typing import Any, Final
 from chipglow.io.sources.mesh_reader import Block, MeshReader
 from chipglow.io.sources.source import SourceError, check_hdf5, reading
 
+OTHER_HDF: Final = (".hdf", ".h5", ".hdf5")
+"""Endings of HDF5 files, which are VTK's only if they have its group."""
+
 KINDS: Final[Mapping[str, str]] = {
     ending: kind
     for kind, endings in (
         ("VTK XML", (".vtu", ".pvtu", ".vtp", ".vts", ".vtr", ".vti")),
         ("VTK XML multi-block", (".vtm", ".vtmb")),
-        ("VTK HDF", (".vtkhdf",)),
+        ("VTK HDF", (".vtkhdf", *OTHER_HDF)),
         ("VTK legacy", (".vtk",)),
         ("ParaView collection", (".pvd",)),
         ("XDMF", (".xdmf", ".xmf")),
@@ -27,16 +30,12 @@ KINDS: Final[Mapping[str, str]] = {
 }
 """Formats by the ending of a file's name."""
 
-ALONE: Final = (
-    ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtk", ".vtkhdf", ".e", ".ex2", ".exo", ".exii",
-    ".cgns",
-)  # fmt: skip
-"""Endings of files that name no other files."""
-
 _NAMES: Final[Mapping[str, Mapping[str, str]]] = {"OpenFOAM": {"velocity": "U"}}
 """Names of fields in one format, which mean another thing in others."""
 
-_AS: Final[Mapping[str, str]] = {".xmf": ".xdmf", ".encas": ".case"}
+_AS: Final[Mapping[str, str]] = {
+    ".xmf": ".xdmf", ".encas": ".case", **dict.fromkeys(OTHER_HDF, ".vtkhdf"),
+}  # fmt: skip
 _INSIDES: Final = ("Element Blocks", "internalMesh", "Internal")
 """VTK's names for the elements of Exodus, OpenFOAM and CGNS, beside sets and boundaries."""
 _HEAD: Final = 100_000

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, ValidationInfo
+from pydantic import BeforeValidator, ValidationInfo
 
 from chipglow.camera import Recording
 from chipglow.io.column_file import read_bad_pixels, read_response
@@ -21,20 +21,22 @@ from chipglow.text import commented_yaml, described_by
 _FRAMES: Final = re.compile(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?")
 
 
-def _limits_or_file(text: str, info: ValidationInfo) -> str:
+def _limits_or_file(text: Any, info: ValidationInfo) -> Any:
     """Check a band's limits, or complete the path of a response beside the description."""
+    if not isinstance(text, str):
+        return text
     if text.lower().endswith(".csv"):
         return beside_the_study(text, info)
     WAVELENGTHS.parse_range(text)
     return text
 
 
-def _mask_or_file(text: str, info: ValidationInfo) -> str:
+def _mask_or_file(text: Any, info: ValidationInfo) -> Any:
     return text if text == "find" else beside_the_study(text, info)
 
 
-BandText = Annotated[str, AfterValidator(_limits_or_file)]
-MaskText = Annotated[str, AfterValidator(_mask_or_file)]
+BandText = Annotated[str, BeforeValidator(_limits_or_file)]
+MaskText = Annotated[str, BeforeValidator(_mask_or_file)]
 
 
 def band_of(text: str) -> Band:

@@ -174,13 +174,15 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
             "expected the same"
         )
     band = recording.band
-    if band is not None and not np.allclose(
-        (band.lower, band.upper), (calibration.band.lower, calibration.band.upper), rtol=_SAME
-    ):
+    if band is not None and not _same_band(band, calibration.band):
         raise ValueError(
             f"calibration: is for the band {_band_text(calibration.band)}, the recording has "
             f"{_band_text(band)}, expected the same"
         )
+
+
+def _same_band(one: Band, other: Band) -> bool:
+    return np.allclose((one.lower, one.upper), (other.lower, other.upper), rtol=_SAME)
 
 
 def _band_text(band: Band) -> str:
@@ -325,6 +327,14 @@ def _notes(recording: Recording, calibration: Calibration | None, position: Imag
 def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator[str]:
     if calibration is None or calibration.errors is None:
         yield "The uncertainty of the radiance from the calibration is not known."
+    band = recording.band if calibration is None else calibration.band
+    stated = recording.stated_band
+    if band is not None and stated is not None and not _same_band(stated, band):
+        source = "description" if calibration is None else "calibration"
+        yield (
+            f"The file states a band of {_band_text(stated)}, the {source} is for "
+            f"{_band_text(band)}; the {source}'s is used."
+        )
     signal = recording.signal
     if recording.saturation is None and np.issubdtype(signal.dtype, np.integer):
         top = int(signal.max())
