@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
 from chipglow.analysis.distribution import PIXEL_PHASE
-from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
 from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
@@ -78,20 +77,6 @@ class Picture:
     def is_blank(self) -> bool:
         """Whether every pixel is flagged."""
         return bool(self.data["flagged"].all())
-
-
-@dataclass(frozen=True, eq=False)
-class Readout:
-    """Numbers at the cursor in K, and the parts of the error; NaN for those that are unknown."""
-
-    measured: float
-    uncertainty: float = nan
-    source: str = ""
-    flagged: bool = False
-    true: float = nan
-    emissivity: float = nan
-    reference: float = nan
-    parts: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,29 +172,26 @@ class SceneModel:
             dict(_absent(state, surface)),
         )  # fmt: skip
 
-    def readout(self, picture: Picture) -> Readout:
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
         assert picture.camera and picture.exposure and picture.parts
         state, at, exposure = picture.state, picture.state.cursor, picture.exposure
-        data, raster, scene = picture.parts(), picture.raster, self.opened.scene
-        pixel = {name: float(nearest(image.values, raster, at)) for name, image in data.items()}
+        camera, raster, scene = picture.camera, picture.raster, self.opened.scene
 
         def sample_of(name: str) -> float:
             return float(nearest(self._field(state, name, scene, exposure), scene.raster, at))
 
-        silent = () if picture.camera.detector else ("detector",)
-        names = {"case_1", *PARTS, "texture"}.difference(silent)
-        calibration = picture.camera.calibration(raster.shape)
-        noisy = calibration is not None and np.isfinite(pixel["measured"])
-        return Readout(
-            measured=pixel["measured"],
-            uncertainty=calibration.netd(pixel["measured"]) if calibration and noisy else nan,
-            source="noise of one frame" if noisy else "",
-            flagged=pixel["flagged"] == 1.0,
-            true=sample_of("temperature") + KELVIN,
-            emissivity=sample_of("emissivity"),
-            reference=pixel["reference"],
-            parts={name: pixel[name] for name in names if name in pixel},
-        )
+        numbers = _at(picture.parts(), raster, at)
+        if camera.detector is None:
+            del numbers["detector"]
+        if "emissivity" in picture.absent:
+            del numbers["emissivity"]
+        calibration = camera.calibration(raster.shape)
+        if calibration and np.isfinite(numbers["measured"]):
+            numbers["uncertainty"] = calibration.netd(numbers["measured"])
+        numbers["sample temperature"] = sample_of("temperature") + KELVIN
+        numbers["sample emissivity"] = sample_of("emissivity")
+        return numbers
 
     def drawn(
         self, state: State, phases: int, textures: int, progress: Callable[[float], None]
@@ -370,20 +352,22 @@ class MeasurementModel:
         panels = {"measured": _measured_panel(data, raster)}
         return Picture(state, raster, data, panels, *_lines(state, raster, data, measurement.tool))
 
-    def readout(self, picture: Picture) -> Readout:
-        """Return the measured temperature at the cursor with its calibration's uncertainty."""
-        at, raster, measurement = picture.state.cursor, picture.raster, self.opened.measurement
-        image, index = picture.data["measured"].values, self._index(picture.state)
-        measured = float(nearest(image, raster, at))
-        flagged = bool(nearest(picture.data["flagged"].values, raster, at) == 1.0)
-        if measurement.calibration_errors is None:
-            return Readout(measured, flagged=flagged)
-        estimate = measurement.estimate(image[None], measurement.calibration_effects(index)[None])
-        uncertainty = float(nearest(estimate.standard_uncertainty[0], raster, at))
-        return Readout(measured, uncertainty, "calibration", flagged)
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
+        measurement, index = self.opened.measurement, self._index(picture.state)
+        data = picture.data
+        if measurement.calibration_errors is not None:
+            effects = measurement.calibration_effects(index)[None]
+            estimate = measurement.estimate(data["measured"].values[None], effects)
+            data = data.assign(uncertainty=(("y", "x"), estimate.standard_uncertainty[0]))
+        return _at(data, picture.raster, picture.state.cursor)
 
     def _index(self, state: State) -> int:
         return int(np.abs(self.opened.measurement.times - state.study.start).argmin())
+
+
+def _at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:
+    return {str(name): float(nearest(one.values, raster, at)) for name, one in data.items()}
 
 
 def _absent(state: State, surface: Surface) -> Mapping[str, str]:
