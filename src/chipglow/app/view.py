@@ -185,9 +185,6 @@ class View:
         elif picture is None or picture.quick or picture.state != self.session.state:
             self._say("The exact picture is not finished: save it when it is.", "error")
             return
-        elif name == "chipglow.png":
-            self._send("sheet", name)
-            return
         else:
             data = measurement_file(picture, model)
         url = f"data:application/octet-stream;base64,{b64encode(data).decode()}"
@@ -231,7 +228,8 @@ class View:
             f"{name}_values": {key: curve.tolist() for key, curve in curves.items()}
             for name, curves in picture.lines.items()
         }
-        self._send("picture", {"number": number, "lines": lines, "absent": picture.absent})
+        content = {"number": number, "lines": lines, "absent": picture.absent}
+        self._send("picture", content | {"quick": picture.quick})
 
     def _described(self, picture: Picture) -> tuple[str, str]:
         """Return the status of the page with a picture, and its kind."""
