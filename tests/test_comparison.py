@@ -59,8 +59,8 @@ def slope_of(temperature):
 def test_e_n_is_the_difference_over_its_expanded_uncertainty(away, first, second):
     one, other = (
         Estimate([700.0 + shift])
-        .with_component("systematic", parts[0], independent="common")
-        .with_component("position", parts[1], independent="per element")
+        .with_component("systematic", parts[0])
+        .with_component("position", parts[1], per_element=True)
         for shift, parts in ((0.0, first), (away, second))
     )
     expected = abs(700.0 + away - 700.0) / (2 * hypot(*first, *second))
@@ -442,7 +442,7 @@ def test_noise_that_is_alike_makes_no_set_of_two_the_best(known, least, most):
         shown = 700.0 + alike(np.random.default_rng(seed))
         mean = Estimate(shown.mean(axis=0))
         alone = mean.with_component("position", shown.std(axis=0, ddof=1) / sqrt(len(shown)),
-                                    independent="per element")  # fmt: skip
+                                    per_element=True)  # fmt: skip
         found = replace(mean, components=(frame_scatter(shown),)) if known else alone
         best = int(np.argmin([((one.values - mean.values) ** 2).mean() for one in sets]))
         claims += _confidences(found, sets)[best] >= SURE

@@ -328,12 +328,12 @@ def _measured_squares(
     slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
     off = np.where(np.isfinite(found.values), np.hypot(*slopes), np.nan)
     off = off * _position(measured, stated)
-    return found.with_component(POSITION, off, independent="per element")
+    return found.with_component(POSITION, off, per_element=True)
 
 
 def _stated(found: Estimate, stated: StatedUncertainties) -> Estimate:
     """Add the stated uncertainty that all measured values have in common."""
-    return found.with_component("stated", stated.temperature, independent="common")
+    return found.with_component("stated", stated.temperature)
 
 
 def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertainties) -> Estimate:
@@ -343,7 +343,7 @@ def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertaintie
         # Kelvins of radiance temperature for a radiance that is off by its own amount.
         radiance = np.asarray(simulated.band.radiance(found.values), np.float64)
         spread = stated.emissivity * radiance / simulated.band.slope(found.values)
-    return found.with_component("emissivity", spread, independent="common")
+    return found.with_component("emissivity", spread)
 
 
 def _image(measured: Measurement, frame: int) -> ThermalImage | None:
@@ -450,7 +450,7 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
     position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
     mean = frame_mean(Estimate(frames, components, systematic.unevaluated))
-    mean = mean.with_component(POSITION, position.values, independent="per element")
+    mean = mean.with_component(POSITION, position.values, per_element=True)
     return replace(mean, components=(*mean.components, _scatter(frames)))
 
 
@@ -508,6 +508,7 @@ def _fit(measured: Estimate, simulated: Estimate) -> dict[str, float]:
 
 def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[float]:
     """Return the fraction of the draws of all uncertainties in which each set is the best."""
-    base, *others = draw([measured, *simulated], _DRAWS, np.random.default_rng(_SEED))
+    generator = np.random.default_rng(_SEED)
+    base, *others = draw([measured, *simulated], _DRAWS, generator, heavy_tails=True)
     best = np.argmin([((other - base) ** 2).mean(axis=1) for other in others], axis=0)
     return [float((best == number).mean()) for number in range(len(others))]
