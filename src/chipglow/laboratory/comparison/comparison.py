@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
-from math import degrees, radians, sqrt
+from math import degrees, isnan, nan, radians, sqrt
 from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import frame_mean, frame_scatter
+from chipglow.laboratory.chip.frames import FRAMES, frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
@@ -106,7 +106,7 @@ class Comparison:
     fits: pd.DataFrame
     """Fit of each simulation at each place, one row each. The bias is the mean of simulated minus
     measured; the confidence is the fraction of the draws of all uncertainties in which the
-    simulation has the least root mean square of the place.
+    simulation has the least root mean square of the place, NaN with one measured frame.
     """
     notes: Notes
 
@@ -152,10 +152,12 @@ def _sentence(best: pd.Series, others: pd.DataFrame) -> str:
     result = "; ".join(
         [result, *(f"{fit['simulation']} is {_fit_text(fit)}" for fit in others.iloc)]
     )
-    how = f"{100 * best['confidence']:.3g} % of the draws of the uncertainties"
+    how = f"in {100 * best['confidence']:.3g} % of the draws of the uncertainties"
     if best["confidence"] >= SURE:
-        return f"{place} {name} fits best (in {how}): it is {result}."
-    nearest = f"({name} is nearest, in {how}): {name} is {result}."
+        return f"{place} {name} fits best ({how}): it is {result}."
+    if isnan(best["confidence"]):
+        how = "but one measured frame does not show how much frames vary"
+    nearest = f"({name} is nearest, {how}): {name} is {result}."
     return f"{place} the sets cannot be distinguished {nearest}"
 
 
@@ -451,6 +453,8 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
     position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
     mean = frame_mean(Estimate(frames, components, systematic.unevaluated))
     mean = mean.with_component(POSITION, position.values, per_element=True)
+    if len(frames) == 1:
+        return mean.with_unevaluated(FRAMES)
     return replace(mean, components=(*mean.components, _scatter(frames)))
 
 
@@ -507,7 +511,12 @@ def _fit(measured: Estimate, simulated: Estimate) -> dict[str, float]:
 
 
 def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[float]:
-    """Return the fraction of the draws of all uncertainties in which each set is the best."""
+    """Return the fraction of the draws of all uncertainties in which each set is the best.
+
+    NaN of one frame, which does not show how the frames vary.
+    """
+    if FRAMES in measured.unevaluated:
+        return [nan] * len(simulated)
     generator = np.random.default_rng(_SEED)
     base, *others = draw([measured, *simulated], _DRAWS, generator, heavy_tails=True)
     best = np.argmin([((other - base) ** 2).mean(axis=1) for other in others], axis=0)
