@@ -464,7 +464,7 @@ def _scatter(frames: Array) -> Component:
     several = count > 1
     if several.any() and (count == 1).any():
         effects = scatter.effects.copy()
-        effects[count == 1, 0] = sqrt(float((count * scatter.variance)[several].mean()))
+        effects[count == 1, 0] = sqrt(float(np.nanvar(frames[:, several], axis=0, ddof=1).mean()))
         scatter = replace(scatter, effects=effects)
     return scatter
 
