@@ -10,7 +10,6 @@ command took to the first exact picture, in a browser that was open, and the mem
 beside that of the scene's own splines or samples.
 """
 
-import argparse
 import os
 import shutil
 import subprocess
@@ -19,6 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from common import arguments
 
 CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
 FLAGS = (
@@ -54,12 +54,9 @@ WATCH = """() => {
 
 def main():
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", type=Path, help="a scene's file; the app's own by default")
-    parser.add_argument("--turns", type=int, default=40, help="turns of each control")
-    parser.add_argument("--controls", nargs="+", default=CONTROLS, help="labels of controls")
-    parser.add_argument("--chromium", default=CHROMIUM)
-    given = parser.parse_args()
+    given = arguments(
+        __doc__, scene=Path, turns=40, controls=list(CONTROLS), chromium=CHROMIUM or str
+    )
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

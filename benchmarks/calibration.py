@@ -7,12 +7,12 @@ Held is how often the 95 % interval of the radiance temperature contains the tru
 often the calibration has a warning.
 """
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from common import arguments, print_head, print_row
 
 from chipglow.camera import Blackbody, LinearCalibration, SakumaHattori, fit_calibration
 from chipglow.radiometry import Band
@@ -86,11 +86,8 @@ FAULTS = {
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--repeats", type=int, default=400, help="calibrations of each row")
-    repeats = parser.parse_args().repeats
-    print("| fault | held at 350 degC | 600 degC | 950 degC | u at 600 degC / K | warned |")
-    print("|---|---|---|---|---|---|")
+    repeats = arguments(__doc__, repeats=400).repeats
+    print_head("fault", "held at 350 degC", "600 degC", "950 degC", "u at 600 degC / K", "warned")
     true, at = BAND.radiance(BETWEEN), signal(BETWEEN)
     for name, fault in FAULTS.items():
         held, uncertainties, warned = np.zeros(3), np.zeros(3), 0
@@ -101,9 +98,8 @@ def main():
             held += error < fit.coverage_factor() * uncertainty
             uncertainties += uncertainty / BAND.slope(BETWEEN)
             warned += bool(fit.calibration.warnings)
-        fractions = " | ".join(f"{100 * value / repeats:.0f} %" for value in held)
-        mean = uncertainties[1] / repeats
-        print(f"| {name} | {fractions} | {mean:.2g} | {100 * warned / repeats:.0f} % |", flush=True)
+        held, mean, warned = held / repeats, uncertainties[1] / repeats, warned / repeats
+        print_row(name, *(f"{one:.0%}" for one in held), f"{mean:.2g}", f"{warned:.0%}")
 
 
 if __name__ == "__main__":

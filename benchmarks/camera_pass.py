@@ -8,28 +8,26 @@ memory; all fields in memory, the emissivity from textures and blend; and a file
 first time and again. Beside them the bound, which is to read once what the pass needs, and the
 paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table. The study is the paper's:
 nine instants, two chips, on the same file, or on that of a cut (`chipglow cache list` says where).
-An image is what a camera makes of a kept mean radiance: GalSim, Pyxel and SciPy make it too, if
-they are there (``pip install galsim pyxel-sim``), and Pyxel counts.
+An image is what a camera makes of a kept mean radiance, as SciPy does too; Pyxel also makes counts,
+if it is there (``pip install pyxel-sim``).
 
 All are timed in one run, frames and studies in turn, each after a call that is not timed; the best
 of the rounds counts. Processor time is that of all threads: it is what can be compared on a machine
 that others use too.
 """
 
-import argparse
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from importlib import import_module
 from importlib.util import find_spec
 from itertools import count, pairwise, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
 
 import numba
 import numpy as np
+from common import arguments, best_of
 from scipy.signal import fftconvolve
 
 from chipglow.analysis import spread_starts
@@ -59,10 +57,6 @@ CAMERA = Camera(psf=GaussianPSF(12e-6), psf_order="detector", lower_limit=None)
 NEEDED = (
     "temperature", "material", "plastic_strain", "plastic_strain_rate", "material_x", "material_y",
 )  # fmt: skip
-PEERS = {
-    "GalSim": ("galsim", "peers.image_galsim"),
-    "Pyxel": ("pyxel", "peers.image_pyxel"),
-}
 READ_NOISE = 500.0  # electrons
 DETECTOR = Detector(
     response=PhotonResponse(quantum_efficiency=0.8, element=15e-6, f_number=2.5),
@@ -184,51 +178,17 @@ def study(scene, instants):
     return [camera.form_measurement(chip) for chip in zip(*exposures, strict=True)]
 
 
-def peers_there():
-    """Return modules of the installed programs by name; print the missing ones."""
-    found = {}
-    for name, (package, module) in PEERS.items():
-        if find_spec(package):
-            found[name] = import_module(module)
-        else:
-            print(f"{name} is not installed")
-    return found
-
-
-def timed(call):
-    """Return wall and processor time of a call."""
-    begin, busy = perf_counter(), process_time()
-    call()
-    return perf_counter() - begin, process_time() - busy
-
-
-def best_of(calls, rounds):
-    """Return least wall and processor times of calls by name."""
-    for call in calls.values():
-        call()
-    taken = {name: [] for name in calls}
-    for _ in range(rounds):
-        for name, call in calls.items():
-            taken[name].append(timed(call))
-    return {name: np.min(values, axis=0) for name, values in taken.items()}
-
-
 def main():
     """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--instants", type=int, default=9, help="of the study")
-    parser.add_argument("--sub-frames", type=int, default=50, help="of the stand-in's exposure")
-    parser.add_argument("--scene", type=Path, help="file of a cut for the study")
-    arguments = parser.parse_args()
+    given = arguments(__doc__, rounds=7, instants=9, sub_frames=50, scene=Path)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.nc"
-        stored_scene(path, 1 if arguments.scene else arguments.instants, arguments.sub_frames)
+        stored_scene(path, 1 if given.scene else given.instants, given.sub_frames)
         threads = numba.get_num_threads()
-        print(f"{threads} threads; best of {arguments.rounds} rounds in turn")
-        kept = compare_frames(path, arguments.rounds, arguments.sub_frames)
-        compare_studies(arguments.scene or path, arguments.instants, arguments.rounds)
-    compare_images(kept, arguments.rounds)
+        print(f"{threads} threads; best of {given.rounds} rounds in turn")
+        kept = compare_frames(path, given.rounds, given.sub_frames)
+        compare_studies(given.scene or path, given.instants, given.rounds)
+    compare_images(kept, given.rounds)
 
 
 def compare_frames(path, rounds, sub_frames):
@@ -293,24 +253,18 @@ def compare_studies(path, instants, rounds):
 
 
 def compare_images(kept, rounds):
-    """Time images of an exposure by chipglow and other programs, and compare them."""
+    """Time images and counts of an exposure by chipglow and other programs, and compare them."""
     print("\nImages of 810 x 900 samples, at 90 x 100 pixels")
-    peers, radiance = peers_there(), kept.mean_radiance
-    calls, images = counted(radiance, peers), same_images(radiance, peers)
+    images, counts = same_images(kept.mean_radiance), counted(kept.mean_radiance)
     # Not in turn: of so many point spread functions the oldest would be forgotten.
-    best = {
-        name: best_of({name: call}, rounds)[name]
-        for name, call in {**new_images(kept), **images, **calls}.items()
-    }
-    ours = images["image: chipglow"]()
-    print(f"{'':50}{'wall ms':>10}{'processor ms':>14}{'apart, K: rms':>15}{'most':>8}")
-    for name, (wall, busy) in best.items():
-        line = f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}"
-        if name in images and name != "image: chipglow":
-            line += "{:15.4f}{:8.4f}".format(*apart(images[name](), ours))
-        print(line)
-    if "Pyxel" in peers:
-        print(f"counts of chipglow and Pyxel apart, over their noise: {counts_apart(calls):.3f}")
+    print(f"{'':50}{'wall ms':>10}{'processor ms':>14}")
+    for name, call in {**new_images(kept), **images, **counts}.items():
+        wall, busy = best_of({name: call}, rounds)[name]
+        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}")
+    ours, scipy = (call() for call in images.values())
+    print("image: SciPy apart in K: rms {:.4f}, most {:.4f}".format(*apart(scipy, ours)))
+    if "counts: Pyxel" in counts:
+        print(f"counts of chipglow and Pyxel apart, over their noise: {counts_apart(counts):.3f}")
 
 
 def new_images(kept):
@@ -333,33 +287,34 @@ def new_images(kept):
     return calls
 
 
-def same_images(radiance, peers):
-    """Return each program's call that forms the image behind a Gaussian on square pixels."""
+def same_images(radiance):
+    """Return calls that form the image behind a Gaussian on square pixels."""
     camera = replace(CAMERA, psf_order="optics")
-    kernel, given = camera.psf.kernel(RASTER.spacing), (camera.psf.fwhm, RASTER.spacing, 9)
-    calls = {
+    kernel = camera.psf.kernel(RASTER.spacing)
+    return {
         "image: chipglow": lambda: camera.form_image(radiance, RASTER),
         "image: SciPy": lambda: scipy_image(radiance, kernel),
     }
-    for name, module in peers.items():
-        form = module.prepared(kernel, *given)
-        calls[f"image: {name}"] = lambda form=form: form(radiance)
-    return calls
 
 
-def counted(radiance, peers):
+def counted(radiance):
     """Return calls that make counts: PSF from pixel to pixel, noise and digitiser."""
     camera, generator = replace(CAMERA, psf_order="detector"), np.random.default_rng(1)
     sensors, point = camera.pixels(RASTER), OperationPoint(band=CAMERA.band)
-    kernel = camera.psf.kernel(camera.pitch)
-    calls = {
-        "counts: chipglow": lambda: DETECTOR.counts(
-            camera.form_image(radiance, RASTER)[None], generator, point
-        )[0]
-    }
-    if "Pyxel" in peers:
-        digitise = peers["Pyxel"].prepared_detector(DETECTOR, DETECTOR.per_radiance(point), kernel)
+
+    def counts():
+        image = camera.form_image(radiance, RASTER)
+        return DETECTOR.counts(image[None], generator, point)[0]
+
+    calls = {"counts: chipglow": counts}
+    if find_spec("pyxel"):
+        from peers.counts_pyxel import prepared_detector
+
+        kernel = camera.psf.kernel(camera.pitch)
+        digitise = prepared_detector(DETECTOR, DETECTOR.per_radiance(point), kernel)
         calls["counts: Pyxel"] = lambda: digitise(integrate(radiance, RASTER, sensors, 1.0))
+    else:
+        print("Pyxel is not installed")
     return calls
 
 

@@ -3,17 +3,17 @@
 A heated plate: its holes radiate more than its surface, so they are bright in the infrared; in the
 visible picture they are dark.
 
-``python benchmarks/dot_target.py 300 20`` registers 20 targets, of seeds 300 and up, with settings
-from `DotTarget.drawn`, and prints how far off each map is and what it says of itself.
+``python benchmarks/dot_target.py --first 300 --count 20`` registers targets of these seeds, with
+settings from `DotTarget.drawn`, and prints how far off each map is and what it says of itself.
 """
 
-import argparse
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, radians, sin
 from typing import Self
 
 import numpy as np
+from common import arguments
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f as f_distribution
@@ -139,14 +139,11 @@ class DotTarget:
 
 def main() -> None:
     """Register targets of fresh seeds and print a table."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("first", type=int, help="the first seed")
-    parser.add_argument("count", type=int, help="number of targets")
-    options = parser.parse_args()
+    given = arguments(__doc__, first=300, count=20)
     print("seed holes match  error  stated  inside  warnings   (in infrared pixels)", flush=True)
     within = tried = 0
     places = np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1)[10::20, 10::20].reshape(-1, 2)
-    for seed in range(options.first, options.first + options.count):
+    for seed in range(given.first, given.first + given.count):
         target = DotTarget.drawn(seed)
         try:
             fit = fit_dots(target.infrared, RASTER, target.visible)

@@ -5,13 +5,13 @@ python benchmarks/knife_edge.py [--repeats 60] [NAME ...]
 A NAME is the beginning of a row's name, such as Moffat; all rows by default.
 """
 
-import argparse
 import sys
 from collections import Counter
 from math import radians, sqrt
 from pathlib import Path
 
 import numpy as np
+from common import arguments, print_head, print_row
 
 from chipglow.camera import AnnularAperturePSF
 from chipglow.laboratory.psf import knife_edge
@@ -94,8 +94,7 @@ def oval(normal):
 
 def kinds_of_optics(repeats, names):
     """Print, by kind of optics, how often the width is held, and what the program says of it."""
-    print("| optics | width / um | bias / um | u / um | held | said | model |")
-    print("|---|---|---|---|---|---|---|")
+    print_head("optics", "width / um", "bias / um", "u / um", "held", "said", "model")
     for name, edge_of, fwhm, normals in optics():
         if not name.startswith(names):
             continue
@@ -116,12 +115,10 @@ def kinds_of_optics(repeats, names):
             )
             models[found.best.model.name] += 1
         held = np.abs(errors) < 1.96 * np.array(uncertainties)
-        print(
-            f"| {name} | {1e6 * fwhm:.2f} | {1e6 * np.mean(errors):+.2f} "
-            f"| {1e6 * np.mean(uncertainties):.2f} | {100 * np.mean(held):.0f} % "
-            f"| {100 * np.mean(said):.0f} % | {models.most_common(1)[0][0]} |",
-            flush=True,
-        )
+        micrometres = [f"{1e6 * fwhm:.2f}", f"{1e6 * np.mean(errors):+.2f}"]
+        micrometres.append(f"{1e6 * np.mean(uncertainties):.2f}")
+        model = models.most_common(1)[0][0]
+        print_row(name, *micrometres, f"{np.mean(held):.0%}", f"{np.mean(said):.0%}", model)
 
 
 def levels_of_noise(repeats, names):
@@ -143,10 +140,7 @@ def levels_of_noise(repeats, names):
 
 def main():
     """Print the tables' rows."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--repeats", type=int, default=60, help="edges of each row")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="beginning of a row's name")
-    given = parser.parse_args()
+    given = arguments(__doc__, repeats=60, names=None)
     names = tuple(given.names) or ("",)
     levels_of_noise(given.repeats, names)
     kinds_of_optics(given.repeats, names)

@@ -10,27 +10,35 @@ values at the ends of the legend given. A row is right if the true value lies wi
 stated standard uncertainty in at least 90 % of the pixels, or if the movie is refused.
 """
 
-import argparse
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import av
 import numpy as np
+from common import arguments, print_head, print_row
 from matplotlib import colormaps
 from matplotlib.colors import hsv_to_rgb
 from PIL import Image
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
+from chipglow.io.sources.movie import FieldMovie, MovieSource
 from chipglow.scene import Raster
 
 COLDEST, HOTTEST = 293.0, 1400.0
 SHAPE = (300, 360)
 PIXEL = 1e-6
+
+
+class NamedMap(NamedTuple):
+    """A colour map, and the number of its bands; 0 for one without steps."""
+
+    name: str
+    bands: int = 0
 
 
 @dataclass(frozen=True)
@@ -191,8 +199,8 @@ def read_with_map(
 ) -> Reading:
     """Draw, encode and read a movie whose colour map is given."""
     encode(path, (drawn(known_field(n, shape), colours) for n in range(count)), codec)
-    movie = FieldMovie(path, (COLDEST, HOTTEST), colours)
-    return read_back(MovieSource({"temperature": movie}, PIXEL, (0, shape[0])), shape)
+    movie = FieldMovie(str(path), COLDEST, HOTTEST, *colours)
+    return read_back(MovieSource(movie, pixel=PIXEL, origin=(0, shape[0])), shape)
 
 
 def read_with_legend(
@@ -200,16 +208,18 @@ def read_with_legend(
 ) -> Reading:
     """Draw, encode and read a movie whose legend has to be found; SourceError if it is refused."""
     encode(path, (with_legend(number, colours, edges) for number in range(count)), codec)
-    movies = {"temperature": FieldMovie(path, (COLDEST, HOTTEST))}
     rows, columns = FIELD_SHAPE
-    crop = (0, 0, columns, rows)
-    source = MovieSource(movies, PIXEL, (0.0, rows), crop=crop, frame_interval=1e-6)
+    source = MovieSource(
+        FieldMovie(str(path), COLDEST, HOTTEST),
+        pixel=PIXEL,
+        origin=(0.0, rows),
+        crop=(0, 0, columns, rows),
+        interval=1e-6,
+    )
     return read_back(source, FIELD_SHAPE)
 
 
-def chosen(
-    given: argparse.Namespace, maps: Sequence[NamedMap], codecs: Sequence[Codec]
-) -> tuple[list[NamedMap], list[Codec]]:
+def chosen(given, maps, codecs):
     """Return the maps and codecs that the command names; all if it names none."""
     return (
         [one for one in maps if not given.maps or one.name in given.maps],
@@ -217,46 +227,45 @@ def chosen(
     )
 
 
-def print_codecs(folder: Path, given: argparse.Namespace) -> None:
+def print_codecs(folder, given):
     """Print the errors by colour map and codec."""
-    print(
-        f"{SHAPE[0]} x {SHAPE[1]} pixels, {COLDEST:g} to {HOTTEST:g} K, {given.pictures} pictures"
-    )
-    head = "| map | codec | kB a picture | RMS, K | 99 %, K | most, K | predicted RMS, K |"
-    print(f"{head} wrong material |\n|{'---|' * 8}")
+    size = f"{SHAPE[0]} x {SHAPE[1]} pixels"
+    print(f"{size}, {COLDEST:g} to {HOTTEST:g} K, {given.pictures} pictures")
+    print_head(
+        "map", "codec", "kB a picture", "RMS, K", "99 %, K", "most, K", "predicted RMS, K",
+        "wrong material",
+    )  # fmt: skip
     for colours, codec in product(*chosen(given, MAPS, CODECS)):
         path = folder / f"movie{codec.suffix}"
         found = read_with_map(path, codec, colours, given.pictures)
         errors, pixels = np.abs(found.errors), given.pictures * SHAPE[0] * SHAPE[1]
         kilobytes = path.stat().st_size / 1000 / given.pictures
         bands = f", {colours.bands} bands" if colours.bands else ""
-        print(
-            f"| {colours.name}{bands} | {codec.name} | {kilobytes:.0f} "
-            f"| {found.rms:.1f} | {np.percentile(errors, 99):.1f} | {errors.max():.0f} "
-            f"| {found.stated:.1f} | {100 * (found.extra + found.missing) / pixels:.2f} % |",
-            flush=True,
+        kelvins = f"{found.rms:.1f}", f"{np.percentile(errors, 99):.1f}", f"{errors.max():.0f}"
+        wrong = f"{100 * (found.extra + found.missing) / pixels:.2f} %"
+        size = f"{kilobytes:.0f}"
+        print_row(
+            f"{colours.name}{bands}", codec.name, size, *kelvins, f"{found.stated:.1f}", wrong
         )
 
 
-def print_legends(folder: Path, given: argparse.Namespace) -> None:
+def print_legends(folder, given):
     """Print whether the stated uncertainty holds by map, bands, edges and codec."""
-    print("| map | bands | edges | codec | stated u / K | RMS / K | within 2 u | |")
-    print("|---|---|---|---|---|---|---|---|")
+    print_head("map", "bands", "edges", "codec", "stated u / K", "RMS / K", "within 2 u", "")
     wrong = 0
     maps, codecs = chosen(given, LEGEND_MAPS, LEGEND_CODECS)
     for colours, edges, codec in product(maps, (False, True), codecs):
         path = folder / f"movie{codec.suffix}"
         bands = colours.bands or "none"
-        case = f"| {colours.name} | {bands} | {'yes' if edges else 'no'} | {codec.name}"
+        case = colours.name, f"{bands}", "yes" if edges else "no", codec.name
         try:
             found = read_with_legend(path, codec, colours, edges, given.pictures)
         except SourceError as error:
-            print(f"{case} | | | | refused: {str(error).removeprefix(f'{path}: ')} |", flush=True)
+            print_row(*case, "", "", "", f"refused: {str(error).removeprefix(f'{path}: ')}")
             continue
         wrong += found.held < 0.9
-        verdict = "" if found.held >= 0.9 else "WRONG"
-        numbers = f"{found.stated:.1f} | {found.rms:.1f} | {100 * found.held:.1f} %"
-        print(f"{case} | {numbers} | {verdict} |", flush=True)
+        numbers = f"{found.stated:.1f}", f"{found.rms:.1f}", f"{100 * found.held:.1f} %"
+        print_row(*case, *numbers, "" if found.held >= 0.9 else "WRONG")
     print(f"\n{wrong} cases wrong")
 
 
@@ -264,12 +273,7 @@ TABLES = {"codecs": print_codecs, "legends": print_legends}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--pictures", type=int, default=4)
-    parser.add_argument("--tables", nargs="*", choices=TABLES, default=list(TABLES))
-    parser.add_argument("--maps", nargs="*", default=[], help="names; all by default")
-    parser.add_argument("--codecs", nargs="*", default=[], help="names; all by default")
-    given = parser.parse_args()
+    given = arguments(__doc__, pictures=4, tables=list(TABLES), maps=[], codecs=[])
     with tempfile.TemporaryDirectory() as folder:
         for name in given.tables:
             TABLES[name](Path(folder), given)

@@ -7,12 +7,11 @@ Prysm is optional (``pip install prysm``). Each row is the greatest difference o
 tests/test_pupil.py.
 """
 
-import argparse
 from importlib.util import find_spec
 from math import pi
-from time import perf_counter
 
 import numpy as np
+from common import arguments, print_head, print_row, timed
 
 from chipglow.camera import PupilPSF
 from chipglow.radiometry import Band
@@ -28,13 +27,6 @@ PUPILS = {
     "obscuration 0.35, defocus 30 um": PupilPSF(LINE, 0.28, 0.35, 30e-6),
     "obscuration 0.35, aberrations": PupilPSF(LINE, 0.28, 0.35, 0.0, ABERRATIONS),
 }
-
-
-def timed(compute):
-    """Return the result and the time in ms."""
-    start = perf_counter()
-    result = compute()
-    return result, 1e3 * (perf_counter() - start)
 
 
 def prysm_kernel(psf, samples):
@@ -66,21 +58,19 @@ def prysm_kernel(psf, samples):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--samples", type=int, default=512, help="of prysm's pupil, across")
-    samples = parser.parse_args().samples
+    samples = arguments(__doc__, samples=512).samples
     peer = find_spec("prysm") is not None
     if not peer:
         print("prysm is not installed")
-    print("| kernel | difference over peak | ms | prysm's ms |\n|---|---|---|---|")
+    print_head("kernel", "difference over peak", "ms", "prysm's ms")
     for name, psf in PUPILS.items():
-        kernel, own = timed(lambda psf=psf: psf.kernel(SPACING))
+        kernel, own, _ = timed(lambda psf=psf: psf.kernel(SPACING))
         middle = slice(kernel.shape[0] // 2 - HALF, kernel.shape[0] // 2 + HALF + 1)
         kernel, cells = kernel[middle, middle], ("", "")
         if peer:
-            found, other = timed(lambda psf=psf: prysm_kernel(psf, samples))
-            cells = f"{np.abs(kernel - found).max() / kernel.max():.1e}", f"{other:.0f}"
-        print(f"| {name} | {cells[0]} | {own:.0f} | {cells[1]} |", flush=True)
+            found, other, _ = timed(lambda psf=psf: prysm_kernel(psf, samples))
+            cells = f"{np.abs(kernel - found).max() / kernel.max():.1e}", f"{1e3 * other:.0f}"
+        print_row(name, cells[0], f"{1e3 * own:.0f}", cells[1])
 
 
 if __name__ == "__main__":

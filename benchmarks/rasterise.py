@@ -1,21 +1,16 @@
-"""Time to sample a mesh: the rasteriser beside VTK's probe and SciPy's interpolator.
+"""Time to sample a mesh: the rasteriser beside VTK's probe.
 
 ``python benchmarks/rasterise.py`` prints a table; ``--file`` adds a whole frame of a million
 elements from a VTK file. ``--coarse`` and ``--fine`` set the columns of elements of the meshes.
 """
 
-import argparse
 import statistics
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyvista
-from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
+from common import arguments, print_head, print_row, timed
 
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.triangles import rasterise
@@ -25,7 +20,7 @@ RASTER = Raster(left=0.0, top=810e-6, spacing=1e-6, rows=810, columns=900)
 REPEATS = 7
 
 
-def mesh_of(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def mesh_of(columns, rows):
     """Triangles of an irregular mesh with a notch, as points and numbers of nodes."""
     random = np.random.default_rng(0)
     side = np.array((900e-6 / columns, 810e-6 / rows))
@@ -40,47 +35,43 @@ def mesh_of(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.in
     return points, triangles[~notch]
 
 
-def linear(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def linear(points):
     return 300.0 + 1.234567e6 * points[..., 0] + 0.7654321e6 * points[..., 1]
 
 
-def timed(action: Callable[[], Any], repeats: int = REPEATS) -> tuple[Any, float, float]:
-    """Result, least and median time in ms; the first run, which may compile, does not count."""
+def times_of(action, repeats=REPEATS):
+    """Least and median time in ms; the first run, which may compile, does not count."""
+    times = [1e3 * timed(action)[1] for _ in range(repeats + 1)][1:]
+    return min(times), statistics.median(times)
+
+
+def row(name, action, repeats=REPEATS):
+    """Print times, and the largest error of the samples."""
     found = action()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        action()
-        times.append(1e3 * (time.perf_counter() - start))
-    return found, min(times), statistics.median(times)
-
-
-def row(name: str, action: Callable[[], NDArray[np.float32]], repeats: int = REPEATS) -> None:
-    found, least, median = timed(action, repeats)
     expected = linear(np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1))
     error = np.nanmax(np.abs(found - expected))
-    void = np.isnan(found).mean()
-    print(f"| {name} | {least:.1f} | {median:.1f} | {error:.1e} | {100 * void:.2f} % |")
+    times = (f"{one:.1f}" for one in times_of(action, repeats))
+    print_row(name, *times, f"{error:.1e}", f"{100 * np.isnan(found).mean():.2f} %")
 
 
-def compare(points: NDArray[np.float64], triangles: NDArray[np.int64], peers: bool) -> None:
+def compare(points, triangles, peer):
+    """Print the table of a mesh."""
     values = linear(points)
     fields = np.stack([values] * 5, axis=1)
     print(f"\n{len(triangles)} triangles on {RASTER.columns} x {RASTER.rows} samples\n")
-    print("| | least / ms | median / ms | largest error / K | void |")
-    print("|---|---|---|---|---|")
+    print_head("", "least / ms", "median / ms", "largest error / K", "void")
     row("rasterise, 1 field", lambda: rasterise(RASTER, points, triangles, values).fields[0])
     row("rasterise, 5 fields", lambda: rasterise(RASTER, points, triangles, fields).fields[0])
-    if not peers:
-        return
-    row("VTK's probe, 1 field", lambda: probe(points, triangles, values), 2)
-    row("SciPy, 1 field", lambda: interpolate(points, values), 1)
+    if peer:
+        row("VTK's probe, 1 field", lambda: probe(points, triangles, values), 2)
 
 
-def probe(
-    points: NDArray[np.float64], triangles: NDArray[np.int64], values: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    mesh = pyvista.PolyData.from_regular_faces(np.pad(points, ((0, 0), (0, 1))), triangles)
+def surface(points, triangles):
+    return pyvista.PolyData.from_regular_faces(np.pad(points, ((0, 0), (0, 1))), triangles)
+
+
+def probe(points, triangles, values):
+    mesh = surface(points, triangles)
     mesh.point_data["t"] = values
     grid = pyvista.ImageData(
         dimensions=(RASTER.columns, RASTER.rows, 1),
@@ -92,16 +83,9 @@ def probe(
     return found.reshape(RASTER.shape)[::-1].astype(np.float32)
 
 
-def interpolate(points: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float32]:
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    found: NDArray[np.float32] = LinearNDInterpolator(points, values)(x, y).astype(np.float32)
-    return found
-
-
-def whole_frame(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> None:
+def whole_frame(points, triangles):
     """A frame from file to samples: triangles with four fields."""
-    mesh = pyvista.PolyData.from_regular_faces(np.pad(points, ((0, 0), (0, 1))), triangles)
-    grid = mesh.cast_to_unstructured_grid()
+    grid = surface(points, triangles).cast_to_unstructured_grid()
     grid.point_data["temperature"] = linear(points)
     grid.point_data["velocity"] = np.ones((len(points), 3))
     grid.cell_data["peeq"] = np.ones(len(triangles))
@@ -110,21 +94,17 @@ def whole_frame(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> No
         grid.save(path)
         source = MeshSource(path)
         size = path.stat().st_size / 1e6
-        _, least, median = timed(lambda: next(source.frames(RASTER)), 3)
+        least, median = times_of(lambda: next(source.frames(RASTER)), 3)
         print(f"\nA frame of {len(triangles)} triangles from a file of {size:.0f} MB:")
         print(f"read and sampled {least:.0f} ms least, {median:.0f} ms median")
 
 
-def main() -> None:
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--file", action="store_true", help="a frame from a file too")
-    arguments.add_argument("--coarse", type=int, default=236, help="columns of the peers' mesh")
-    arguments.add_argument("--fine", type=int, default=745, help="columns of the fine mesh")
-    chosen = arguments.parse_args()
-    fine = mesh_of(chosen.fine, round(chosen.fine * 674 / 745))
-    compare(*mesh_of(chosen.coarse, round(chosen.coarse * 215 / 236)), peers=True)
-    compare(*fine, peers=False)
-    if chosen.file:
+def main():
+    given = arguments(__doc__, file=False, coarse=236, fine=745)
+    fine = mesh_of(given.fine, round(given.fine * 674 / 745))
+    compare(*mesh_of(given.coarse, round(given.coarse * 215 / 236)), peer=True)
+    compare(*fine, peer=False)
+    if given.file:
         whole_frame(*fine)
 
 

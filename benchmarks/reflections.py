@@ -10,13 +10,13 @@ chip 1. Wedge angle, bulge radius, fraction of mirror-like reflection and the em
 and tool are drawn; the tool is as warm as it was cut, or as the chip that it touches. Minutes.
 """
 
-import argparse
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import pi, radians
 from pathlib import Path
 
 import numpy as np
+from common import arguments
 from experiments import aligned
 
 from chipglow.camera import Camera
@@ -168,11 +168,7 @@ def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--draws", type=int, default=40, help="draws of each row, 2 or more")
-    parser.add_argument("--angles", nargs="*", type=float, default=SHAPES, help="in degrees")
-    parser.add_argument("--study", type=Path, help="a study whose cut or scene is looked at")
-    given = parser.parse_args()
+    given = arguments(__doc__, draws=40, angles=list(SHAPES), study=Path)
     study = Study.quick() if given.study is None else load_study(given.study)
     path = cut(study) if study.scene is None else study.scene
     scene, camera = open_scene(path), study.camera.build()

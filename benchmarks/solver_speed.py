@@ -6,11 +6,11 @@ gives the cost). Numbers of threads are timed in turn and have to agree; the bes
 counts.
 """
 
-import argparse
 from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
+from common import arguments, timed
 from numba import njit, prange, set_num_threads
 from solver import DENSITY, FAR, Block
 
@@ -89,16 +89,6 @@ class Stepper:
         return {name: self.points[name] for name in COMPARED}
 
 
-def fastest(call, rounds):
-    """Return the least seconds of some rounds."""
-    best = np.inf
-    for _ in range(rounds):
-        begin = perf_counter()
-        call()
-        best = min(best, perf_counter() - begin)
-    return best
-
-
 @njit(parallel=True, cache=True)
 def copy(source, target):  # type: ignore[no-untyped-def]
     for k in prange(source.size):
@@ -109,13 +99,13 @@ def copy_bandwidth(threads):
     """Return bytes read and written a second by a copy larger than the caches."""
     source, target = np.ones(1 << 25), np.empty(1 << 25)
     set_num_threads(threads)
-    return 2 * source.nbytes / fastest(lambda: copy(source, target), 8)
+    return 2 * source.nbytes / min(timed(lambda: copy(source, target))[1] for _ in range(8))
 
 
 def sort_seconds(start):
     """Return the seconds to sort the points by cell once."""
     target = np.empty_like(start.points)
-    return fastest(lambda: sort_points(start, target), 3)
+    return min(timed(lambda: sort_points(start, target))[1] for _ in range(3))
 
 
 def check(stepper, ours):
@@ -157,13 +147,7 @@ def measure(side, threads, rounds, bandwidth):
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--sides", type=int, nargs="+", default=[100, 200, 400, 800])
-    parser.add_argument("--threads", type=int, nargs="+", default=[1, 2], help="1 first")
-    given = parser.parse_args()
+    given = arguments(__doc__, rounds=10, sides=[100, 200, 400, 800], threads=[1, 2])
     bandwidth = {count: copy_bandwidth(count) for count in given.threads}
     print("copy, read and written: ", end="")
     print(", ".join(f"{value / 1e9:.1f} GB/s on {n}" for n, value in bandwidth.items()), "threads")

@@ -6,21 +6,20 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
-from analytic_chip import AnalyticChip
-from matplotlib.figure import Figure
 
 import chipglow
 from chipglow.analysis import LinePlace, error_images, error_parts
 from chipglow.app.controls import OWN, TABLE
-from chipglow.app.files import figure_file, measurement_file, study_file
-from chipglow.app.opening import open_any, open_uploaded
+from chipglow.app.files import chip_picture, measurement_file, study_file
+from chipglow.app.opening import OpenedScene, open_any, open_uploaded
 from chipglow.app.pictures import MeasurementModel, SceneModel
 from chipglow.app.session import Newest, Session, SupersededError
-from chipglow.app.view import _chip
+from chipglow.app.view import View as PageView, readable
 from chipglow.camera import View, expose
 from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
@@ -85,7 +84,7 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
     file.write_bytes(study_file(model, state))
     study = load_study(file)
     assert Path(study.scene) == example_scene().path
-    camera, exposure, _ = seen_by_the_library(study, state.start)
+    camera, exposure, _ = seen_by_the_library(study, state.study.start)
     expected = error_images(camera, exposure, study.analysis.reference)
     xr.testing.assert_equal(picture.data, expected)
     np.testing.assert_array_equal(
@@ -107,9 +106,9 @@ def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
     state = model.controls.changed(model.controls.initial, texts)
     picture = model.picture(state)
     readout = model.readout(picture)
-    camera, exposure, surface = seen_by_the_library(state.study, state.start)
+    camera, exposure, surface = seen_by_the_library(state.study, state.study.start)
     scene, at = model.opened.scene, (-40e-6, 200e-6)
-    plain = camera.expose(scene, surface.without_texture(), state.start)
+    plain = camera.expose(scene, surface.without_texture(), state.study.start)
     parts = error_parts(camera, exposure, "maximum", plain)
     psf = parts["psf"].where(~parts["flagged"])
     np.testing.assert_array_equal(picture.panels["error"].values, psf)
@@ -118,7 +117,7 @@ def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
     assert readout.measured == nearest(parts["measured"].values, picture.raster, at)
     calibration = camera.calibration(picture.raster.shape)
     assert readout.uncertainty == calibration.netd(readout.measured)
-    frame = scene.frame(int(np.searchsorted(scene.times, state.start + 5e-6 + 1e-12)) - 1)
+    frame = scene.frame(int(np.searchsorted(scene.times, state.study.start + 5e-6 + 1e-12)) - 1)
     # The image of the scene is in °C, in 32 bits.
     assert readout.true == pytest.approx(nearest(frame.temperature, scene.raster, at), abs=1e-3)
     laid = camera.lay(surface, scene).emissivity(frame)
@@ -135,15 +134,82 @@ def test_a_surface_without_texture_has_no_error_by_it(model):
         assert not np.nan_to_num(picture.panels["error"].values).any()
 
 
+def test_an_error_image_that_is_zero_everywhere_says_why(model):
+    """In the order in which the menu once said texture while the picture stayed the PSF's."""
+    state, reasons = model.controls.initial, []
+    for texts in ({"error_image": "psf"}, {"surface": "uniform"}, {"error_image": "texture"},
+                  {"camera.psf": "none"}):  # fmt: skip
+        state = model.controls.changed(state, texts)
+        picture = model.picture(state)
+        reasons.append(sorted(picture.absent))
+    assert picture.panels["error"].name == "Error by texture"
+    assert reasons == [["emissivity"], *2 * [["emissivity", "texture"]],
+                       ["emissivity", "psf", "texture"]]  # fmt: skip
+
+
+def test_a_failure_is_shown_on_the_page(opened):
+    view, sent = PageView(opened), []
+    view.page._send_msg = sent.append
+    view._receive(SimpleNamespace(data={"n": 1, "kind": "change", "content": {}}))
+    assert sent[-1]["content"]["text"] == "Defect: KeyError: 'texts'"
+    assert sent[-1]["content"]["kind"] == "error"
+
+
+def test_the_error_of_the_true_temperature_has_emissivity_as_a_part_of_its_own(model):
+    state = model.controls.changed(
+        model.controls.initial, {"analysis.reference": "true", "error_image": "emissivity"}
+    )
+    picture = model.picture(state)
+    parts = model.readout(picture).parts
+    assert parts["emissivity"] < -100 > parts["case_1"]
+    parts = {name: part for name, part in parts.items() if name != "texture"}
+    assert sum(parts.values()) == pytest.approx(2 * parts["case_1"])
+    assert np.nanmin(picture.panels["error"].values) < -100
+    assert "emissivity" not in picture.absent
+
+
+def test_the_app_opens_where_the_shear_band_is_hottest_with_the_line_on_its_ridge(model):
+    picture = model.picture(model.controls.initial)
+    line = picture.lines["band_line"]
+    for name in ("reference", "measured"):
+        assert abs(line["along"][line[name].argmax()] - 60) < 25
+        assert 300 < line[name].max() < 400  # in the camera's range
+    assert model.controls.initial.study.start == 413e-6
+
+
+def test_the_rake_face_is_marked_where_its_line_enters_the_tool(model):
+    picture = model.picture(model.controls.initial)
+    assert picture.crossings["rake_line"] == pytest.approx(60, abs=0.2)
+    assert picture.crossings["band_line"] is None
+
+
+def test_a_limit_above_all_temperatures_says_so_and_leaves_the_scene_visible(opened, model):
+    state = model.controls.changed(model.controls.initial, {"camera.lower_limit": "5000"})
+    picture = model.picture(state)
+    assert picture.panels["scene"].limits[1] < 1000
+    text, kind = PageView(opened)._described(picture)
+    assert text == "No pixel is within the camera's range, which begins at 5000 °C."
+    assert kind == "error"
+
+
+def test_the_uncertainty_is_shown_or_its_absence_explained(opened, model):
+    view, sent = PageView(opened), []
+    view.page._send_msg = sent.append
+    for texts, said in (({}, "No ± without noise"), ({"camera.detector": "noise"}, " ± 0.0")):
+        picture = model.picture(model.controls.changed(model.controls.initial, texts))
+        view._show_readout(picture, model.readout(picture))
+        assert said in sent[-1]["content"]
+
+
 def test_draws_are_those_of_other_pixels_and_textures(model):
     state = model.controls.initial
     progress = []
     drawn = model.drawn(state, 2, 2, progress.append)
     assert progress == sorted(progress) and progress[-1] == 1.0
     assert drawn.error.values.shape == (2, 4)
-    camera, _, surface = seen_by_the_library(state.study, state.start)
+    camera, _, surface = seen_by_the_library(state.study, state.study.start)
     second = replace(camera, offset=(camera.pitch / 2, 0.0))
-    exposure = camera.expose(model.opened.scene, surface.redrawn(1), state.start)
+    exposure = camera.expose(model.opened.scene, surface.redrawn(1), state.study.start)
     errors = error_images(second, exposure)
     pixels = second.pixels(exposure.raster)
     # The draws blur the samples once for all pixels: other rounding.
@@ -198,18 +264,15 @@ def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
         ({"surface": OWN, f"surface.chips.{OWN}.body.mean": "2"}, "mean: 2, expected 0 to 1"),
         ({"camera.band.0": "6"}, "reversed"),
         ({"camera.psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
-        ({"seed": "1.5"}, "Seed: '1.5', expected a whole number"),
-        ({"seed": "-1"}, "Seed: Camera.seed: -1, expected 0 or more"),
-        (
-            {"camera.integration_time": "90"},
-            "Exposure: exposure: 0.000397 s to 0.000487 s is not",
-        ),
-        ({"camera.pitch": "6 mm"}, "Pixel pitch: camera: pitch of 0.006 m"),
-        ({"camera.lower_limit": "9999"}, "Lower range limit: lower_limit: 9999 degC"),
-        ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 different points"),
+        ({"seed": "1.5"}, "Seed: 1.5, expected a valid integer"),
+        ({"seed": "-1"}, "Seed: -1, expected 0 or more"),
+        ({"camera.integration_time": "90"}, "Exposure: exposure: 413 us to 503 us is not within"),
+        ({"camera.pitch": "6 mm"}, "Pixel pitch: camera: pitch of 6000 um at an offset"),
+        ({"camera.lower_limit": "9999"}, "Lower range limit: 9999 degC"),
+        ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 x,y in µm"),
         ({"rake_line": "1,2;3,461"}, "expected x from -620.0 to 40.0 µm and y from -80.0 to 460.0"),
-        ({"cursor": "here"}, "Cursor: 'here', expected positions"),
-        ({"cursor": "999,0"}, "Cursor: 999,0, expected x from -620.0 to 40.0 µm"),
+        ({"cursor": "here"}, "Cursor: 'here', expected 1 x,y in µm"),
+        ({"cursor": "999,0"}, "Cursor: outside the image, expected x from -620.0 to 40.0 µm"),
         ({"zoom": "2"}, "zoom: unknown control"),
     ],
 )
@@ -217,6 +280,12 @@ def test_a_refused_value_is_one_clear_error(model, texts, said):
     with pytest.raises(ValueError) as error:
         model.controls.changed(model.controls.initial, texts)
     assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def shown(model, state):
+    """Texts of the fields of a page."""
+    values, rows = model.controls.values(state), model.controls.rows
+    return {path: rows[path].shown(text) for path, text in values.items()}
 
 
 def test_a_link_brings_the_state_back(model):
@@ -229,61 +298,40 @@ def test_a_link_brings_the_state_back(model):
     state = model.controls.changed(model.controls.initial, texts)
     restored = model.controls.changed(model.controls.initial, state.texts)
     assert restored == state and restored.study == state.study
-    assert state.texts.keys() == texts.keys() and state.start == 395.5e-6
-    rows = [model.controls.row(path) for path in texts]
-    back = {row.path: row.shown(model.controls.value(row, restored)) for row in rows}
-    assert model.controls.changed(model.controls.initial, back) == state
-    initial = model.controls.initial
-    back = {row.path: row.shown(model.controls.value(row, initial)) for row in rows}
+    assert state.texts.keys() == texts.keys() and state.study.start == 395.5e-6
+    assert model.controls.changed(model.controls.initial, shown(model, state)) == state
+    back = {path: shown(model, model.controls.initial)[path] for path in texts}
     assert model.controls.changed(state, back).texts == {}
+
+
+def test_a_decimal_comma_and_the_units_of_the_page_are_read(model):
+    for text, pitch in (("5,5", 5.5e-6), ("5.5 µm", 5.5e-6), ("0,0055 mm", 5.5e-6)):
+        state = model.controls.changed(model.controls.initial, {"camera.pitch": text})
+        assert state.study.camera.pitch == pitch and state.texts == {"camera.pitch": "5.5 um"}
+    assert readable("413 us to 503 us, 6 um, 300 degC") == "413 µs to 503 µs, 6 µm, 300 °C"
+
+
+def test_a_saved_study_names_a_scene_of_the_user_and_none_of_the_cache(model):
+    scene, initial = model.opened.scene, model.controls.initial
+    of_results = SceneModel(OpenedScene.of(scene, Study.quick(), "results", None))
+    assert "\nscene: none\n" in study_file(of_results, of_results.controls.initial).decode()
+    uploaded = SceneModel(replace(model.opened, file="mine.nc"))
+    assert "\nscene: mine.nc\n" in study_file(uploaded, initial).decode()
+
+
+def test_the_study_has_the_setting_of_each_control(model):
+    """It has it at first, or when a word of another control says so."""
+    assert model.controls.rows.keys() > {row.path for row in TABLE}
 
 
 def test_a_setting_counts_again_when_the_study_has_it_again(model):
     texts = {"camera.psf.numerical_aperture": "0.2", "camera.psf": "gaussian"}
     state = model.controls.changed(model.controls.initial, texts)
     assert state.study.camera.psf.kind == "gaussian"
-    shown = {row.path: model.controls.is_shown(row, state) for row in model.controls.rows}
-    assert shown["camera.psf.fwhm"] and not shown["camera.psf.numerical_aperture"]
+    values = model.controls.values(state)
+    assert "camera.psf.fwhm" in values and "camera.psf.numerical_aperture" not in values
     again = model.controls.changed(state, {"camera.psf": "annular-aperture"})
     assert again.study.camera.psf.numerical_aperture == 0.2
-
-
-def test_the_study_has_the_setting_of_each_control(model):
-    """It has it at first, or when a word of another control says so."""
-    controls = model.controls
-    states = [
-        controls.changed(controls.initial, {row.path: word})
-        for row in controls.rows
-        for word in row.options
-    ]
-    for row in TABLE:
-        assert any(controls.is_shown(controls.row(row.path), state) for state in states)
-
-
-def test_the_saved_figure_shows_what_the_page_shows(model, monkeypatch):
-    """Colours shared by both temperatures, the part that is seen, the range of the draws."""
-    saved = []
-    monkeypatch.setattr(
-        Figure, "savefig", lambda figure, path, **_: saved.append(figure) or path.touch()
-    )
-    initial = model.controls.initial
-    picture = model.picture(initial)
-    drawn = model.drawn(initial, 2, 1, lambda _: None)
-    seen = (-100e-6, 20e-6, 100e-6, 200e-6)
-    figure_file(picture, model, seen, drawn)
-    scene, measured, error, rake, _, caption = saved[0].axes[:6]
-    limits = [one.images[0].get_clim() for one in (scene, measured, error)]
-    assert limits[0] == limits[1]
-    assert limits[0][0] == pytest.approx(300.0)  # the camera's range limit
-    assert limits[0][1] == pytest.approx(np.nanmax(picture.panels["scene"].values))
-    assert limits[2][0] == -limits[2][1]
-    for one in (scene, measured, error):
-        assert (*one.get_xlim(), *one.get_ylim()) == pytest.approx([1e6 * end for end in seen])
-    shaded = rake.collections[0].get_paths()[0].get_extents()
-    low, high = (end(drawn.lines["rake_line"]) for end in (np.nanmin, np.nanmax))
-    assert (shaded.y0, shaded.y1) == pytest.approx((low, high))
-    text = caption.texts[0].get_text()
-    assert "Exposure: 10 µs" in text and "Emissivity: Chip 1" in text
 
 
 def test_what_is_saved_can_be_opened(model, tmp_path):
@@ -293,15 +341,14 @@ def test_what_is_saved_can_be_opened(model, tmp_path):
     assert is_measurement(file)
     again = open_uploaded(file, "mine.nc")
     assert again.name == "mine.nc"
-    shown = MeasurementModel(again)
-    seen = shown.picture(shown.controls.initial)
+    reader = MeasurementModel(again)
+    seen = reader.picture(reader.controls.initial)
     usable = ~picture.data["flagged"].values
     for name in ("flagged", "measured"):
         np.testing.assert_array_equal(
             seen.data[name].values[usable], picture.data[name].values[usable]
         )
-    assert shown.readout(seen).parts is None
-    assert figure_file(picture, model, picture.raster.extent).startswith(b"\x89PNG")
+    assert reader.readout(seen).parts is None
 
 
 def test_what_is_no_scene_is_refused_by_its_own_name(tmp_path):
@@ -320,9 +367,9 @@ def test_a_scene_of_temperature_alone_is_seen_with_one_emissivity(tmp_path):
     hot = np.full((1, 30, 40), 900.0)
     scene = chipglow.Scene.from_fields(raster, [0.0], {"temperature": hot})
     view = chipglow.explore(scene)
-    assert "plastic_strain" not in view.html
+    assert "plastic_strain" not in view.html and "The whole chip" not in view.html
     opened = open_any(None)
-    assert opened.controls.row("scene_image").options.keys() >= {"speed", "plastic_strain"}
+    assert opened.controls.rows["scene_image"].options.keys() >= {"speed", "plastic_strain"}
 
 
 # Sessions
@@ -402,7 +449,7 @@ def test_only_the_newest_job_is_done():
 def test_a_pass_that_nobody_waits_for_ends_early(opened):
     scene, camera = opened.scene, Study().camera.build()
     views = [View(camera.lay(CHIP_1, scene), camera.band)]
-    start = opened.controls.initial.start
+    start = opened.controls.initial.study.start
     calls = []
 
     def check():
@@ -421,7 +468,7 @@ def test_a_pass_that_nobody_waits_for_ends_early(opened):
 
 
 def test_parts_sum_to_the_error_and_vanish_with_their_effects(opened):
-    scene, start = opened.scene, opened.controls.initial.start
+    scene, start = opened.scene, opened.controls.initial.study.start
     camera = Study(camera={"psf": "none", "lower_limit": "none"}).camera.build()
     exposure = camera.expose(scene, CHIP_1, start)
     for reference in ("maximum", "mean", "centre", "true"):
@@ -514,7 +561,7 @@ def test_a_notebooks_page_changes_while_no_message_of_it_is_taken(monkeypatch):
     assert changed.is_set()
 
 
-def test_the_page_has_the_whole_chip_if_the_scene_knows_it(model):
-    scene = model.opened.scene
-    assert _chip(scene).startswith("data:image/png;base64,iVBOR")
-    assert _chip(AnalyticChip(frames=3).scene()) == ""
+def test_the_page_draws_the_whole_chip_when_it_is_unfolded_if_the_scene_knows_it(opened):
+    assert chip_picture(opened.scene, "#e8eaed").startswith("data:image/png;base64,iVBOR")
+    page = PageView(opened).page
+    assert "The whole chip" in page.html and "base64" not in page.html

@@ -8,12 +8,14 @@ import re
 import shutil
 import subprocess
 import sys
+from io import BytesIO
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from chipglow.app.opening import open_any
 from chipglow.app.pictures import SceneModel
@@ -64,8 +66,9 @@ def opening(server, chromium):
     """Open pages, each a user of their own; `wrong` is what went wrong in them."""
     contexts, wrong = [], []
 
-    def opened(query="", status=EXACT):
-        context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    def opened(query="", status=EXACT, width=1280, theme="light"):
+        size = {"width": width, "height": 800}
+        context = chromium.new_context(viewport=size, color_scheme=theme)
         context.set_default_timeout(PATIENCE)
         contexts.append(context)
         page = context.new_page()
@@ -194,17 +197,49 @@ def test_what_is_being_typed_stays_while_the_page_changes(page, model):
     number(page, "measured").get_by_text(expected(model, {"camera.pitch": "5"})).wait_for()
     aperture = control(page, "camera.psf.numerical_aperture")
     aperture.fill("0.2")
-    page.locator(".app").dispatch_event("keydown", {"key": "z", "ctrlKey": True})
-    playwright.expect(control(page, "camera.pitch")).to_have_value("6", timeout=PATIENCE)
+    for key, shift, pitch in (("z", False, "6"), ("Z", True, "5"), ("z", False, "6"),
+                              ("y", False, "5"), ("z", False, "6")):  # fmt: skip
+        event = {"key": key, "ctrlKey": True, "shiftKey": shift, "bubbles": True}
+        page.locator("body").dispatch_event("keydown", event)
+        playwright.expect(control(page, "camera.pitch")).to_have_value(pitch, timeout=PATIENCE)
     assert aperture.input_value() == "0.2"
     aperture.press("Enter")
     texts = {"camera.psf.numerical_aperture": "0.2"}
     number(page, "measured").get_by_text(expected(model, texts)).wait_for()
 
 
+def test_what_cannot_be_shown_is_disabled_with_its_reason(page):
+    texture = control(page, "error_image").locator("option[value=texture]")
+    assert texture.is_enabled()
+    control(page, "error_image").select_option("psf")
+    control(page, "surface").select_option("uniform")
+    playwright.expect(texture).to_be_disabled(timeout=PATIENCE)
+    assert texture.get_attribute("label") == "Error by texture: 0, the emissivity has none"
+    control(page, "camera.psf").select_option("none")
+    page.locator("#status", has_text="Error by PSF is 0 everywhere: no PSF.").wait_for()
+
+
+def test_emissivity_is_a_part_of_the_error_of_the_true_temperature(page):
+    parts = page.get_by_role("table", name="Parts of the error")
+    assert parts.get_by_role("row", name="Emissivity").count() == 0
+    control(page, "analysis.reference").select_option("true")
+    parts.get_by_role("row", name="Emissivity").wait_for()
+
+
+def test_a_narrow_dark_page_fits_its_width_and_has_no_white_frame(visit):
+    page = visit(width=400, theme="dark")
+    assert page.evaluate("document.documentElement.scrollWidth") == 400
+    tops = [page.locator(one).first.bounding_box()["y"] for one in (".images", "aside", ".below")]
+    assert tops == sorted(tops)
+    page.locator(".chip summary").click()
+    page.locator(".chip img[src]").wait_for()
+    left = Image.open(BytesIO(page.locator(".chip img").screenshot())).crop((0, 0, 20, 60))
+    assert np.median(np.asarray(left.convert("L"))) < 60
+
+
 def test_of_a_link_that_is_wrong_in_part_the_rest_counts(visit, model):
     page = visit("&camera.psf.numerical_aperture=0.2&camera.pitch=-5+um", "Link: Pixel pitch")
-    page.locator("#status.error", has_text="Link: Pixel pitch: -5 um is not over 0").wait_for()
+    page.locator("#status.error", has_text="Link: Pixel pitch: -5 µm is not over 0").wait_for()
     assert control(page, "camera.psf.numerical_aperture").input_value() == "0.2"
     assert control(page, "camera.pitch").input_value() == "6"
     texts = {"camera.psf.numerical_aperture": "0.2"}
@@ -214,6 +249,8 @@ def test_of_a_link_that_is_wrong_in_part_the_rest_counts(visit, model):
 
 def test_a_line_and_the_cursor_are_dragged(page, model):
     (x, y), _ = model.controls.initial.line("band_line").corners
+    session = page.context.new_cdp_session(page)
+    session.send("Emulation.setCPUThrottlingRate", {"rate": 6})
     start = place(page, "measured_figure", 1e6 * x, 1e6 * y)
     end = place(page, "measured_figure", -400, 150)
     page.mouse.move(*start)
@@ -221,6 +258,7 @@ def test_a_line_and_the_cursor_are_dragged(page, model):
     page.mouse.move((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
     page.mouse.move(*end)
     page.mouse.up()
+    session.send("Emulation.setCPUThrottlingRate", {"rate": 1})
     ends = page.locator("#place-band_line")
     page.wait_for_function("one => one.value.startsWith('-4') || one.value.startsWith('-39')",
                            arg=ends.element_handle())  # fmt: skip
@@ -268,6 +306,9 @@ def test_downloads_hold_what_is_shown(visit, tmp_path, model):
     with page.expect_download() as started:
         page.get_by_role("button", name="Figure").click()
     assert started.value.suggested_filename == "chipglow.png"
+    sheet = tmp_path / "chipglow.png"
+    started.value.save_as(sheet)
+    assert Image.open(sheet).convert("L").getextrema()[0] < 50 < sheet.stat().st_size / 1000
     # What was saved is opened again, and it has no knobs of a camera.
     page.locator("input[type=file]").set_input_files(saved)
     page.wait_for_url("**open=*")

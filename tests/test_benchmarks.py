@@ -7,7 +7,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 
@@ -20,16 +19,6 @@ from chipglow.io import write_scene
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 COARSEST = "40"  # um: eight cells in the depth of the computed region
 STUDIES = {
-    "band_width.py": (
-        "short.yaml",
-        """
-cutting:
-  cutting_length: 0.5 mm
-  window: {start: 0.45 mm, end: 0.5 mm, interval: 0.5 us, later_bands: 0}
-  field_of_view: {spacing: 1.5 um, rows: 520, columns: 460}
-analysis: {exposures: 2, phases: 1, textures: 1, psf_widths: [12 um]}
-""",
-    ),
     "reflections.py": ("chip.yaml", "scene: chip.nc"),
 }
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
@@ -40,7 +29,6 @@ PROGRAMS = {
         "--turns 1 --controls Seed",
         {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 3},
     ),
-    "band_width.py": (f"--study short.yaml {COARSEST}", {f"| {COARSEST} |": 7}),
     "calibration.py": (
         "--repeats 2",
         {"| none |": 5, "| none, sakuma": 5, "| 15 counts": 6, "| 3 points": 6},
@@ -49,12 +37,11 @@ PROGRAMS = {
         "--rounds 1 --instants 1 --sub-frames 4",
         {
             **dict.fromkeys(("given: ", "in memory: ", "stored: "), 3),
-            **dict.fromkeys(("study: ", "new image: ", "image: chipglow", "counts: chipglow"), 2),
-            "image: SciPy": 4,
+            **dict.fromkeys(("study: ", "new image: ", "image: ", "counts: "), 2),
         },
     ),
     "convergence.py": (f"{COARSEST} --length 1", {f"| {COARSEST} |": 10}),
-    "dot_target.py": ("300 1", {" 300 ": 6}),
+    "dot_target.py": ("--count 1", {" 300 ": 6}),
     "experiments.py": (
         f"--cell {COARSEST} --length 0.6 paper",
         {"paper  cutting force": 1, "paper  thickness": 1, "paper  contact": 1, "paper  250": 7},
@@ -76,15 +63,15 @@ PROGRAMS = {
     "optics.py": ("--samples 128", {"| clear |": 1, "| obscuration 0.35, aberrations": 2}),
     "rasterise.py": (
         "--file --coarse 40 --fine 60",
-        {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 2},
+        {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "read ": 2},
     ),
     "reflections.py": (
         "--draws 2 --angles 45 --study chip.yaml",
         {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
     ),
     "registration_libraries.py": (
-        "--pairs 1 --only 'scikit-image, correlation'",
-        {"| scikit-image, correlation |": 5},
+        "--pairs 1 --only scikit-image",
+        {"| scikit-image |": 5},
     ),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
     "titanium.py": (
@@ -92,7 +79,6 @@ PROGRAMS = {
         {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},
     ),
     "verification.py": ("momentum", {"| A free, spinning block": 4}),
-    "warm_tool.py": (f"--cell {COARSEST} --length 0.4 cold", {"cold": 5}),
 }
 NEEDED = {
     "app_latency.py": ("panel", "playwright"),
@@ -100,10 +86,6 @@ NEEDED = {
     "movies.py": ("av",),
     "rasterise.py": ("pyvista",),
     "registration_libraries.py": ("skimage",),
-}
-# What begins the row of a program that may be there: its package, its name.
-PEERS = {
-    "camera_pass.py": ("image: ", {"galsim": "GalSim", "pyxel": "Pyxel"}),
 }
 # Programs that fork, spawn processes or drive a browser run in a process of their own.
 OWN_PROCESS = ("app_latency.py", "fuzz/fuzz.py")
@@ -170,7 +152,3 @@ def test_a_program_prints_its_table(program, run):
         for row in rows:
             assert len(numbers(row)) >= count, row
             assert all(map(isfinite, numbers(row))), row
-    label, peers = PEERS.get(program, ("", {}))
-    for package, peer in peers.items():
-        there = re.search(rf"^{label}{peer} +\d", printed, re.MULTILINE)
-        assert there if find_spec(package) else f"{peer} is not installed" in printed

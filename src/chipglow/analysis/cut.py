@@ -139,8 +139,8 @@ def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float
     last = times[-1] + spacing - duration
     if last < times[0] - 1e-6 * duration:
         raise ValueError(
-            f"scene: it lasts {times[-1] + spacing - times[0]:.4g} s, "
-            f"expected an exposure's {duration:.4g} s or more"
+            f"scene: it lasts {1e6 * (times[-1] + spacing - times[0]):.4g} us, "
+            f"expected an exposure's {1e6 * duration:.4g} us or more"
         )
     wanted = np.linspace(times[0], max(last, times[0]), count) if count > 1 else times[:1]
     nearest_frame = np.searchsorted(times, wanted + 1e-6 * spacing, side="right") - 1

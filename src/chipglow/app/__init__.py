@@ -36,17 +36,15 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
     _check_installed()
     import panel as pn
 
-    from chipglow.app.opening import OpenedScene, open_any
+    from chipglow.app.opening import open_any, open_scene_object
     from chipglow.app.view import View
     from chipglow.scene import Scene
-    from chipglow.study import Study
 
     pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
     if isinstance(scene, Scene):
-        opened: Any = OpenedScene.of(scene, study or Study(), "scene")
+        view = View(open_scene_object(scene, study, "scene"), embedded=True)
     else:
-        opened = open_any(scene, study)
-    view = View(opened, embedded=True)
+        view = View(open_any(scene, study), embedded=True)
     view.start(None)
     return view.page
 

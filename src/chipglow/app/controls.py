@@ -1,18 +1,17 @@
-"""The controls of the app: rows that name a setting of the study, and the study at their values."""
+"""The controls of the app: a table of paths into the study, and the study at their values."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from types import NoneType
-from typing import Any, Final, TypeAlias, get_args
+from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis import LinePlace
 from chipglow.camera.exposure import frame_weights
-from chipglow.quantities import changed, setting_at, unchecked, value_at
+from chipglow.quantities import Parameter, changed, setting_at, unchecked, value_at
 from chipglow.quantities.units import INSTANT, Quantity, is_bare_number
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
@@ -41,10 +40,18 @@ SCENE_IMAGES: Final[Mapping[str, tuple[str, str]]] = {
 
 ERROR_IMAGES: Final[Mapping[str, str]] = {
     "total": "Error",
+    "emissivity": "Error by emissivity",
     "motion": "Error by motion",
     "footprint": "Error by footprint",
     "psf": "Error by PSF",
     "texture": "Error by texture",
+}
+
+_REFERENCES: Final = {
+    "maximum": "Radiance, maximum",
+    "mean": "Radiance, mean",
+    "centre": "Radiance, centre",
+    "true": "True temperature",
 }
 
 OWN: Final = "own numbers"
@@ -57,9 +64,6 @@ _NOISE: Final = {
 }
 """A detector with this noise and steps too fine to matter."""
 
-_VIEW: Final = ("start", "scene_image", "error_image")
-"""Controls of the page itself, which are no settings of a study."""
-
 _FIELDS: Final = {
     "radiance_temperature": "temperature", "emissivity": "temperature", "speed": "velocity_x"
 }  # fmt: skip
@@ -67,6 +71,18 @@ _FIELDS: Final = {
 
 _SLACK: Final = 1e-7
 """How far outside the image a position may be in m: links round to this."""
+
+
+@dataclass(frozen=True)
+class ShownStudy(Study):
+    """A study of an open scene, and what the page shows of it."""
+
+    start: Annotated[float, Parameter("When the exposure begins.", INSTANT)] = 0.0
+    scene_image: Annotated[str, Parameter("Image of the scene.")] = "temperature"
+    error_image: Annotated[str, Parameter("Image of the error.")] = "total"
+
+    def _check_camera(self) -> None:
+        """Its cut need not suit the camera: the scene is there."""
 
 
 @dataclass(frozen=True)
@@ -79,23 +95,26 @@ class Option:
 
 @dataclass(frozen=True)
 class Control:
-    """A row of the table. Ends and step of the slider are in the unit of the setting."""
+    """A row of the table. Ends, step and stops of the slider are in the unit of the setting."""
 
     path: str
     label: str
-    group: str
+    group: str = ""
     low: float = 0.0
     high: float = 1.0
     step: float = 0.01
     options: Mapping[str, Option] = field(default_factory=dict)
     stops: tuple[float, ...] = ()
+    points: int = 0
     quantity: Quantity | None = None
-    optional: bool = False
-    whole: bool = False
 
     @property
     def setting(self) -> str:
-        return self.path
+        """Path in the study."""
+        if not self.points:
+            return self.path
+        name = LINES.get(self.path)
+        return f"analysis.lines.{name}" if name else f"analysis.points.{self.path}"
 
     @property
     def unit(self) -> str:
@@ -104,81 +123,53 @@ class Control:
         return {"um": "µm", "us": "µs", "degC": "°C"}.get(unit, unit)
 
     def text(self, value: Any) -> str:
-        """Return a value as links write it."""
+        """Return a value of the study as links write it."""
+        if self.points:
+            pairs = value if self.path in LINES else (value,)
+            return ";".join(f"{1e6 * x:.1f},{1e6 * y:.1f}" for x, y in pairs)
         if value is None:
             return "none"
-        if self.quantity is not None:
+        if self.quantity is not None and not isinstance(value, str):
             return _quantity_text(self.quantity, value)
-        return str(value) if self.options or self.whole else f"{value:.10g}"
+        return value if isinstance(value, str) else f"{value:.10g}"
 
-    def shown(self, value: Any) -> str:
-        """Return a value as its field shows it: without its unit, empty for none."""
-        if self.options or value is None:
-            return value or ""
-        return self.text(value).split(" ")[0]
-
-    def value(self, text: str) -> Any:
-        """Return the value in SI of a text, with or without its unit."""
-        text = text.strip()
-        if self.optional and text in ("", "none"):
-            return None
+    def shown(self, text: str) -> str:
+        """Return a text as its field shows it: without its unit, empty for none."""
+        if self.points:
+            return text.replace(",", ", ").replace(";", "; ")
         if self.options:
-            if text not in self.options:
-                raise ValueError(f"{text!r}, expected {', '.join(self.options)}")
             return text
-        text = text.replace(",", ".")
+        return "" if text == "none" else text.split(" ")[0]
+
+    def parse(self, text: str) -> object:
+        """Return what the study takes for a text, with or without its unit."""
+        text = text.strip()
+        if self.points:
+            return self._positions(text)
+        text = text.replace(",", ".").replace("−", "-") or "none"
+        if not is_bare_number(text):
+            return text
         if self.quantity is not None:
-            unit = f" {self.quantity.unit}" if is_bare_number(text) else ""
-            return self.quantity.parse(text + unit)
+            return f"{text} {self.quantity.unit}"
+        return int(text) if text.isdecimal() else float(text)
+
+    def _positions(self, text: str) -> object:
         try:
-            return int(text) if self.whole else float(text)
+            pairs = [[float(number) for number in pair.split(",")] for pair in text.split(";")]
+            x, y = zip(*pairs, strict=True)
         except ValueError:
-            kind = "a whole number" if self.whole else "a number"
-            raise ValueError(f"{text!r}, expected {kind}") from None
-
-
-@dataclass(frozen=True)
-class PlaceControl(Control):
-    """The cursor or the ends of a line, in µm."""
-
-    extent: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-
-    @property
-    def setting(self) -> str:
-        is_line = self.path in LINES
-        return f"analysis.lines.{LINES[self.path]}" if is_line else f"analysis.points.{CURSOR}"
-
-    def text(self, value: Any) -> str:
-        points = value if self.path in LINES else (value,)
-        return ";".join(f"{1e6 * x:.1f},{1e6 * y:.1f}" for x, y in points)
-
-    def shown(self, value: Any) -> str:
-        return self.text(value).replace(",", ", ").replace(";", "; ")
-
-    def value(self, text: str) -> Any:
-        """Return positions in m, which are within the image."""
-        try:
-            pairs = (one.split(",") for one in text.split(";"))
-            points = tuple((float(f"{x.strip()}e-6"), float(f"{y.strip()}e-6")) for x, y in pairs)
-        except ValueError:
-            raise ValueError(f"{text!r}, expected positions such as -35,120 in µm") from None
-        count = 2 if self.path in LINES else 1
-        if not len(set(points)) == len(points) == count:
-            raise ValueError(f"{text!r}, expected {count} different points")
-        left, right, bottom, top = self.extent
-        for x, y in points:
-            if max(left - x, x - right, bottom - y, y - top) > _SLACK:
-                raise ValueError(
-                    f"{text}, expected x from {1e6 * left:.1f} to {1e6 * right:.1f} µm and y from "
-                    f"{1e6 * bottom:.1f} to {1e6 * top:.1f} µm"
-                )
-        return points if self.path in LINES else points[0]
+            x = y = ()
+        if len(x) != self.points:
+            raise ValueError(f"{text!r}, expected {self.points} x,y in µm such as -35,120")
+        places = tuple((f"{x[i]:.1f} um", f"{y[i]:.1f} um") for i in range(len(x)))
+        return places if self.path in LINES else places[0]
 
 
 TABLE: Final = (
-    Control("start", "Exposure begins", "Scene", quantity=INSTANT),
+    Control("start", "Exposure begins", "Scene"),
     Control("scene_image", "Scene image", "Scene"),
     Control("error_image", "Error image", "Scene"),
+    Control("analysis.reference", "Error against", "Scene"),
     Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
     Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
     Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
@@ -207,18 +198,21 @@ TABLE: Final = (
     Control("seed", "Seed", "Surface", 0, 4000, 1),
     Control("camera.reflected", "Reflected temperature", "Surface", 0.0, 300.0, 5.0),
 )  # fmt: skip
-"""All controls in the order of the page. A control is shown while the study has its setting."""
+"""The controls of a column in their order. One is shown while the study has its setting."""
+
+PLACES: Final = (
+    Control(CURSOR, "Cursor", points=1),
+    *(Control(name, f"Line {title}", points=2) for name, title in LINES.items()),
+)
+"""The controls of positions on the images."""
 
 
 @dataclass(frozen=True)
 class State:
-    """The study and the view at some values of the controls; all that a picture depends on."""
+    """The study at some values of the controls; all that a picture depends on."""
 
     texts: Texts
-    study: Study = field(compare=False)
-    start: float
-    scene_image: str
-    error_image: str
+    study: ShownStudy = field(compare=False)
 
     @property
     def cursor(self) -> tuple[float, float]:
@@ -237,17 +231,17 @@ class State:
 class Controls:
     """The controls of a study on a scene or of a measurement, and the states at their values."""
 
-    study: Study
-    start: float
-    rows: tuple[Control, ...]
+    study: ShownStudy
+    rows: Mapping[str, Control]
+    raster: Raster
     scene: Scene | None = None
 
     @classmethod
-    def of_scene(cls, study: Study, scene: Scene, start: float, duration: float) -> "Controls":
+    def of_scene(cls, study: ShownStudy, scene: Scene, duration: float) -> "Controls":
         """Return the controls of a scene; one exposure lasts `duration`."""
         options = _options(study, scene)
         words = (word for row in options.values() for word in row.values())
-        studies = [_with(study, word.changes) for word in words]
+        studies = [study, *(changed(study, word.changes) for word in words)]
         side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
         longest = 5e6 * study.camera.integration_time
         ranges: dict[str, dict[str, Any]] = {
@@ -257,104 +251,99 @@ class Controls:
                 "low": longest / 50, "high": longest, "step": longest / 100
             },
         }  # fmt: skip
-        rows: list[Control] = []
+        rows = {}
         for row in TABLE:
-            made = replace(row, options=options.get(row.path, {}), **ranges.get(row.path, {}))
-            if not made.options and row.path not in _VIEW:
-                having = next((one for one in studies if _has(one, row.path)), None)
-                if having is None:
-                    continue
-                setting = setting_at(having, row.path)
-                made = replace(
-                    made,
-                    quantity=setting.parameter.quantity,
-                    optional=NoneType in get_args(setting.kind),
-                    whole=setting.kind is int,
-                )
-            rows.append(made)
-        return cls(study, start, (*rows, *_places(scene.raster)), scene)
+            declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
+            if declared:
+                quantity = declared[0].parameter.quantity
+                own, of_row = ranges.get(row.path, {}), options.get(row.path, {})
+                rows[row.path] = replace(row, quantity=quantity, options=of_row, **own)
+        return cls(study, rows | {row.path: row for row in PLACES}, scene.raster, scene)
 
     @classmethod
     def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
         """Return the controls of a measurement: which of its frames is shown, and the places."""
-        row = replace(TABLE[0], label="Frame began", stops=tuple(map(rounded, times)))
-        return cls(study, row.stops[0], (row, *_places(raster)))
+        stops = tuple(rounded(1e6 * one) for one in times)
+        row = replace(TABLE[0], label="Frame began", stops=stops, quantity=INSTANT)
+        rows = {row.path: row for row in (row, *PLACES)}
+        return cls(shown_study(study, rounded(times[0])), rows, raster)
 
     @cached_property
     def initial(self) -> State:
         return self.state({})
 
-    @cached_property
-    def _by_path(self) -> dict[str, Control]:
-        return {row.path: row for row in self.rows}
-
-    def row(self, path: str) -> Control:
-        return self._by_path[path]
-
-    def is_shown(self, row: Control, state: State) -> bool:
-        return row.path in _VIEW or _has(state.study, row.setting)
-
-    def value(self, row: Control, state: State) -> Any:
-        """Return the value of a control: a word, a number in SI or positions; None if hidden."""
-        if row.options:
-            return _word(row, state.texts)
-        if row.path == "camera.lower_limit":
-            return state.study.camera.build().lower_limit
-        if row.path == "start":
-            return state.start
-        return value_at(state.study, row.setting) if self.is_shown(row, state) else None
+    def values(self, state: State) -> dict[str, str]:
+        """Return the texts of all controls that the study of a state has."""
+        return {
+            path: _word(row, state.texts) if row.options else
+            row.text(value_at(state.study, row.setting))
+            for path, row in self.rows.items()
+            if row.options or _has(state.study, row.setting)
+        }  # fmt: skip
 
     def changed(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values; a ValueError names the control."""
-        if unknown := [path for path in texts if path not in self._by_path]:
-            known = ", ".join(self._by_path)
+        if unknown := [path for path in texts if path not in self.rows]:
+            known = ", ".join(self.rows)
             raise ValueError(f"{unknown[0]}: unknown control, expected one of {known}")
-        new = dict(state.texts)
         try:
-            for path, text in texts.items():
-                row = self._by_path[path]
-                new[path] = row.text(row.value(text))
-                if new[path] == row.text(self.value(row, self.initial)):
-                    del new[path]
-            made = self.state(new)
-            if self.scene is not None:
-                _check_exposure(made, self.scene)
+            made = self.state({**state.texts, **texts})
+            self._check(made)
         except ValueError as error:
-            labels = ", ".join(self._by_path[path].label for path in texts)
-            raise ValueError(f"{labels}: {error}") from None
-        return made
+            message = str(error)
+            for path in texts:
+                message = message.removeprefix(f"{self.rows[path].setting}: ")
+            labels = ", ".join(self.rows[path].label for path in texts)
+            raise ValueError(f"{labels}: {message}") from None
+        initial = self.values(self.initial)
+        written = {**made.texts, **self.values(made)}
+        return State(
+            {path: written[path] for path in made.texts if written[path] != initial.get(path)},
+            made.study,
+        )
 
     def state(self, texts: Texts) -> State:
         """Return the state at given values; the initial ones where none is given."""
-        study = self.study
-        words = {row.path: _word(row, texts) for row in self.rows if row.options}
-        for path, word in words.items():
-            study = _with(study, self.row(path).options[word].changes)
+        study, words = self.study, dict[str, object]()
+        for row in self.rows.values():
+            if row.options:
+                word = _word(row, texts)
+                if word not in row.options:
+                    raise ValueError(f"{word!r}, expected {', '.join(row.options)}")
+                words |= row.options[word].changes
+        study = changed(study, words)
         numbers = {
-            row.setting: row.value(texts[row.path])
-            for row in self.rows
-            if row.path in texts and row.path not in _VIEW and not row.options
-            and _has(study, row.setting)
-        }  # fmt: skip
-        return State(
-            texts,
-            _with(study, numbers),
-            self.row("start").value(texts["start"]) if "start" in texts else self.start,
-            words.get("scene_image", ""),
-            words.get("error_image", ""),
-        )
+            row.setting: row.parse(texts[path])
+            for path, row in self.rows.items()
+            if path in texts and not row.options and _has(study, row.setting)
+        }
+        return State(texts, changed(study, numbers))
+
+    def _check(self, state: State) -> None:
+        """Raise a ValueError unless the camera can see the scene, and places are in the image."""
+        left, right, bottom, top = self.raster.extent
+        lines = (state.line(name).corners for name in LINES)
+        x, y = np.array([state.cursor, *(corner for line in lines for corner in line)]).T
+        if max(left - x.min(), x.max() - right, bottom - y.min(), y.max() - top) > _SLACK:
+            raise ValueError(
+                f"outside the image, expected x from {1e6 * left:.1f} to {1e6 * right:.1f} µm "
+                f"and y from {1e6 * bottom:.1f} to {1e6 * top:.1f} µm"
+            )
+        if self.scene is not None:
+            camera = state.study.camera.on(self.raster, state.study.seed)
+            duration = camera.frame_duration(self.raster)
+            frame_weights(self.scene.times, self.scene.frame_spacing, state.study.start, duration)
+
+
+def shown_study(study: Study, start: float) -> ShownStudy:
+    """Return a study with the exposure that is shown."""
+    given = {name: getattr(study, name) for name in study.given}
+    return ShownStudy(**given, start=start)
 
 
 def _word(row: Control, texts: Texts) -> str:
     """Return the word of a control with options, of which the first is the initial one."""
     return texts.get(row.path, next(iter(row.options)))
-
-
-def _check_exposure(state: State, scene: Scene) -> None:
-    camera = state.study.camera.on(scene.raster, state.study.seed)
-    camera.pixels(scene.raster)
-    duration = camera.frame_duration(scene.raster)
-    frame_weights(scene.times, scene.frame_spacing, state.start, duration)
 
 
 @lru_cache(1000)
@@ -363,30 +352,11 @@ def _quantity_text(quantity: Quantity, value: float) -> str:
     return quantity.text(value)
 
 
-def _places(raster: Raster) -> Iterator[PlaceControl]:
-    labels = {CURSOR: "Cursor", **{name: f"Line {title}" for name, title in LINES.items()}}
-    for path, label in labels.items():
-        yield PlaceControl(path, label, "", extent=raster.extent)
-
-
 def _has(study: Study, path: str) -> bool:
     with suppress(LookupError):
         value_at(study, path)
         return True
     return False
-
-
-def _with(study: Study, changes: Mapping[str, object]) -> Study:
-    """Return a study with other settings; its cut need not suit them, as the scene is there."""
-    update: dict[str, Any] = {path: value for path, value in changes.items() if "." not in path}
-    for name in dict.fromkeys(path.partition(".")[0] for path in changes if "." in path):
-        inner = {
-            path.removeprefix(f"{name}."): value
-            for path, value in changes.items()
-            if path.startswith(f"{name}.")
-        }
-        update[name] = changed(update.get(name, getattr(study, name)), inner)
-    return unchecked(study, **update)
 
 
 def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
@@ -398,25 +368,33 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
             "Annular aperture", {"camera.psf": {"kind": "annular-aperture"}}
         ),
         "gaussian": Option("Gaussian", {"camera.psf": {"kind": "gaussian", "fwhm": "8 um"}}),
-        "none": Option("None (ideal)", {"camera.psf": "none", "camera.blur": []}),
-    }
-    orders = {
-        "detector": Option("Blur on the pixels", {"camera.psf_order": "detector"}),
-        "optics": Option("Blur on the scene", {"camera.psf_order": "optics"}),
+        "none": Option("None (ideal)", {"camera.psf": "none", "camera.blur": ()}),
     }
     detectors = {
         "none": Option("None", {"camera.detector": "none", **limit}),
         "noise": Option("Noise", {"camera.detector": _NOISE, **limit}),
     }
+    scene_images = {
+        name: label
+        for name, (label, _) in SCENE_IMAGES.items()
+        if _FIELDS.get(name, name) in scene.fields
+    }
+    orders = {"detector": "Blur on the pixels", "optics": "Blur on the scene"}
+    words = {
+        "scene_image": scene_images,
+        "error_image": ERROR_IMAGES,
+        "analysis.reference": _REFERENCES,
+        "camera.psf_order": orders,
+    }
     return {
-        "scene_image": {
-            name: Option(label)
-            for name, (label, _) in SCENE_IMAGES.items()
-            if _FIELDS.get(name, name) in scene.fields
+        **{
+            path: _first(
+                value_at(study, path),
+                {word: Option(label, {path: word}) for word, label in labels.items()},
+            )
+            for path, labels in words.items()
         },
-        "error_image": {name: Option(label) for name, label in ERROR_IMAGES.items()},
         "camera.psf": _first("none" if psf is None else psf.kind, psfs),
-        "camera.psf_order": _first(camera.psf_order, orders),
         "camera.detector": _first(AS_STUDY if camera.detector else "none", detectors),
         "surface": _surfaces(study),
     }
@@ -447,22 +425,21 @@ def _surfaces(study: Study) -> dict[str, Option]:
     }
     surfaces[OWN] = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
     return {
-        name: Option(name.capitalize(), {"surface": surface, "analysis": _reading(study, name)})
+        name: Option(
+            name.capitalize(),
+            {"surface": surface, "analysis.rake_chip": name, "analysis.band_chip": name},
+        )
         for name, surface in surfaces.items()
     } | uniform
 
 
-def _reading(study: Study, chip: str) -> object:
-    return changed(study.analysis, {"rake_chip": chip, "band_chip": chip})
-
-
 def _starts(scene: Scene, duration: float) -> Iterator[float]:
-    """Yield the frames at which an exposure can begin that ends within its part of the scene."""
+    """Yield the times in µs at which an exposure can begin that ends within its part."""
     times, spacing = scene.times, scene.frame_spacing
     for block in scene.blocks:
         end = times[block[-1]] + spacing * (1 + 1e-6)
         yield from (
-            rounded(times[i]) for i in block if len(times) == 1 or times[i] + duration <= end
+            rounded(1e6 * times[i]) for i in block if len(times) == 1 or times[i] + duration <= end
         )
 
 

@@ -8,9 +8,8 @@ from bokeh.models import (
     ColorBar,
     ColumnDataSource,
     CrosshairTool,
-    CustomJSHover,
-    CustomJSTickFormatter,
     HoverTool,
+    Label,
     LinearColorMapper,
     Range1d,
     Span,
@@ -34,7 +33,9 @@ TITLES: Final = {
     "error": "Error / K",
 }
 
-_TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}
+TEXT: Final = {"light": "#16191d", "dark": "#e8eaed"}
+"""Colours of text by theme."""
+
 _VOID, _GRID = (128, 128, 128, 0.2), (128, 128, 128, 0.35)
 """Colours on light and dark ground, which shows through."""
 
@@ -45,23 +46,6 @@ _REFERENCE: Final = "#7d858f"
 _BORDER: Final = 46
 _SIDE: Final = 180
 """Initial size of a frame in pixels; page.js fits the figures to the page."""
-
-_WITH_UNIT: Final = """
-// The middle tick of a bar has the unit, which is in the title of the image.
-const unit = (title.text.split(" / ")[1] ?? "").replace(/[()]/g, "");
-const large = Math.max(...ticks) >= 1e5;
-const text = large ? tick.toExponential().replace("e+", "e") : String(Number(tick.toPrecision(6)));
-const middle = index === Math.floor(ticks.length / 2);
-return text.replace("-", "−") + (middle && unit ? " " + unit : "");
-"""
-
-_VALUE: Final = """
-// The value under the pointer with the unit in the title of the image.
-const shown = source.data.image[0][special_vars.image_index?.flat_index];
-if (!Number.isFinite(shown)) return missing;
-const unit = (title.text.split(" / ")[1] ?? "").replace(/[()]/g, "");
-return `${Number(shown.toPrecision(4))} ${unit}`.replace("-", "−");
-"""
 
 
 class Image:
@@ -76,27 +60,16 @@ class Image:
             palette=PALETTES[HEAT], low=0.0, high=1.0, nan_color=(0, 0, 0, 0.0)
         )
         self._shown = np.zeros(0)
-        places = {key: key for key in empty}
-        glyph = one.image(**places, source=self.source, color_mapper=self.mapper)
-        title = one.title
-        formatter = CustomJSTickFormatter(code=_WITH_UNIT, args={"title": title})
-        self.bar = ColorBar(
-            color_mapper=self.mapper, height=10, padding=2, margin=0, formatter=formatter,
-            background_fill_color=None,
-        )  # fmt: skip
-        one.add_layout(self.bar, "below")
-        missing = "no material" if name == "scene" else "out of range"
-        known = {"title": title, "source": self.source, "missing": missing}
-        one.add_tools(
-            HoverTool(
-                renderers=[glyph],
-                tooltips=[("", "$sx{custom}"), ("x, y", "$x{0.0}, $y{0.0} µm")],
-                formatters={"$sx": CustomJSHover(code=_VALUE, args=known)},
-                attachment="above",
-            )
+        glyph = one.image(
+            **{key: key for key in empty}, source=self.source, color_mapper=self.mapper
         )
+        self.bar = ColorBar(
+            color_mapper=self.mapper, height=10, padding=2, margin=0, background_fill_color=None
+        )
+        one.add_layout(self.bar, "below")
+        tips = [("", "@image{0.0[00]}"), ("x, y", "$x{0.0}, $y{0.0} µm")]
         wheel = WheelZoomTool()
-        one.add_tools(wheel)
+        one.add_tools(HoverTool(renderers=[glyph], tooltips=tips, attachment="above"), wheel)
         one.toolbar.active_scroll = wheel
         one.grid.visible = False
         one.xaxis.axis_label = "x / µm"
@@ -127,42 +100,54 @@ class Line:
     """A figure of the temperatures along a line; the page fills its curves, see page.js."""
 
     def __init__(self, name: str, with_reference: bool) -> None:
-        title = f"Temperature {LINES[name]}"
-        if not with_reference:
-            title = "Temperature along the line"
+        title = f"Temperature {LINES[name]}" if with_reference else "Temperature along the line"
         self.figure = one = _figure(name, title, 150)
-        empty: dict[str, list[float]] = {"along": [], "measured": [], "reference": []}
-        source = ColumnDataSource(empty, name=f"{name}_values")
+        curves = ("measured", "reference") if with_reference else ("measured",)
+        source = ColumnDataSource(
+            {"along": [], "measured": [], "reference": []}, name=f"{name}_values"
+        )
         self.band = ColumnDataSource({"along": [], "low": [], "high": []})
         self.under_range = BoxAnnotation(
             level="underlay", line_color=None, fill_color="#808080", fill_alpha=0.2, visible=False
         )
         colour = LINE_COLOURS[name]
+        self.face = Span(dimension="height", line_color=_REFERENCE, line_dash="dotted", location=0)
+        self.face_label = Label(
+            x=0, y=2, y_units="screen", text=" tool's face", text_font_size="11px",
+            text_color=_REFERENCE,
+        )  # fmt: skip
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
-        one.add_layout(self.under_range)
+        for mark in (self.under_range, self.face, self.face_label):
+            one.add_layout(mark)
         one.varea("along", "low", "high", source=self.band, fill_alpha=0.25, color=_MEASURED)
-        tips = [("distance", "@along{0.0} µm"), ("measured", "@measured{0.0} °C")]
-        style = {"source": source, "line_width": 2}
-        if with_reference:
-            tips.append(("reference", "@reference{0.0} °C"))
-            one.line(
-                "along", "reference", line_dash="dashed", line_color=_REFERENCE,
-                legend_label="reference", **style,
-            )  # fmt: skip
-        curve = one.line(
-            "along", "measured", line_color=_MEASURED, legend_label="measured", **style
-        )
+        looks = {
+            "reference": {"line_dash": "dashed", "line_color": _REFERENCE},
+            "measured": {"line_color": _MEASURED},
+        }
+        drawn = [
+            one.line("along", key, source=source, line_width=2, legend_label=key, **looks[key])
+            for key in reversed(curves)
+        ]
+        tips = [("distance", "@along{0.0} µm"), *((key, f"@{key}{{0.0}} °C") for key in curves)]
         one.legend[0].update(
             orientation="horizontal", padding=0, margin=0, spacing=10, glyph_height=12,
             label_text_font_size="11px", border_line_color=None, background_fill_color=None,
         )  # fmt: skip
         one.add_layout(one.legend[0], "above")
-        one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=[curve]))
+        one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=drawn[-1:]))
         one.x_range.range_padding = 0.02
         one.xaxis.axis_label = "distance / µm"
-        one.yaxis.axis_label = "radiance temperature / °C"
+        one.yaxis.axis_label = "temperature / °C"
         one.min_border_left = _BORDER + 6
         one.title.text_font_size = "12px"
+
+    def show(self, limit: float | None, crossing: float | None) -> None:
+        """Mark the range limit and where the line enters the tool, and remove the draws."""
+        self.under_range.update(top=limit, visible=limit is not None)
+        self.face.update(location=crossing or 0.0, visible=crossing is not None)
+        self.face_label.update(x=crossing or 0.0, visible=crossing is not None)
+        if len(self.band.data["along"]):
+            self.band.data = {"along": [], "low": [], "high": []}
 
 
 class Figures:
@@ -171,10 +156,11 @@ class Figures:
     def __init__(self, raster: Raster, tool: Tool | None, images: tuple[str, ...]) -> None:
         left, right, bottom, top = self.extent = tuple(MICRONS * edge for edge in raster.extent)
         # The wheel zooms out to three times the image at most.
-        x_range = Range1d(left, right, bounds=(2 * left - right, 2 * right - left))
-        y_range = Range1d(bottom, top, bounds=(2 * bottom - top, 2 * top - bottom))
-        self._ranges = {"x_range": x_range, "y_range": y_range}
-        self.images = {name: Image(name, self._ranges, name == images[0]) for name in images}
+        ranges = {
+            "x_range": Range1d(left, right, bounds=(2 * left - right, 2 * right - left)),
+            "y_range": Range1d(bottom, top, bounds=(2 * bottom - top, 2 * top - bottom)),
+        }
+        self.images = {name: Image(name, ranges, name == images[0]) for name in images}
         self.lines = {name: Line(name, len(images) > 1) for name in LINES}
         self.all = {name: one.figure for name, one in (self.images | self.lines).items()}
         places = {
@@ -189,21 +175,12 @@ class Figures:
             _draw_over(one.figure, outline, places)
         self.set_theme("light")
 
-    @property
-    def view(self) -> tuple[float, float, float, float]:
-        """Visible part of the images: left, right, bottom and top in m."""
-        x, y = self._ranges["x_range"], self._ranges["y_range"]
-        return x.start / MICRONS, x.end / MICRONS, y.start / MICRONS, y.end / MICRONS
-
     def show(self, picture: Picture) -> None:
         """Show the images of a picture, and no draws."""
         for name, panel in picture.panels.items():
             self.images[name].show(panel)
-        limit = picture.lower_limit
-        for line in self.lines.values():
-            line.under_range.update(top=limit, visible=limit is not None)
-            if len(line.band.data["along"]):
-                line.band.data = {"along": [], "low": [], "high": []}
+        for name, line in self.lines.items():
+            line.show(picture.lower_limit, picture.crossings[name])
 
     def show_drawn(self, picture: Picture, drawn: Drawn) -> None:
         for name, line in self.lines.items():
@@ -213,7 +190,7 @@ class Figures:
             line.band.data = {"along": along[known], "low": low, "high": high}
 
     def set_theme(self, theme: str) -> None:
-        text = _TEXT[theme]
+        text = TEXT[theme]
         for one in self.all.values():
             one.title.text_color = text
             one.axis.axis_label_text_color = one.axis.major_label_text_color = text

@@ -11,13 +11,14 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from chipglow.analysis import spread_starts
+from chipglow.analysis.cut import lacking
 from chipglow.analysis.places import LINE_REACH, TOUCHING
-from chipglow.app.controls import CURSOR, LINES, Controls, rounded
+from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
 from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
-from chipglow.laboratory.chip import Instant, contact_length
+from chipglow.laboratory.chip import Instant, Segment
 from chipglow.quantities import unchecked
-from chipglow.scene import Material, Raster, Scene
+from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformSurface
 
@@ -41,20 +42,23 @@ class OpenedScene:
     scene: Scene
     coarse: Scene | None
     controls: Controls
-    from_file: bool = False
+    file: str | None
+    """The scene as a saved study names it; None for the study's cut."""
 
     @classmethod
-    def of(cls, scene: Scene, study: Study, name: str, from_file: bool = False) -> "OpenedScene":
-        """Open a scene in an exposure in its middle; a ValueError if it is shorter."""
+    def of(cls, scene: Scene, study: Study, name: str, file: str | None) -> "OpenedScene":
+        """Open a scene at its developed shear band, else in its middle; a ValueError if short."""
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
             study = unchecked(study, surface=UniformSurface(0.5))
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         starts = spread_starts(scene, duration, 3)
-        start = rounded(starts[len(starts) // 2])
-        study = _with_places(study, *_scene_places(scene, start, study.camera.integration_time))
+        start, places = starts[len(starts) // 2], _through(scene.raster)
         coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
-        controls = Controls.of_scene(study, scene, start, duration)
-        return cls(name, scene, None if coarse is scene else coarse, controls, from_file)
+        if segment := _developed(coarse, duration, study.analysis.exposures):
+            start, places = segment.start, _across(segment)
+        shown = shown_study(_with_places(study, *places), rounded(start))
+        controls = Controls.of_scene(shown, scene, duration)
+        return cls(name, scene, None if coarse is scene else coarse, controls, file)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +87,19 @@ Opened: TypeAlias = OpenedScene | OpenedMeasurement
 def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
     """Open a scene, a measurement or a folder of results; without a path the bundled scene."""
     if path is None:
-        return OpenedScene.of(example_scene(), study or Study(), "bundled scene", from_file=True)
+        return open_scene_object(example_scene(), study, "bundled scene")
     path = Path(path)
     if path.is_dir():
         return _results(path)
     if is_measurement(path):
         return OpenedMeasurement.of(read_measurement(path), path.name)
-    return OpenedScene.of(open_scene(path), study or Study(), path.name, from_file=True)
+    return open_scene_object(open_scene(path), study, path.name)
+
+
+def open_scene_object(scene: Scene, study: Study | None, name: str) -> OpenedScene:
+    """Open a scene; a study of one that is no file names ``scene.nc`` beside it."""
+    file = str(scene.path.resolve()) if isinstance(scene, StoredScene) else "scene.nc"
+    return OpenedScene.of(scene, study or Study(), name, file)
 
 
 class OpenFiles:
@@ -127,7 +137,7 @@ def open_uploaded(path: Path, name: str) -> Opened:
     except (ValueError, OSError) as error:
         raise ValueError(str(error).replace(str(path), name)) from None
     if isinstance(opened, OpenedScene):
-        return replace(opened, name=name, from_file=False)
+        return replace(opened, name=name, file=name)
     return replace(opened, name=name)
 
 
@@ -149,11 +159,12 @@ def _results(folder: Path) -> OpenedScene:
             f"{folder}: the scene of its study is not in the cache, expected that "
             f"chipglow run {file} --out {folder} was done on this machine, or a scene's file"
         )
-    return OpenedScene.of(open_scene(study.scene or cut(study)), study, folder.name)
+    scene = open_scene(study.scene or cut(study))
+    return OpenedScene.of(scene, study, folder.name, study.scene)
 
 
 def _with_places(study: Study, cursor: _Points, *lines: _Points) -> Study:
-    """Return a study with these places alone, rounded to a tenth of a micrometre as in links."""
+    """Return a study with these points and lines, rounded to a tenth of a micrometre."""
     (point,), *ends = (
         tuple((round(float(x), 7), round(float(y), 7)) for x, y in points)
         for points in (cursor, *lines)
@@ -162,23 +173,26 @@ def _with_places(study: Study, cursor: _Points, *lines: _Points) -> Study:
     return unchecked(study, analysis=unchecked(study.analysis, **places))
 
 
-def _scene_places(scene: Scene, start: float, duration: float) -> list[_Points]:
+def _developed(scene: Scene, duration: float, count: int) -> Segment | None:
+    """Return the segment with the hottest middle of a shear band, if there is band and contact."""
+    if any(lacking(scene)):
+        return None
+    starts = spread_starts(scene, duration, count)
+    instants = [Instant.at(scene, float(start), duration) for start in starts]
+    heat = {i: one.temperatures[one.band.middle] for i, one in enumerate(instants) if one.band}
+    if not heat:
+        return None
+    hottest = instants[max(heat, key=lambda i: heat[i])]
+    segment = Segment.of(scene, hottest, duration, TOUCHING)
+    return segment if segment.contact_length > 0 else None
+
+
+def _across(segment: Segment) -> list[_Points]:
     """Return a cursor on the rake face, and lines across it and across the shear band."""
-    cursor, rake, band = _through(scene.raster)
-    tool = scene.tool
-    if tool is None:
-        return [cursor, rake, band]
-    index = scene.frame_at(start + duration / 2)
-    workpiece = scene.field("material", index) == Material.WORKPIECE
-    contact = contact_length(scene.raster, workpiece, tool, TOUCHING)
-    if contact > 0:
-        middle, across = tool.rake_point(contact / 2), LINE_REACH * np.asarray(tool.rake_normal)
-        cursor, rake = [middle], [middle - across, middle + across]
-    if "plastic_strain_rate" in scene.fields:
-        ridge = Instant.at(scene, start, duration).band
-        if ridge is not None:
-            band = ridge.across(LINE_REACH, LINE_REACH).points[[0, -1]]
-    return [cursor, rake, band]
+    middle = segment.tool.rake_point(segment.contact_length / 2)
+    reach = LINE_REACH * np.asarray(segment.tool.rake_normal)
+    band = segment.band.across(LINE_REACH, LINE_REACH).points[[0, -1]]
+    return [[middle], [middle - reach, middle + reach], band]
 
 
 def _through(raster: Raster, place: tuple[float, float] | None = None) -> list[_Points]:

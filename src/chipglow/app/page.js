@@ -17,6 +17,7 @@ export function render({ view, model, el }) {
     for (const one of page.querySelectorAll(selector)) one.addEventListener(kind, () => act(one));
   };
   const named = (name) => view.model.document.get_model_by_name(name);
+  const plotOf = (name) => Bokeh.index.find_one_by_id(named(`${name}_figure`).id);
   const figures = model.get_child("figures");
   spec.figures.forEach((name, i) => find(`#figure-${name}`).prepend(figures[i]));
   el.style.width = "100%";
@@ -107,8 +108,7 @@ export function render({ view, model, el }) {
   function grip(down) {
     const cell = down.target.closest?.(".figure");
     if (!cell || down.button !== 0) return;
-    const figure = named(cell.id.replace("figure-", "") + "_figure");
-    const plot = Bokeh.index.find_one_by_id(figure.id);
+    const plot = plotOf(cell.id.replace("figure-", "")), figure = plot.model;
     const box = plot.canvas_view.el.getBoundingClientRect();
     const { x_scale, y_scale, bbox } = plot.frame;
     const at = (event) => [x_scale.invert(event.clientX - box.x), y_scale.invert(event.clientY - box.y)];
@@ -150,6 +150,7 @@ export function render({ view, model, el }) {
     };
     const up = (event) => {
       for (const [kind, handler] of Object.entries(handlers)) removeEventListener(kind, handler);
+      move(event); // of a busy page it may be the first to come
       if (!dragged && event.type === "pointerup") {
         change("cursor", clamped(...start).map((value) => value.toFixed(1)).join(","), true);
       } else if (held && text) change(held.name, text, true);
@@ -173,11 +174,11 @@ export function render({ view, model, el }) {
 
   // Messages from Python.
 
-  function showValues({ n, values, shown, can_undo, can_redo, link }) {
-    for (const [path, text] of Object.entries(values)) {
-      const entry = controls.get(path), { box, field, slider, stops } = entry;
-      box.hidden = !shown.includes(path);
-      if (entry.sent > n) continue;
+  function showValues({ n, values, can_undo, can_redo, link }) {
+    for (const [path, entry] of controls) {
+      const { box, field, slider, stops } = entry, text = values[path];
+      box.hidden = text === undefined;
+      if (box.hidden || entry.sent > n) continue;
       entry.text = text;
       if (!entry.typing) {
         field.removeAttribute("aria-invalid");
@@ -216,15 +217,35 @@ export function render({ view, model, el }) {
     find(".numbers").innerHTML = html;
   }
 
-  function saveDownload({ name, data }) {
-    const link = document.createElement("a");
-    Object.assign(link, { href: `data:application/octet-stream;base64,${data}`, download: name }).click();
+  function saveDownload({ name, url }) {
+    Object.assign(document.createElement("a"), { href: url, download: name }).click();
+  }
+
+  // One picture of all figures as they are: images in a row, lines below.
+  function saveSheet(name) {
+    const lines = spec.figures.filter((one) => !spec.images.includes(one));
+    const rows = [spec.images, lines].map((row) => row.map((one) => plotOf(one).export("png").canvas));
+    const sum = (row) => row.reduce((width, one) => width + one.width, 0);
+    const tall = rows.map((row) => Math.max(...row.map((one) => one.height)));
+    const sheet = Object.assign(document.createElement("canvas"), {
+      width: Math.max(...rows.map(sum)), height: tall[0] + tall[1] });
+    const context = sheet.getContext("2d");
+    context.fillStyle = getComputedStyle(page).backgroundColor;
+    context.fillRect(0, 0, sheet.width, sheet.height);
+    rows.forEach((row, i) => row.forEach((one, j) => context.drawImage(one, sum(row.slice(0, j)), i * tall[0])));
+    saveDownload({ name, url: sheet.toDataURL() });
+    showStatus({ text: `${name} is saved.`, kind: "" });
   }
 
   // A picture counts as painted when the browser had time for it: then come the curves along its
   // lines, and the next picture.
-  function showPicture({ number, lines }) {
+  function showPicture({ number, lines, absent }) {
     find(".numbers").classList.add("old"); // until those of this picture come
+    for (const option of controls.get("error_image")?.field.options ?? []) {
+      const reason = absent[option.value];
+      option.label = option.text + (reason ? `: 0, ${reason}` : "");
+      option.disabled = Boolean(reason);
+    }
     requestAnimationFrame(() => setTimeout(() => {
       send("painted", number);
       for (const [name, data] of Object.entries(lines)) named(name).setv({ data }, { sync: false });
@@ -266,13 +287,18 @@ export function render({ view, model, el }) {
     }
     find("#theme").textContent = theme === "dark" ? "Light" : "Dark";
     send("theme", theme);
+    showChip();
   }
+  function showChip() {
+    if (find(".chip")?.open) send("chip", theme);
+  }
+  find(".chip")?.addEventListener("toggle", showChip);
   each("#theme", "click", () => setTheme(theme === "dark" ? "light" : "dark"));
 
   // Figures fit their places, in CSS pixels. All change at once: each change lays the page out.
   let size = "";
   function fit() {
-    const width = Math.round(find("main").getBoundingClientRect().width);
+    const width = Math.round(find(".images").getBoundingClientRect().width);
     const height = Math.round(spec.embedded ? 900 : innerHeight);
     if (width < 1 || size === `${width}x${height}`) return false;
     size = `${width}x${height}`;
@@ -294,16 +320,19 @@ export function render({ view, model, el }) {
   }
   const refit = () => fit() && view.invalidate_layout();
 
-  page.addEventListener("keydown", (event) => {
-    const typing = event.target.type === "text", key = event.key.toLowerCase();
+  // Of a page of its own also the keys that come when nothing has the focus.
+  const keyed = spec.embedded ? page : document;
+  const onKey = (event) => {
+    const typing = event.composedPath()[0].type === "text", key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && "zy".includes(key) && !typing) {
       event.preventDefault();
       send("step", key === "y" || event.shiftKey ? "on" : "");
     } else if (key === "enter" && typing) {
       event.preventDefault(); // a notebook would make no change of it
-      event.target.dispatchEvent(new Event("change"));
+      event.composedPath()[0].dispatchEvent(new Event("change"));
     }
-  });
+  };
+  keyed.addEventListener("keydown", onKey);
   // A notebook takes keys for itself, unless an element over them says otherwise.
   if (spec.embedded) {
     page.addEventListener("focusin", () => {
@@ -311,7 +340,7 @@ export function render({ view, model, el }) {
     });
   }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
-    more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
+    sheet: saveSheet, chip: (url) => { find(".chip img").src = url; }, more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);
@@ -319,9 +348,12 @@ export function render({ view, model, el }) {
     send("ready");
     setTheme(theme);
     refit();
-    watcher.observe(find("main"));
+    watcher.observe(find(".images"));
   });
-  model.on("remove", () => watcher.disconnect());
+  model.on("remove", () => {
+    watcher.disconnect();
+    keyed.removeEventListener("keydown", onKey);
+  });
   addEventListener("resize", refit);
   fit();
   return page;

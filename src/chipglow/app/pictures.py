@@ -1,7 +1,7 @@
 """Images, lines and numbers at a state of the controls; states share the stages they agree on."""
 
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field, replace
 from math import ceil, nan
 from typing import Any, Final, Generic, TypeAlias, TypeVar
 
@@ -18,13 +18,13 @@ from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, 
 from chipglow.camera import Camera, Exposure
 from chipglow.camera.sweep import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.quantities import Array
 from chipglow.radiometry import Band
-from chipglow.scene import Material, Raster, Scene, sample
+from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
 from chipglow.surface import EmissivityField, Surface
 
-Array: TypeAlias = NDArray[np.float64]
 _Exposed: TypeAlias = tuple[ExposureImages, Exposure | None]
 _Result = TypeVar("_Result")
 
@@ -33,7 +33,8 @@ DISPLAYED: Final = 100_000
 
 _SURFACE: Final = ("surface", "seed")
 _EXPOSURE: Final = (
-    *_SURFACE, "start", "camera.band", "camera.integration_time", "camera.reflected"
+    *_SURFACE, "start", "analysis.reference",
+    "camera.band", "camera.integration_time", "camera.reflected",
 )  # fmt: skip
 _ROLLING: Final = (*_EXPOSURE, "camera.pitch", "camera.offset")
 """Beginnings of the paths of controls that change surface and exposure."""
@@ -60,16 +61,23 @@ class Picture:
     data: xr.Dataset  # of a scene that of `error_images`, else ``measured`` and ``flagged``
     panels: dict[str, Panel]
     lines: dict[str, dict[str, Array]]  # ``along``, ``measured`` and ``reference`` by name
+    crossings: dict[str, float | None]  # where lines enter the tool in µm
     quick: bool = False
     camera: Camera | None = None
     exposure: Exposure | None = None
     parts: Callable[[], xr.Dataset] | None = None  # computes the `error_parts`
+    absent: Mapping[str, str] = field(default_factory=dict)  # why error images are 0 everywhere
 
     @property
     def lower_limit(self) -> float | None:
         """Lower range limit of the camera in °C."""
         limit = self.camera.lower_limit if self.camera else None
         return None if limit is None else limit - KELVIN
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether every pixel is flagged."""
+        return bool(self.data["flagged"].all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +91,7 @@ class Readout:
     true: float = nan
     emissivity: float = nan
     reference: float = nan
-    parts: dict[str, float] | None = None
+    parts: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +126,7 @@ class SceneModel:
         self._quick_exposures: _Cache[_Exposed] = _Cache(24)
         self._errors: _Cache[xr.Dataset] = _Cache(8)
         self._parts: _Cache[xr.Dataset] = _Cache(2)
-        self._images: _Cache[Panel] = _Cache(4)
-        self._fields: _Cache[NDArray[np.float32]] = _Cache(2)
+        self._fields: _Cache[NDArray[np.float32]] = _Cache(6)
         self._displayed = with_samples(opened.scene, DISPLAYED)
         self._displayed_quick = with_samples(opened.scene, QUICK_SAMPLES)
 
@@ -130,23 +137,23 @@ class SceneModel:
 
     def is_ready(self, state: State) -> bool:
         """Whether the exact picture takes milliseconds."""
-        if self._exposure_key(state) not in self._exposures:
+        key = self._exposure_key(state)
+        if key not in self._exposures:
             return False
         camera, coarse = state.study.camera, self.opened.coarse
-        kind = camera.psf.kind if camera.psf else ""
-        on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
+        on_samples = camera.psf_order != "detector" and (
+            camera.psf is not None and camera.psf.kind == "annular-aperture"
+        )
         # A quick look at pixels hardly larger than the coarse samples takes half as long.
-        many = on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing)
-        if not many:
-            return True
-        exact = self._camera(state, self.opened.scene)
-        return (self._exposure_key(state), exact, False) in self._errors
+        if on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing):
+            return (key, self._camera(state, self.opened.scene), False) in self._errors
+        return True
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return images and lines at a state; `check` is called meanwhile and may raise."""
         quick = quick and self.has_quick_look
         scene, surface = self._on(state, quick)
-        camera = self._camera(state, scene, quick)
+        camera, shown = self._camera(state, scene, quick), state.study.error_image
         images, untextured = self._exposed(scene, surface, camera, state, quick, check)
         key = self._exposure_key(state), camera, quick
         data = self._errors.result(key, lambda: images.errors(camera))
@@ -157,52 +164,51 @@ class SceneModel:
             )
 
         error = data["case_1"]
-        if state.error_image != "total":
-            error = parts().get(state.error_image, xr.zeros_like(error))
-        raster, exposure = camera.pixels(scene.raster), images.exposure
-        shown, label = _unflagged(data, error), ERROR_IMAGES[state.error_image]
-        limit = round_limit(shown, 99, 5.0)
+        if shown != "total":
+            error = parts().get(shown, xr.zeros_like(error))
+        raster, exposure, tool = camera.pixels(scene.raster), images.exposure, scene.tool
+        values = _unflagged(data, error)
+        limit = round_limit(values, 99, 5.0)
         panels = {
             "scene": self._scene_panel(state, exposure, quick),
             "measured": _measured_panel(data, raster),
-            "error": Panel(label, "K", shown, raster, (-limit, limit), SIGNED),
+            "error": Panel(ERROR_IMAGES[shown], "K", values, raster, (-limit, limit), SIGNED),
         }
         if panels["scene"].unit == "°C":  # both temperatures have the same colours
-            (low, high), (least, most) = panels["scene"].limits, panels["measured"].limits
-            low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
-            limits = min(least, low), max(most, high)
+            limits = panels["scene"].limits
+            if np.isfinite(panels["measured"].values).any():
+                (low, high), (least, most) = limits, panels["measured"].limits
+                low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
+                limits = min(least, low), max(most, high)
             panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
-        lines = _lines(state, raster, data)
-        return Picture(state, raster, data, panels, lines, quick, camera, exposure, parts)
+        lines, crossings = _lines(state, raster, data, tool)
+        return Picture(
+            state, raster, data, panels, lines, crossings, quick, camera, exposure, parts,
+            dict(_absent(state, surface)),
+        )  # fmt: skip
 
     def readout(self, picture: Picture) -> Readout:
         assert picture.camera and picture.exposure and picture.parts
         state, at, exposure = picture.state, picture.state.cursor, picture.exposure
-
-        def pixel(name: str) -> float:
-            return float(nearest(data[name].values, picture.raster, at))
+        data, raster, scene = picture.parts(), picture.raster, self.opened.scene
+        pixel = {name: float(nearest(image.values, raster, at)) for name, image in data.items()}
 
         def sample_of(name: str) -> float:
-            scene = self.opened.scene
-            key = self._field_key(state, name, scene, exposure)
-            values = self._fields.result(key, lambda: self._field(state, name, scene, exposure))
-            return float(nearest(values, scene.raster, at))
+            return float(nearest(self._field(state, name, scene, exposure), scene.raster, at))
 
-        data = picture.parts()
         silent = () if picture.camera.detector else ("detector",)
         names = {"case_1", *PARTS, "texture"}.difference(silent)
-        measured = pixel("measured")
-        calibration = picture.camera.calibration(picture.raster.shape)
-        noisy = calibration is not None and np.isfinite(measured)
+        calibration = picture.camera.calibration(raster.shape)
+        noisy = calibration is not None and np.isfinite(pixel["measured"])
         return Readout(
-            measured=measured,
-            uncertainty=calibration.netd(measured) if calibration and noisy else nan,
+            measured=pixel["measured"],
+            uncertainty=calibration.netd(pixel["measured"]) if calibration and noisy else nan,
             source="noise of one frame" if noisy else "",
-            flagged=pixel("flagged") == 1.0,
+            flagged=pixel["flagged"] == 1.0,
             true=sample_of("temperature") + KELVIN,
             emissivity=sample_of("emissivity"),
-            reference=pixel("reference"),
-            parts={name: pixel(name) for name in names if name in data},
+            reference=pixel["reference"],
+            parts={name: pixel[name] for name in names if name in pixel},
         )
 
     def drawn(
@@ -210,33 +216,33 @@ class SceneModel:
     ) -> Drawn:
         """Return lines and error at the cursor over `phases`² pixel positions and textures."""
         # This is done in another thread than the pictures, whose caches it leaves alone.
-        fitted = fit(state.study, self.opened.scene)
+        study = state.study
+        fitted = fit(study, self.opened.scene)
         scene, (surface,) = fitted.scene, fitted.surfaces.values()
-        camera = state.study.camera.on(scene.raster, state.study.seed)
-        cursor = PointPlace(CURSOR, state.cursor)
-        places = cursor, *map(state.line, LINES)
+        camera = study.camera.on(scene.raster, study.seed)
+        places = PointPlace(CURSOR, state.cursor), *map(state.line, LINES)
         count = textures if surface.redrawn(1) is not surface else 1
         noise = np.arange(count * phases**2).reshape(1, count, phases**2)
         schedule = Schedule(
-            starts=np.array([state.start]),
+            starts=np.array([study.start]),
             drawn=(0,),
             shown=0,
             views=(View(CURSOR, [places], noise, ()),),
             phases=phases,
-            reference=state.study.analysis.reference,
+            reference=study.analysis.reference,
             effects={ALL: CASES[ALL]},
         )
         laid = {CURSOR: camera.lay(surface.redrawn(0), scene)}
         looked = look(scene, {CURSOR: surface}, laid, camera, schedule, progress)
         reference, measured, _ = np.moveaxis(looked.read[0, 0], -1, 0)
         error = measured - reference
+        lines = {
+            name: np.concatenate(looked.along[row, 0, :, :, 1]) - KELVIN
+            for row, name in enumerate(LINES)
+        }
+        is_known = np.isfinite(error).all()
         return Drawn(
-            state,
-            {
-                name: np.concatenate(looked.along[row, 0, :, :, 1]) - KELVIN
-                for row, name in enumerate(LINES)
-            },
-            Distribution(error, ("texture", PIXEL_PHASE)) if np.isfinite(error).all() else None,
+            state, lines, Distribution(error, ("texture", PIXEL_PHASE)) if is_known else None
         )
 
     def _exposure_key(self, state: State) -> Hashable:
@@ -276,17 +282,15 @@ class SceneModel:
     ) -> _Exposed:
         """Return the exposure, and that without texture where it differs and is needed."""
         plain = surface.without_texture()
-        both = plain is not surface and (not quick or state.error_image == "texture")
-        surfaces = (surface, plain) if both else (surface,)
+        both = plain is not surface and (not quick or state.study.error_image == "texture")
 
         def make() -> _Exposed:
-            grey = surface.is_grey
-            spectral = () if grey else (camera.band.lower, camera.band.upper, camera.reflected)
+            spectral = camera.band.lower, camera.band.upper, camera.reflected
             laid = self._laid.result(
-                (state.key(*_SURFACE), quick, both, spectral),
-                lambda: [camera.lay(one, scene) for one in surfaces],
+                (state.key(*_SURFACE), quick, both, () if surface.is_grey else spectral),
+                lambda: [camera.lay(one, scene) for one in (surface, plain)[: 1 + both]],
             )
-            exposure, *others = camera.expose_fields(scene, laid, state.start, check)
+            exposure, *others = camera.expose_fields(scene, laid, state.study.start, check)
             exposure = replace(exposure, effects=surface.effects)
             images = ExposureImages(exposure, state.study.analysis.reference)
             return images, others[0] if both else None
@@ -297,17 +301,12 @@ class SceneModel:
         return self._exposures.result(key, make)
 
     def _scene_panel(self, state: State, exposure: Exposure, quick: bool) -> Panel:
-        name, (label, unit) = state.scene_image, SCENE_IMAGES[state.scene_image]
-        few = quick and self._field_key(state, name, self._displayed, exposure) not in self._images
+        name, (label, unit) = state.study.scene_image, SCENE_IMAGES[state.study.scene_image]
+        few = quick and self._field_key(state, name, self._displayed, exposure) not in self._fields
         scene = self._displayed_quick if few else self._displayed
-
-        def make() -> Panel:
-            values = self._field(state, name, scene, exposure)
-            colours = HEAT if unit == "°C" else PLAIN
-            title = f"Scene: {label.lower()}"
-            return Panel(title, unit, values, scene.raster, ends(values), colours)
-
-        return self._images.result(self._field_key(state, name, scene, exposure), make)
+        values = self._field(state, name, scene, exposure)
+        colours = HEAT if unit == "°C" else PLAIN
+        return Panel(f"Scene: {label.lower()}", unit, values, scene.raster, ends(values), colours)
 
     def _field_key(self, state: State, name: str, scene: Scene, exposure: Exposure) -> Hashable:
         of_surface = name in ("radiance_temperature", "emissivity")
@@ -319,10 +318,14 @@ class SceneModel:
     ) -> NDArray[np.float32]:
         """Return a field in the middle of the exposure in its image's unit; NaN off material."""
         index = self._middle_frame(state)
-        values = self._values(state, name, scene, exposure, index).astype(np.float32)
-        void = scene.field("material", index) == Material.VOID
-        zero = np.float32(KELVIN if SCENE_IMAGES[name][1] == "°C" else 0.0)
-        return np.where(void, np.float32(nan), values - zero)
+
+        def make() -> NDArray[np.float32]:
+            values = self._values(state, name, scene, exposure, index).astype(np.float32)
+            void = scene.field("material", index) == Material.VOID
+            zero = np.float32(KELVIN if SCENE_IMAGES[name][1] == "°C" else 0.0)
+            return np.where(void, np.float32(nan), values - zero)
+
+        return self._fields.result(self._field_key(state, name, scene, exposure), make)
 
     def _values(
         self, state: State, name: str, scene: Scene, exposure: Exposure, index: int
@@ -340,7 +343,8 @@ class SceneModel:
 
     def _middle_frame(self, state: State) -> int:
         """Return the index of the frame in the middle of the exposure."""
-        return self.opened.scene.frame_at(state.start + state.study.camera.integration_time / 2)
+        study = state.study
+        return self.opened.scene.frame_at(study.start + study.camera.integration_time / 2)
 
 
 class MeasurementModel:
@@ -364,7 +368,7 @@ class MeasurementModel:
         }
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
         panels = {"measured": _measured_panel(data, raster)}
-        return Picture(state, raster, data, panels, _lines(state, raster, data))
+        return Picture(state, raster, data, panels, *_lines(state, raster, data, measurement.tool))
 
     def readout(self, picture: Picture) -> Readout:
         """Return the measured temperature at the cursor with its calibration's uncertainty."""
@@ -379,19 +383,48 @@ class MeasurementModel:
         return Readout(measured, uncertainty, "calibration", flagged)
 
     def _index(self, state: State) -> int:
-        return int(np.abs(self.opened.measurement.times - state.start).argmin())
+        return int(np.abs(self.opened.measurement.times - state.study.start).argmin())
 
 
-def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str, Array]]:
-    lines = {}
+def _absent(state: State, surface: Surface) -> Mapping[str, str]:
+    """Return the error images that are 0 everywhere, with the reason."""
+    study = state.study
+    reasons = {
+        "emissivity": study.analysis.reference != "true" and "part of the reference",
+        "psf": study.camera.psf is None and "no PSF",
+        "texture": surface.without_texture() is surface and "the emissivity has none",
+    }
+    return {name: reason for name, reason in reasons.items() if reason}
+
+
+def _lines(
+    state: State, raster: Raster, data: xr.Dataset, tool: Tool | None
+) -> tuple[dict[str, dict[str, Array]], dict[str, float | None]]:
+    """Return temperatures along the lines, and the distances at which these enter the tool."""
+    lines: dict[str, dict[str, Array]] = {}
+    crossings: dict[str, float | None] = dict.fromkeys(LINES)
     for name in LINES:
         line = state.line(name).line(raster.spacing)
-        lines[name] = {"along": 1e6 * line.distance} | {
+        along = 1e6 * line.distance
+        lines[name] = {"along": along} | {
             key: sample(data[key].values, raster, line.points) - KELVIN
             for key in ("measured", "reference")
             if key in data
         }
-    return lines
+        crossings[name] = (
+            None if tool is None else _zero(along, tool.signed_distance(*line.points.T))
+        )
+    return lines, crossings
+
+
+def _zero(along: Array, values: Array) -> float | None:
+    """Return where values along a line first change their sign; None if they do not."""
+    changes = np.flatnonzero(np.diff(values > 0))
+    if not changes.size:
+        return None
+    pair = slice(changes[0], changes[0] + 2)
+    order = np.argsort(values[pair])
+    return float(np.interp(0.0, values[pair][order], along[pair][order]))
 
 
 def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:

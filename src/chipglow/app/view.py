@@ -1,11 +1,12 @@
 """The page: a session and its figures as a Panel component, see page.js."""
 
 import json
+import logging
+import re
 from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
-from io import BytesIO
 from itertools import groupby
 from math import isfinite
 from pathlib import Path
@@ -21,27 +22,16 @@ from jinja2 import Environment, PackageLoader
 from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
-from chipglow.app.controls import Texts
-from chipglow.app.figures import TITLES, Figures
+from chipglow.app.controls import ERROR_IMAGES, Texts
+from chipglow.app.figures import TEXT, TITLES, Figures
 from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
 from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
-from chipglow.drawing.drawing import data_url, draw_chip, style
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
-from chipglow.scene import Scene
 
 _FOLDER: Final = Path(__file__).parent
-_TEMPLATES: Final = Environment(
-    loader=PackageLoader("chipglow.app"), autoescape=True, trim_blocks=True, lstrip_blocks=True
-)
-_PARTS: Final = (
-    ("motion", "Motion", "Mean over the exposure minus its maximum"),
-    ("footprint", "Footprint", "Mean over the pixel minus its hottest sample"),
-    ("psf", "PSF", "Case 1 − case 2: with minus without the point spread function"),
-    ("detector", "Detector", "Noise, counts and calibration"),
-    ("texture", "of it: texture", "Error minus that without texture: part of the others"),
-)
+_log = logging.getLogger(__name__)
 
 
 class Page(JSComponent):  # type: ignore[misc]
@@ -78,28 +68,28 @@ class View:
         files: OpenFiles | None = None,
         embedded: bool = False,
     ) -> None:
-        self._link, self._files, self._embedded = link or {}, files, embedded
+        self._link, self._files = link or {}, files
         self._upload: Path | None = None
         self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
         self._refused = self._restore(texts or {})
-        self._is_scene = isinstance(opened, OpenedScene)
+        is_scene = isinstance(opened, OpenedScene)
         shown = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
-        images = tuple(TITLES) if self._is_scene else ("measured",)
-        self.figures = Figures(shown.raster, shown.tool, images)
+        self.figures = Figures(
+            shown.raster, shown.tool, tuple(TITLES) if is_scene else ("measured",)
+        )
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
-        self._drawn: Drawn | None = None
-        panes = [
-            pn.pane.Bokeh(one, sizing_mode="fixed", margin=0) for one in self.figures.all.values()
-        ]
         self.page = Page(
-            html=self._html(opened),
-            spec=self._spec(opened),
-            figures=panes,
+            html=_html(opened, self.figures, files is not None, embedded),
+            spec=_spec(opened, self.figures, embedded),
+            figures=[
+                pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
+                for one in self.figures.all.values()
+            ],
             sizing_mode="stretch_width",
         )
         self.page.on_msg(self._receive)
@@ -119,26 +109,36 @@ class View:
 
     def _restore(self, texts: Texts) -> str:
         """Set the controls of a link that are possible; return what is wrong with the others."""
-        try:
-            self.session.restore(texts)
-            return ""
-        except ValueError:
-            refused = ""
-        for path, text in texts.items():
+        refused = ""
+        for some in (texts, *({path: text} for path, text in texts.items())):
             try:
-                self.session.restore({path: text})
+                self.session.restore(some)
+                if some is texts:
+                    return ""
             except ValueError as error:
-                refused = refused or f"Link: {error}"
+                if some is not texts:
+                    refused = refused or f"Link: {error}"
         return refused
+
+    # Messages of the page
 
     def _receive(self, event: Any) -> None:
         message = event.data
         self._handled = int(message["n"])
+        act = getattr(self, f"_on_{message['kind']}")
         with unlocked():  # one answer, that the browser draws once
-            getattr(self, f"_on_{message['kind']}")(message.get("content"))
+            self._reported(lambda: act(message.get("content")))
 
     def _notified(self, kind: str, *content: Any) -> None:
         self._later(lambda: getattr(self, f"_show_{kind}")(*content))
+
+    def _reported(self, act: Callable[[], None]) -> None:
+        """Do something; a failure is shown on the page."""
+        try:
+            act()
+        except Exception as error:  # a defect: it must not leave the page waiting
+            _log.exception("chipglow app")
+            self._say(f"Defect: {type(error).__name__}: {error}", "error")
 
     def _on_ready(self, _: None) -> None:
         """Fill a page that has just been rendered, and compute its picture."""
@@ -179,9 +179,14 @@ class View:
         self.session.cancel()
         self._say("The drawing was cancelled.")
 
+    def _on_chip(self, theme: str) -> None:
+        from chipglow.app.files import chip_picture  # Matplotlib takes long to import
+
+        assert isinstance(self.session.model, SceneModel)
+        self._send("chip", chip_picture(self.session.model.opened.scene, TEXT[theme]))
+
     def _on_save(self, name: str) -> None:
-        # Matplotlib is imported only to save something.
-        from chipglow.app.files import figure_file, measurement_file, study_file
+        from chipglow.app.files import measurement_file, study_file
 
         model, picture = self.session.model, self._picture
         assert isinstance(model, SceneModel)
@@ -191,10 +196,12 @@ class View:
             self._say("The exact picture is not finished: save it when it is.", "error")
             return
         elif name == "chipglow.png":
-            data = figure_file(picture, model, self.figures.view, self._drawn)
+            self._send("sheet", name)
+            return
         else:
             data = measurement_file(picture, model)
-        self._send("download", {"name": name, "data": b64encode(data).decode()})
+        url = f"data:application/octet-stream;base64,{b64encode(data).decode()}"
+        self._send("download", {"name": name, "url": url})
         self._say(f"{name} is saved.")
 
     def _on_piece(self, piece: dict[str, Any]) -> None:
@@ -223,55 +230,63 @@ class View:
             raise
         self._notified("opened", key)
 
+    # Messages to the page
+
     def _show_opened(self, key: str) -> None:
         self._send("open", key)
 
     def _show_picture(self, number: int, picture: Picture) -> None:
-        self._picture, self._drawn = picture, None
+        self._picture = picture
         self.figures.show(picture)
-        if picture.quick:
-            assert picture.exposure
-            spacing = picture.exposure.raster.spacing
-            finer = picture.state.study.camera.pitch < picture.raster.spacing
-            what = "samples and pixels" if finer else "samples"
-            follows = f"Quick look on {what} of {1e6 * spacing:.3g} µm; the exact picture follows."
-            self._say(follows, "busy")
-        elif self._refused:
-            self._say(self._refused, "error")
-        else:
-            took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
-            self._say(f"Exact picture{took if self._began else ''}.")
+        self._say(*self._described(picture))
         # The page draws the curves after the images: that halves the time to the images.
         lines = {
             f"{name}_values": {key: curve.tolist() for key, curve in curves.items()}
             for name, curves in picture.lines.items()
         }
-        self._send("picture", {"number": number, "lines": lines})
+        self._send("picture", {"number": number, "lines": lines, "absent": picture.absent})
+
+    def _described(self, picture: Picture) -> tuple[str, str]:
+        """Return the status of the page with a picture, and its kind."""
+        shown = picture.state.study.error_image
+        if picture.quick:
+            assert picture.exposure
+            spacing = picture.exposure.raster.spacing
+            finer = picture.state.study.camera.pitch < picture.raster.spacing
+            what = "samples and pixels" if finer else "samples"
+            return (
+                f"Quick look on {what} of {1e6 * spacing:.3g} µm; the exact picture follows.",
+                "busy",
+            )
+        if self._refused:
+            return self._refused, "error"
+        if picture.is_blank:
+            limit = picture.lower_limit
+            above = "" if limit is None else f", which begins at {limit:.0f} °C"
+            return f"No pixel is within the camera's range{above}.", "error"
+        if shown in picture.absent:
+            return f"{ERROR_IMAGES[shown]} is 0 everywhere: {picture.absent[shown]}.", ""
+        took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
+        return f"Exact picture{took if self._began else ''}.", ""
 
     def _show_readout(self, picture: Picture, readout: Readout) -> None:
         x, y = picture.state.cursor
-        position = f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−")
-        rows = [("x, y", position, ""), ("measured", _measured(readout), readout.source)]
-        parts, known = [], readout.parts
-        if known is not None:
-            rows[1:1] = [
-                ("true temperature", _celsius(readout.true), "Of the sample in mid-exposure"),
-                ("emissivity", rounded_text(readout.emissivity), "Of the same sample"),
-                ("reference", _celsius(readout.reference), "Maximum in the pixel"),
-            ]
-            rows.append(("error", _kelvins(known["case_1"]), "Measured minus reference"))
-            shown = [part for part in _PARTS if part[0] in known]
-            kelvins = [known[part[0]] for part in shown]
-            bars = np.nan_to_num(kelvins)
-            percents = 50 * bars / max(1e-9, np.abs(bars).max())
-            parts = list(zip(shown, percents, map(_kelvins, kelvins), strict=True))
-        template = _TEMPLATES.get_template("numbers.html")
-        self._send("numbers", template.render(rows=rows, parts=parts))
+        is_true = picture.state.study.analysis.reference == "true"
+        hidden = {"case_1"} if is_true else {"case_1", "emissivity"}
+        parts = {key: one for key, one in (readout.parts or {}).items() if key not in hidden}
+        largest = np.nanmax([1e-9, *np.abs(list(parts.values()))])
+        self._send(
+            "numbers",
+            _TEMPLATES.get_template("numbers.html").render(
+                readout=readout,
+                position=f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−"),
+                percent={name: 50 * np.nan_to_num(part) / largest for name, part in parts.items()},
+            ),
+        )
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
             return
-        self._drawn = drawn
         self.figures.show_drawn(self._picture, drawn)
         if (error := drawn.error) is None:
             self._say("Drawn: the range of the draws is shaded.")
@@ -293,59 +308,23 @@ class View:
         self.page._send_msg({"kind": kind, "content": content})
 
     def _say(self, text: str, kind: str = "", **more: Any) -> None:
-        self._send("status", {"text": text, "kind": kind, **more})
+        self._send("status", {"text": readable(text), "kind": kind, **more})
 
     def _put_values(self) -> None:
         session, controls = self.session, self.session.model.controls
+        values = controls.values(session.state)
         content = {
             "n": self._handled,
-            "values": {
-                row.path: row.shown(controls.value(row, session.state)) for row in controls.rows
-            },
-            "shown": [row.path for row in controls.rows if controls.is_shown(row, session.state)],
+            "values": {path: controls.rows[path].shown(text) for path, text in values.items()},
             "can_undo": session.can_undo,
             "can_redo": session.can_redo,
             "link": {**self._link, **session.state.texts},
         }
         self._send("values", content)
 
-    def _html(self, opened: Opened) -> str:
-        """Return the page without figures and numbers."""
-        figures = self.figures
-        rows = (row for row in opened.controls.rows if row.group)
-        return _TEMPLATES.get_template("page.html").render(
-            name=opened.name,
-            is_scene=self._is_scene,
-            embedded=self._embedded,
-            may_upload=self._files is not None,
-            groups=[(name, list(of)) for name, of in groupby(rows, lambda row: row.group)],
-            images={name: one.figure.title.text for name, one in figures.images.items()},
-            lines={name: one.figure.title.text for name, one in figures.lines.items()},
-            draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
-            chip=_chip(opened.scene) if isinstance(opened, OpenedScene) else "",
-        )
-
-    def _spec(self, opened: Opened) -> str:
-        """Return what page.js needs beside the page."""
-        left, right, bottom, top = self.figures.extent
-        return json.dumps(
-            {
-                "embedded": self._embedded,
-                "most_uploaded": MOST_UPLOADED,
-                "stops": {
-                    row.path: [float(row.shown(stop)) for stop in row.stops]
-                    for row in opened.controls.rows
-                },
-                "images": list(self.figures.images),
-                "figures": list(self.figures.all),
-                "extent": self.figures.extent,
-                "shape": (top - bottom) / (right - left),
-            }
-        )
-
     def _later(self, show: Callable[[], None]) -> None:
         if self._loop is not None:
-            self._loop.call_soon_threadsafe(self.page.alone, show)
+            self._loop.call_soon_threadsafe(self.page.alone, lambda: self._reported(show))
             return
         if self._document is None:
             show()
@@ -353,7 +332,7 @@ class View:
 
         def together() -> None:
             with unlocked():  # one message, that the browser draws once
-                show()
+                self._reported(show)
 
         try:
             self._document.add_next_tick_callback(together)
@@ -361,15 +340,50 @@ class View:
             self.session.end()
 
 
-def _measured(readout: Readout) -> str:
-    """Return the measured temperature, to two digits of its uncertainty if that is known."""
-    text = _celsius(readout.measured)
-    if isfinite(readout.measured) and readout.uncertainty > 0:
-        text = f"{uncertain_text(readout.measured - KELVIN, readout.uncertainty)} °C"
-    return f"{text} (under range)" if readout.flagged and isfinite(readout.measured) else text
+def readable(text: str) -> str:
+    """Return a message of the library with µm, µs and °C for the spellings of YAML files."""
+    for word, unit in ((" um", " µm"), (" us", " µs"), (" degC", " °C")):
+        text = re.sub(rf"(?<=\d){word}\b", unit, text)
+    return text
 
 
-def _celsius(kelvins: float) -> str:
+def _html(opened: Opened, figures: Figures, may_upload: bool, embedded: bool) -> str:
+    """Return the page without figures and numbers."""
+    rows = (row for row in opened.controls.rows.values() if row.group)
+    scene = opened.scene if isinstance(opened, OpenedScene) else None
+    return _TEMPLATES.get_template("page.html").render(
+        name=opened.name,
+        is_scene=scene is not None,
+        has_chip=scene is not None and scene.overview is not None,
+        embedded=embedded,
+        may_upload=may_upload,
+        groups=[(name, list(of)) for name, of in groupby(rows, lambda row: row.group)],
+        images={name: one.figure.title.text for name, one in figures.images.items()},
+        lines={name: one.figure.title.text for name, one in figures.lines.items()},
+        draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
+    )
+
+
+def _spec(opened: Opened, figures: Figures, embedded: bool) -> str:
+    """Return what page.js needs beside the page."""
+    left, right, bottom, top = figures.extent
+    return json.dumps(
+        {
+            "embedded": embedded,
+            "most_uploaded": MOST_UPLOADED,
+            "stops": {row.path: row.stops for row in opened.controls.rows.values()},
+            "images": list(figures.images),
+            "figures": list(figures.all),
+            "extent": figures.extent,
+            "shape": (top - bottom) / (right - left),
+        }
+    )
+
+
+def _celsius(kelvins: float, uncertainty: float = 0.0) -> str:
+    """Return a temperature, to two digits of its uncertainty if that is known."""
+    if isfinite(kelvins) and uncertainty > 0:
+        return f"{uncertain_text(kelvins - KELVIN, uncertainty)} °C"
     return quantity_text(kelvins - KELVIN if isfinite(kelvins) else None, "°C", 1)
 
 
@@ -377,11 +391,7 @@ def _kelvins(kelvins: float) -> str:
     return quantity_text(kelvins if isfinite(kelvins) else None, "K", 1, "+")
 
 
-def _chip(scene: Scene) -> str:
-    """Return a picture of the whole chip as the address of a PNG; empty without one."""
-    if scene.overview is None:
-        return ""
-    file = BytesIO()
-    with style():
-        draw_chip(scene.overview, scene.raster, scene.tool).savefig(file, dpi=110)
-    return data_url(file.getvalue())
+_TEMPLATES: Final = Environment(
+    loader=PackageLoader("chipglow.app"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+)
+_TEMPLATES.filters |= {"celsius": _celsius, "kelvins": _kelvins, "rounded": rounded_text}

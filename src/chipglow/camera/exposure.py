@@ -148,19 +148,23 @@ def frame_weights(
     end = start + duration
     if not (start >= times[0] - rounding and end <= ends[-1] + rounding):
         raise ValueError(
-            f"exposure: {start:.9g} s to {end:.9g} s is not within the scene, which lasts from "
-            f"{times[0]:.9g} s to {ends[-1]:.9g} s"
+            f"exposure: {_microseconds(start, end)} is not within the scene, which lasts from "
+            f"{_microseconds(times[0], ends[-1])}"
         )
     for gap in np.flatnonzero(before_gap):
         if start < times[gap + 1] - rounding and end > ends[gap] + rounding:
             raise ValueError(
-                f"exposure: {start:.9g} s to {end:.9g} s reaches into a gap of the scene, which "
-                f"has no frame from {ends[gap]:.9g} s to {times[gap + 1]:.9g} s"
+                f"exposure: {_microseconds(start, end)} reaches into a gap of the scene, which "
+                f"has no frame from {_microseconds(ends[gap], times[gap + 1])}"
             )
     shared = np.minimum(ends, end) - np.maximum(times, start)
     covered = np.flatnonzero(shared > rounding)
     weights = shared[covered]
     return range(int(covered[0]), int(covered[-1]) + 1), weights / weights.sum()
+
+
+def _microseconds(begin: float, end: float) -> str:
+    return f"{1e6 * begin:.6g} us to {1e6 * end:.6g} us"
 
 
 def _row_weights(

@@ -35,13 +35,15 @@ def sensor_raster(
     rows, columns = (int(length / pitch + _ROUNDING) for length in room)
     if min(offset) < 0 or min(rows, columns) < 1:
         raise ValueError(
-            f"camera: pitch of {pitch:g} m at an offset of {offset[0]:g}, {offset[1]:g} m does not "
-            f"fit the scene of {right - left:g} x {top - bottom:g} m"
+            f"camera: pitch of {1e6 * pitch:g} um at an offset of {1e6 * offset[0]:g}, "
+            f"{1e6 * offset[1]:g} um does not fit the scene of {1e6 * (right - left):g} x "
+            f"{1e6 * (top - bottom):g} um"
         )
     if shape is not None and (shape[0] > rows or shape[1] > columns):
         raise ValueError(
             f"camera: shape is {shape[0]} x {shape[1]} pixels, but only {rows} x {columns} of "
-            f"{pitch:g} m fit the scene of {right - left:g} x {top - bottom:g} m"
+            f"{1e6 * pitch:g} um fit the scene of {1e6 * (right - left):g} x "
+            f"{1e6 * (top - bottom):g} um"
         )
     rows, columns = shape or (rows, columns)
     return Raster(left + offset[0], top - offset[1], pitch, rows, columns)

@@ -1,9 +1,4 @@
-"""The image of a surface in Pyxel 3, and its counts, for `camera_pass.py`.
-
-The models of Pyxel one after the other, without its runner. Pyxel has no samples finer than its
-elements: for an image the point spread function is laid on an array of samples, and the means over
-the pixels are NumPy's; for counts it is laid on the elements.
-"""
+"""Counts of a surface by the models of Pyxel 3, without its runner, for `camera_pass.py`."""
 
 from pyxel.detectors import CMOS, Characteristics, CMOSGeometry, Environment
 from pyxel.models.charge_collection import simple_collection
@@ -14,17 +9,6 @@ from pyxel.models.photon_collection.point_spread_function import apply_psf_2d
 from pyxel.models.readout_electronics import simple_adc
 
 VOLTS = 1e-6  # an electron's
-
-
-def prepared(kernel, _fwhm, _spacing, group):
-    """What forms an image: radiance of squares to that of `group` times larger ones."""
-
-    def form(radiance):
-        rows, columns = (count // group for count in radiance.shape)
-        blurred = apply_psf_2d(radiance, kernel)
-        return blurred.reshape(rows, group, columns, group).mean(axis=(1, 3))
-
-    return form
 
 
 def prepared_detector(detector, per_radiance, kernel):
