@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import av
 import numpy as np
@@ -25,12 +26,19 @@ from matplotlib.colors import hsv_to_rgb
 from PIL import Image
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
+from chipglow.io.sources.movie import FieldMovie, MovieSource
 from chipglow.scene import Raster
 
 COLDEST, HOTTEST = 293.0, 1400.0
 SHAPE = (300, 360)
 PIXEL = 1e-6
+
+
+class NamedMap(NamedTuple):
+    """A colour map, and the number of its bands; 0 for one without steps."""
+
+    name: str
+    bands: int = 0
 
 
 @dataclass(frozen=True)
@@ -191,8 +199,8 @@ def read_with_map(
 ) -> Reading:
     """Draw, encode and read a movie whose colour map is given."""
     encode(path, (drawn(known_field(n, shape), colours) for n in range(count)), codec)
-    movie = FieldMovie(path, (COLDEST, HOTTEST), colours)
-    return read_back(MovieSource({"temperature": movie}, PIXEL, (0, shape[0])), shape)
+    movie = FieldMovie(str(path), COLDEST, HOTTEST, *colours)
+    return read_back(MovieSource(movie, pixel=PIXEL, origin=(0, shape[0])), shape)
 
 
 def read_with_legend(
@@ -200,10 +208,14 @@ def read_with_legend(
 ) -> Reading:
     """Draw, encode and read a movie whose legend has to be found; SourceError if it is refused."""
     encode(path, (with_legend(number, colours, edges) for number in range(count)), codec)
-    movies = {"temperature": FieldMovie(path, (COLDEST, HOTTEST))}
     rows, columns = FIELD_SHAPE
-    crop = (0, 0, columns, rows)
-    source = MovieSource(movies, PIXEL, (0.0, rows), crop=crop, frame_interval=1e-6)
+    source = MovieSource(
+        FieldMovie(str(path), COLDEST, HOTTEST),
+        pixel=PIXEL,
+        origin=(0.0, rows),
+        crop=(0, 0, columns, rows),
+        interval=1e-6,
+    )
     return read_back(source, FIELD_SHAPE)
 
 

@@ -146,14 +146,3 @@ def test_drift_is_the_change_of_the_mean_from_half_to_half():
         time, cutting, np.full(100, 1e5), np.full(100, 4e-4), none, overview=None
     )
     assert experiments.drift(history) == pytest.approx(0.1, rel=1e-12)
-
-
-def test_a_coarse_cut_has_means():
-    simulation = experiment().simulation(40e-6, 0.3e-3)
-    means = experiments.compute(simulation)
-    # Work over cut volume of any steel of this strength; a chip thicker than the feed.
-    assert 0.15e6 < means.cutting_force < 1e6
-    assert 0 < means.thrust_force < means.cutting_force
-    assert 0.15e-3 < means.thickness < 0.6e-3
-    assert 0 < means.contact < 0.6e-3
-    assert abs(means.unaccounted) < 0.1

@@ -1,5 +1,7 @@
 """The command import: its description, what it says, what it writes, what it refuses."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from chipglow.io import (
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import MovieSource, NamedMap
+from chipglow.io.sources.movie import MovieSource
 from chipglow.scene import Material, ToolGeometry
 from chipglow.text import DescriptionError
 
@@ -161,11 +163,11 @@ def test_movies_are_described_field_by_field(tmp_path):
     )
     source = description.build().source.source
     assert isinstance(source, MovieSource)
-    assert source.metre_per_pixel == pytest.approx(2e-6)
-    assert source.movies["temperature"].values == pytest.approx((293.15, 1400.15))
-    assert source.movies["temperature"].colours == NamedMap("jet")
-    assert source.movies["plastic_strain"].colours == (600, 40, 620, 400)
-    assert source.movies["plastic_strain"].path.name == "e.avi"
+    assert source._sides == pytest.approx((2e-6, 2e-6))
+    assert source.temperature.ends("temperature") == pytest.approx((293.15, 1400.15))
+    assert source.temperature.colours == "jet"
+    assert source.plastic_strain.legend == (600, 40, 620, 400)
+    assert Path(source.plastic_strain.file).name == "e.avi"
 
 
 def test_the_kind_is_told_by_the_name():
@@ -188,7 +190,7 @@ def test_a_movie_needs_no_source_beside_its_section(tmp_path):
         "movie: {temperature: {file: disc.avi, first: 80 degC, last: 600 degC}, pixel: 1 mm}\n"
     )
     source = load_import(path).build().source.source
-    assert source.inputs == (str(tmp_path / "disc.avi"),)
+    assert source.files == str(tmp_path / "disc.avi")
 
 
 def test_the_description_that_init_writes_says_every_field_and_is_read_back(arrays, tmp_path):
@@ -199,7 +201,7 @@ def test_the_description_that_init_writes_says_every_field_and_is_read_back(arra
     assert "# Units of the source" in path.read_text()
     assert "# What the source is" in path.read_text()
     path.write_text(path.read_text().replace("source: none", "source: cut.npz", 1))
-    assert load_import(path).file == str(arrays)
+    assert load_import(path).source == str(arrays)
 
 
 def test_a_table_with_names_is_points_and_one_without_a_grid(tmp_path):

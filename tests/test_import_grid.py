@@ -623,7 +623,6 @@ def test_coordinates_that_go_wrong(tmp_path):
     [
         ({"spacing": 0.0}, "spacing"),
         ({"row_spacing": 0.0}, "row_spacing"),
-        ({"interval": float("nan")}, "interval"),
         ({"axes": ("time", "x")}, "axes"),
         ({"files": {"heat": "T.npy"}}, "unknown field 'heat'"),
         ({"top": float("inf")}, "top"),

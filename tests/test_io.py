@@ -25,13 +25,11 @@ from chipglow.io import (
     write_measurement,
     write_scene,
 )
-from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Frame, Raster, SceneError, ToolGeometry
 from chipglow.scene.scene import raster_coordinates
 
 RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27)
 RELATIVE = {
-    "temperature": 2.0**-19,
     "material_x": 2.0**-18,
     "material_y": 2.0**-18,
     "plastic_strain": 2.0**-14,
@@ -108,7 +106,7 @@ def test_a_scalar_in_degrees_is_not_rounded_to_steps(tmp_path):
     share = 273.15 + np.linspace(0.0, 0.4402, RASTER.rows * RASTER.columns).reshape(RASTER.shape)
     write_frame(tmp_path / "scene.nc", a_frame(temperature=share.astype(np.float32)))
     found = open_scene(tmp_path / "scene.nc").celsius()
-    np.testing.assert_allclose(found, share - 273.15, atol=6e-4)
+    np.testing.assert_allclose(found, share - 273.15, atol=2e-5)
 
 
 def test_a_scene_packed_by_the_conventions_is_read(tmp_path):
@@ -187,23 +185,6 @@ def test_write_scene_keeps_all(tmp_path):
         for name in (*FIELD_UNITS, "material_x", "material_y"):
             # What was rounded once stays as it is.
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-
-
-def test_a_pixel_keeps_its_radiance_temperature(tmp_path):
-    band, count = Band(3.8e-6, 5.1e-6), 20
-    with SceneWriter(tmp_path / "scene.nc", RASTER) as writer:
-        for index in range(count):
-            writer.append(a_frame(index * 0.2e-6, seed=index))
-    scene = open_scene(tmp_path / "scene.nc")
-
-    def pixels(frames):
-        radiance = np.mean([band.radiance(frame.temperature) for frame in frames], axis=0)
-        return band.temperature(radiance.reshape(2, 9, 3, 9).mean(axis=(1, 3)))
-
-    found = pixels(scene.frames())
-    expected = pixels(a_frame(index * 0.2e-6, seed=index) for index in range(count))
-    # The roundings, up to 2 mK each, average over the 1620 samples of a pixel.
-    np.testing.assert_allclose(found, expected, rtol=0, atol=0.6e-3)
 
 
 def test_scene_by_xarray_is_read_too(tmp_path):
@@ -434,7 +415,7 @@ def test_a_hot_scene_comes_back_and_survives_a_copy(tmp_path):
     one = open_scene(tmp_path / "one.nc")
     assert_as_kept(one.frame(0), frame)
     # As read by xarray, which does not know the fast way.
-    np.testing.assert_allclose(one.data["temperature"][0], hot, rtol=2.0**-19)
+    np.testing.assert_array_equal(one.data["temperature"][0], hot)
     write_scene(one, tmp_path / "two.nc")
     two = open_scene(tmp_path / "two.nc").frame(0)
     np.testing.assert_array_equal(two.temperature, one.frame(0).temperature)

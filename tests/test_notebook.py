@@ -8,7 +8,6 @@ import pytest
 from matplotlib import pyplot as plt
 
 from chipglow.camera import Camera, Flag, Measurement
-from chipglow.io import open_scene, write_scene
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene, ToolGeometry
 from chipglow.surface import UniformSurface
@@ -67,24 +66,11 @@ def test_a_measurement_in_a_line():
     assert cold.notes.warnings == []
 
 
-def test_the_length_is_the_number_of_frames():
-    assert (len(scene()), len(scene(1)), len(measurement())) == (3, 1, 2)
-
-
 def test_degrees_celsius_of_a_frame():
     np.testing.assert_allclose(scene().celsius(-1)[7], 302.0 + RASTER.x * 1e6, atol=1e-4)
     # The band's table and its inverse: under 1 mK.
     np.testing.assert_allclose(measurement().celsius(), [[426.85, 527.0, np.nan]], atol=1e-3)
     np.testing.assert_allclose(measurement().celsius(1), [[427.85, 527.85, 628.0]], atol=1e-3)
-
-
-def test_a_scene_in_a_file_shows_the_same(tmp_path):
-    made = scene()
-    write_scene(made, tmp_path / "scene.nc")
-    stored = open_scene(tmp_path / "scene.nc")
-    assert repr(stored) == repr(made)
-    # Temperature is stored in steps of 25 mK.
-    np.testing.assert_allclose(stored.celsius(1), made.celsius(1), atol=0.0126)
 
 
 @pytest.mark.parametrize(

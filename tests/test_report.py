@@ -15,14 +15,12 @@ import xarray as xr
 from PIL import Image
 
 from chipglow.analysis import Distribution, one_draw, with_errors
-from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
-from chipglow.scene import Line
 from chipglow.study import Study
 
 TITLE = "My <i>own</i> study"
@@ -128,10 +126,10 @@ def test_every_figure_is_there_as_picture_and_as_drawing(folder):
 
 def test_the_page_stands_alone_and_escapes_text(page, result, facts):
     assert page.open == []
-    assert all(s.startswith(("data:image/png;base64,", "#")) for s in page.sources)
+    inside = ("data:image/png;base64,", "#", "study.yaml")
+    assert all(source.startswith(inside) for source in page.sources)
     assert page.seen.count("script") == 1 and not {"b", "i", "link"} & set(page.seen)
     shown = "".join(page.text)
-    assert STUDY in shown
     for value in (*PROVENANCE.values(), *REMARKS, *sentences_of(facts)):
         assert value in shown
     rows = all_rows(facts)
@@ -154,13 +152,14 @@ def sentences_of(facts):
 
 
 def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, facts):
-    assert page.sections == ["answer", "causes", "comparison", "tables", "repeat"]
+    assert page.sections == ["answer", "causes", "details", "comparison", "tables", "repeat"]
+    assert page.seen.count("details") == 4  # all but the answer and its causes is folded
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2
     sentences = sentences_of(facts)
     assert len(sentences) == 4
     assert "steady" not in shown.lower()
-    later = (REMARKS[0], "Causes of the errors\n", "Figure 2:", "Table 1:", STUDY)
+    later = (REMARKS[0], "would reduce it", "Figure 2:", "Table 1:", "study.yaml")
     places = [shown.index(text) for text in (TITLE, *sentences, *later)]
     assert places == sorted(places)
 
@@ -238,19 +237,6 @@ def test_the_parts_of_an_error_are_all_of_it(result, facts):
     assert set(rows["band_worst_error_degC"].parts) == {"psf", "rest"}
     mean = Facts(replace(result, plan=replace(result.plan, reference="mean")))
     assert all("motion" not in row.parts for row in all_rows(mean)["errors"])
-
-
-def test_inertia_that_is_too_much_is_said(result):
-    def rows(fraction):
-        inert = Inertia(kinetic_fraction=fraction, force_fraction=0.004, mass_scaling=300.0)
-        forces = replace(result.cut.forces, inertia=inert)
-        return {row.key: row for row in result_rows(of_cut(result, forces=forces))}
-
-    assert rows(0.02)["kinetic_fraction_percent"].cells["mean"] == "2.00 %"
-    assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_fraction_percent"].explanation
-    assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
-    assert rows(0.009)["inertia_force_fraction_percent"].cells["mean"] == "0.40 %"
-    assert "1/300 of this" in rows(0.009)["inertia_force_fraction_percent"].explanation
 
 
 def test_the_answer_states_interval_and_whether_the_paper_differs(facts):
@@ -399,18 +385,6 @@ def test_the_comparison_holds_what_the_paper_states(result):
     error = frame.loc["rake_error_degC"]
     assert (error["least"], error["greatest"]) == draws.range
     assert error["standard_deviation"] == draws.standard_deviation
-
-
-def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
-    whole = result.cut.band
-    ridge = Line(whole.ridge.distance[20:], whole.ridge.points[20:])
-    values = {name: getattr(whole, name)[20:] for name in ("normals", "rate", "widths")}
-    segment = replace(result.cut.segments[0], band=replace(whole, ridge=ridge, **values))
-    shorter = of_cut(result, segments=(segment,))
-    row = next(r for r in result_rows(shorter) if r.key == "band_length_um")
-    begins = whole.ridge.distance[20]
-    assert row.here == pytest.approx(1e6 * (whole.ridge.distance[-1] - begins))
-    assert f"begins {1e6 * begins:.0f} µm from the cutting edge" in row.explanation
 
 
 def test_numbers_are_printed_with_sign_unit_and_dash():

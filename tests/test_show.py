@@ -159,11 +159,6 @@ def test_the_command_prints_flags_tool_forces_and_provenance(tmp_path, monkeypat
     assert "interval" not in text
 
 
-def test_uneven_times_are_said(tmp_path):
-    write_scene(a_scene(times=[0.0, 1e-6, 3e-6]), tmp_path / "scene.nc")
-    assert "1 µs to 2 µs" in show(tmp_path / "scene.nc")[1]
-
-
 def test_the_command_draws(path):
     code, text = show("scene.nc", "--plot", "scene.png")
     assert code == 0, text

@@ -1,4 +1,3 @@
-import os
 import threading
 from dataclasses import FrozenInstanceError, replace
 from math import isfinite, radians
@@ -11,9 +10,9 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from chipglow.analysis import Plan
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
-from chipglow.cutting import CuttingConditions, CuttingSimulation, Friction, Numerics, OutputWindow
+from chipglow.cutting import CuttingConditions, Friction, Numerics, OutputWindow
 from chipglow.io import atomic_path, open_scene, read_tool_outline
-from chipglow.quantities import Part, own_settings, units
+from chipglow.quantities import units
 from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Raster, Scene, ToolGeometry
 from chipglow.study import (
     Study,
@@ -98,13 +97,6 @@ def test_a_quantity_is_read_back_from_its_text_as_the_same_float(kind, value, ne
     assert kind.parse(kind.text(value)) == value
 
 
-@given(st.lists(st.floats(min_value=1e-8, max_value=1e-3), min_size=2, max_size=2, unique=True))
-def test_a_range_is_read_back_from_its_text_as_the_same_floats(limits):
-    band = units.WAVELENGTHS
-    pair = tuple(sorted(limits))
-    assert band.parse_range(band.range_text(pair)) == pair
-
-
 @given(
     st.text()
     | st.from_regex(r"[-+]?[0-9.e]{1,8} ?[a-zA-Z/*^ .0-9°µ]{0,9}", fullmatch=True)
@@ -134,14 +126,6 @@ def test_the_default_study_has_the_librarys_defaults():
     assert list(chips.values()) == [CHIP_1, CHIP_2]
 
 
-def test_the_default_view_holds_more_than_the_papers_90_by_100_sensors():
-    study = Study()
-    raster = study.cutting.field_of_view.build()
-    assert study.camera.build().pixels(raster).shape == (130, 115)
-    frames = study.cutting.duration / study.cutting.window.interval
-    assert round(frames) == 455
-
-
 @pytest.mark.parametrize(("study", "samples"), [(Study(), 9), (Study.quick(), 4)])
 def test_a_whole_number_of_samples_makes_a_pixel_of_the_default_grids(study, samples):
     raster, pitch = study.cutting.field_of_view.build(), study.camera.pitch
@@ -150,36 +134,11 @@ def test_a_whole_number_of_samples_makes_a_pixel_of_the_default_grids(study, sam
     assert [n % samples for n in raster.shape] == [0, 0]
 
 
-def test_an_exposure_of_the_quick_study_has_ten_sub_frames_or_more():
-    study = Study.quick()
-    assert study.camera.integration_time / study.cutting.window.interval >= 10
-    view, full = study.cutting.field_of_view.build(), Study().cutting.field_of_view.build()
-    # The quick view is the full one but for the rounding of sums of floats.
-    np.testing.assert_allclose(view.extent, full.extent, atol=1e-15)
-
-
 @pytest.mark.parametrize("study", [Study(), Study.quick()], ids=["paper", "quick"])
 def test_the_template_is_read_back_as_the_same_study(study, tmp_path):
     path = tmp_path / "study.yaml"
     path.write_text(study_text(study), encoding="utf-8")
     assert load_study(path) == study
-
-
-def fields_of(section):
-    for one in own_settings(section):
-        yield one.name
-        values = one.value.values() if isinstance(one.value, dict) else [one.value]
-        for part in values:
-            if isinstance(part, Part):
-                yield from fields_of(part)
-
-
-def test_every_field_is_in_the_template_after_a_comment():
-    lines = [line.strip() for line in study_text(Study()).splitlines()]
-    for name in fields_of(Study()):
-        places = [i for i, line in enumerate(lines) if line.startswith(f"{name}:")]
-        assert places, name
-        assert all(lines[i - 1].startswith("#") for i in places), name
 
 
 def load(text, folder):
@@ -192,20 +151,15 @@ REFUSED = [
     ("sede: 3", "unknown key 'sede', did you mean 'seed'?"),
     ("camera: {zoom: 3}", "camera: unknown key 'zoom', expected one of preset, band, response"),
     ("cutting: {feed: 0.3}", "cutting.feed: 0.3 has no unit, expected a length such as 0.3 mm"),
-    ("cutting: {feed: -0.3 mm}", "cutting.feed: -0.3 mm is not over 0, expected a length"),
-    ("cutting: {feed: 0.3 s}", "cutting.feed: '0.3 s' is not a length"),
     ("cutting: {initial_temperature: -280 degC}", "initial_temperature: -280 degC is not over 0 K"),
     (
         "cutting: {tool: {temperature: 1300 degC}}",
         "1300 degC, expected -73.15 degC to 1226.85 degC",
     ),
-    ("cutting: {tool: {temperature: hot}}", "tool.temperature: 'hot' is not a temperature"),
     ("cutting: {tool: {rake_angle: 80 deg}}", "80 deg, expected over -60 deg, under 60 deg"),
     ("cutting: {tool: {material: cheese}}", "'cheese' is unknown, expected one of carbide"),
     ("cutting: {workpiece: cheese}", "workpiece: 'cheese' is unknown, expected one of aisi-1045"),
     ("cutting: {numerics: {cell: 1 m}}", "1000000 um, expected 0.5 um to 43.75 um"),
-    ("cutting: {field_of_view: {rows: 8.5}}", "field_of_view.rows: 8.5, expected a valid integer"),
-    ("cutting: {field_of_view: {rows: 0}}", "expected 1 or more"),
     ("cutting: {window: {end: 3 mm}}", "window.end: 3 mm is beyond cutting_length, expected up to"),
     (
         "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
@@ -217,14 +171,12 @@ REFUSED = [
     ),
     ("cutting: 3", "cutting: 3 is no section, expected keys of speed"),
     ("camera: {band: 5.1-3.8 um}", "camera.band: 5.1-3.8 um is reversed"),
-    ("camera: {band: 3.8-5.1}", "camera.band: 3.8-5.1 has no unit"),
     (
         "{camera: {integration_time: 200 us}, cutting: {window: {start: 1.579 mm, end: 1.958 mm}}}",
         "camera.integration_time: 200 us is longer than the scene, expected up to the 90.96 us",
     ),
     ("camera: {pitch: 2 mm}", "2000 um is larger than the field of view, expected up to the 690"),
     ("camera: {fill_factor: yes}", "camera.fill_factor: True, expected a valid number"),
-    ("camera: {fill_factor: .nan}", "camera.fill_factor: nan, expected a finite number"),
     (
         "camera: {psf: {kind: lens}}",
         "kind: 'lens', expected one of annular-aperture, gaussian, airy",
@@ -237,10 +189,8 @@ REFUSED = [
         "surface: {chips: {a: chip-3}}",
         "surface.chips.a: 'chip-3' is unknown, expected one of chip-1",
     ),
-    ("surface: {tool: {mean: 1.2}}", "surface.tool.mean: 1.2, expected 0 to 1"),
     ("surface: {chips: {a: chip-1}}", "analysis.rake_chip: 'chip 2' is unknown, expected one of a"),
     ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0: 4 has no unit"),
-    ("seed: -1", "seed: -1, expected 0 or more"),
     (
         "cutting: {tool: {chamfer: {width: 10 um, angle: 20 deg}}}",
         "chamfer width: expected over 17.53 um",
@@ -440,15 +390,6 @@ def test_another_solver_is_another_scene(cache, runs, monkeypatch):
     assert cut(small_study()) != first
 
 
-def test_a_damaged_scene_in_the_cache_is_computed_anew(cache, runs):
-    path = cut(small_study())
-    os.truncate(path, path.stat().st_size // 2)
-    assert not is_cut(small_study())
-    assert cut(small_study()) == path
-    assert is_cut(small_study())
-    assert len(runs) == 2
-
-
 def test_the_cache_is_listed_and_cleared(cache, runs):
     assert cached_scenes() == []
     assert clear_cache() == 0
@@ -472,16 +413,6 @@ def test_what_ended_runs_left_is_cleared_and_what_runs_stays(cache):
         assert clear_cache() == 20
         assert list(cache.iterdir()) == [running]
     assert clear_cache() == 10
-
-
-def test_a_failed_cut_leaves_nothing_in_the_cache(cache, monkeypatch):
-    def fail(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(CuttingSimulation, "run", fail)
-    with pytest.raises(OSError, match="No space left"):
-        cut(small_study())
-    assert list(cache.iterdir()) == []
 
 
 def test_runs_at_the_same_time_leave_one_whole_scene(cache, runs):

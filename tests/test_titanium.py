@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import pytest
 import titanium
-import yaml
-from hypothesis import given, strategies as st
 from titanium import Condition, Cut, Trial
 
 SLOW, FAST = 60 / 60, 120 / 60
@@ -41,35 +39,6 @@ def test_the_data_are_those_of_the_source():
     assert (read.wear, read.status) == ("M", "short")
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"status": "error"}, "status 'error', expected one of ok, short"),
-        ({"thickness": "0 um"}, "0 um is not over 0"),
-    ],
-)
-def test_a_bad_entry_is_named(tmp_path, change, message):
-    data = yaml.safe_load(titanium.DATA.read_text(encoding="utf-8"))
-    data["tests"][0] |= change
-    path = tmp_path / "tests.yaml"
-    path.write_text(yaml.safe_dump(data), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"^tests\.yaml: V0025: " + message):
-        titanium.read_trials(path)
-
-
-def test_repeats_are_of_the_same_speed_and_feed():
-    trials = [
-        trial(name="a", feed=COARSE),
-        trial(name="b", speed=FAST),
-        trial(name="c"),
-        trial(name="d", feed=COARSE, cutting_force=140.0),
-    ]
-    found = titanium.repeats(trials)
-    assert list(found) == [(SLOW, FINE), (FAST, FINE), (SLOW, COARSE)]
-    assert [one.name for one in found[Condition(SLOW, COARSE)]] == ["a", "d"]
-    assert titanium.mean(found[Condition(SLOW, COARSE)]).cutting_force == 120.0
-
-
 def test_a_mean_is_over_the_tests_and_a_spread_needs_two():
     trials = [trial(), trial(cutting_force=110.0, feed_force=80.0, thickness=160e-6)]
     assert titanium.mean(trials) == pytest.approx((105.0, 70.0, 140e-6))
@@ -96,15 +65,3 @@ def test_ratios_by_hand():
             "Fc(120 m/min) / Fc(60 m/min) at 0.1 mm": 0.9,
         }
     )
-
-
-@given(
-    width=st.floats(1e-4, 1e-2),
-    forces=st.lists(st.floats(1e4, 1e6), min_size=4, max_size=4),
-)
-def test_no_ratio_depends_on_the_width_of_cut(width, forces):
-    places = [Condition(speed, feed) for speed in (SLOW, FAST) for feed in (FINE, COARSE)]
-    narrow = {at: Cut(f, 0.5 * f, at.feed) for at, f in zip(places, forces, strict=True)}
-    wide = {at: Cut(width * f, width * t, h) for at, (f, t, h) in narrow.items()}
-    assert titanium.ratios(wide) == pytest.approx(titanium.ratios(narrow), rel=1e-12)
-    assert len(titanium.ratios(narrow)) == 4 + 4 + 2 + 2

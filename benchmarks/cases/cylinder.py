@@ -114,14 +114,12 @@ def thick_cylinder(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
             bore = np.sqrt(INNER**2 + result.swept) / MICRO
             left.plot(result.time / MICRO, bore, color=colour, label=f"cell {cell / MICRO:.1f} µm")
         left.plot(times / MICRO, inner / MICRO, "k--", linewidth=0.9, label="rigid-plastic")
-        left.set_xlabel("time / µs")
-        left.set_ylabel("inner radius / µm")
+        left.set(xlabel="time / µs", ylabel="inner radius / µm")
         left.legend(loc="lower right")
         middle.plot(finest.radius / MICRO, finest.strain, ".", color=BLUE, markersize=1.5)
         rank = np.argsort(finest.radius)
         middle.plot(finest.radius[rank] / MICRO, finest.exact_strain[rank], "k--", linewidth=0.9)
-        middle.set_xlabel("radius / µm")
-        middle.set_ylabel("plastic strain")
+        middle.set(xlabel="radius / µm", ylabel="plastic strain")
         convergence(right, cells, [np.array(growth) * 100], [None], [BLUE])
         right.set_ylabel("error of the growth / %")
 

@@ -103,10 +103,12 @@ def bent(cells=(10e-6, 5e-6)):
         )
         shown = left.scatter(x / MICRO, y / MICRO, 2, p["temperature"], cmap="viridis")
         figure.colorbar(shown, ax=left, label="temperature / K", shrink=0.7)
-        left.set_aspect("equal")
-        left.set_title(f"displacements drawn {EXAGGERATED} times")
-        left.set_xlabel("x / µm")
-        left.set_ylabel("y / µm")
+        left.set(
+            aspect="equal",
+            title=f"displacements drawn {EXAGGERATED} times",
+            xlabel="x / µm",
+            ylabel="y / µm",
+        )
         for block, colour in zip(blocks, (VERMILLION, BLUE), strict=True):
             inside = np.abs(places(block)[0]) < 0.3 * LENGTH
             height = block.points["material_y"][inside] / MICRO
@@ -115,8 +117,7 @@ def bent(cells=(10e-6, 5e-6)):
         fine = np.array([0.0, HEIGHT])
         exact = -ACROSS * (fine / HEIGHT - 0.5)
         right.plot(fine / MICRO, exact / 1e6, color=GREY, linewidth=0.9, label="exact")
-        right.set_xlabel("height / µm")
-        right.set_ylabel("stress across the plane / MPa")
+        right.set(xlabel="height / µm", ylabel="stress across the plane / MPa")
         right.legend()
 
     checks = (

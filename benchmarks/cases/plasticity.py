@@ -89,16 +89,14 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
             axes.plot(shear, values, ".", color=BLUE, label="solver")
             axes.plot(total * sqrt(3), exact, "k--", linewidth=0.9, label="integral")
             axes.set_xlabel("shear")
-        left.set_ylabel("shear stress / MPa")
-        left.set_ylim(0)
+        left.set(ylabel="shear stress / MPa", ylim=(0, None))
         left.legend()
         middle.set_ylabel("temperature / K")
         right.loglog(np.array(steps) * 1e3, errors, "o-", color=BLUE, markersize=4)
         slope = errors[0] * np.array(steps) / steps[0]
         right.loglog(np.array(steps) * 1e3, slope, ":", color=GREY, label="first order")
         right.axhline(lower_limit, color=GREEN, linewidth=0.9, label="whole kelvins")
-        right.set_xlabel("shear in a step / 10⁻³")
-        right.set_ylabel("error of the temperature / K")
+        right.set(xlabel="shear in a step / 10⁻³", ylabel="error of the temperature / K")
         right.set_xticks(np.array(steps) * 1e3, [f"{step * 1e3:g}" for step in steps])
         right.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
         right.minorticks_off()
@@ -157,8 +155,7 @@ def friction(coefficients=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)):
             least = np.minimum(fine * forces[0, 0], limit if forces is soft_forces else np.inf)
             axes.plot(fine, least / 1e3, "--", color="black", linewidth=0.9)
         axes.plot([], "--", color="black", linewidth=0.9, label="min(μ F, area · σ/√3)")
-        axes.set_xlabel("coefficient of friction μ")
-        axes.set_ylabel("tangential force / (N/mm)")
+        axes.set(xlabel="coefficient of friction μ", ylabel="tangential force / (N/mm)")
         axes.legend()
 
     checks = (

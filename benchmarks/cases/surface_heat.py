@@ -82,9 +82,7 @@ def surface_flux():
         left.plot(fine / MICRO, exact_rise(fine, DURATION), "k--", linewidth=0.9, label="exact")
         depth, rise, _ = shown[0]
         left.plot(depth / MICRO, rise, ".", color=BLUE, label="cell 20 µm")
-        left.set_xlim(0, 150)
-        left.set_xlabel("depth / µm")
-        left.set_ylabel("rise / K")
+        left.set(xlim=(0, 150), xlabel="depth / µm", ylabel="rise / K")
         left.legend()
         labels = ["all points", "surface's row"]
         convergence(right, CELLS, [mean, worst], labels, [BLUE, VERMILLION])
@@ -149,8 +147,10 @@ def moving_source():
         left.plot(fine / MICRO, rises, "k--", linewidth=0.9, label="Jaeger")
         left.plot(results[1][0] / MICRO, results[1][1], ".", color=GREEN, label="cell 10 µm")
         left.axvspan(-HALF_WIDTH / MICRO, HALF_WIDTH / MICRO, color="0.93", zorder=0)
-        left.set_xlabel("place from the middle of the source / µm")
-        left.set_ylabel("rise of the surface's row / K")
+        left.set(
+            xlabel="place from the middle of the source / µm",
+            ylabel="rise of the surface's row / K",
+        )
         left.legend()
         convergence(right, CELLS, [errors], [None], [GREEN])
         right.set_ylabel("mean error / highest rise")

@@ -183,10 +183,12 @@ def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
         for shape, cell, colour in zip(shapes, cells, (VERMILLION, GREEN, BLUE), strict=True):
             left.plot(*(shape.side / MILLI).T, color=colour, label=f"cell {cell / MILLI:.2f} mm")
         left.plot(*(known.side / MILLI).T, "k--", linewidth=0.9, label="finite elements")
-        left.set_xlim(0, 12)
-        left.set_ylim(3)
-        left.set_xlabel("distance from the foot / mm")
-        left.set_ylabel("half width / mm")
+        left.set(
+            xlim=(0, 12),
+            ylim=(3, None),
+            xlabel="distance from the foot / mm",
+            ylabel="half width / mm",
+        )
         left.legend()
         names = ("shortening", "width of the foot", "profile, mean")
         for line, name, colour in zip(errors, names, (BLUE, VERMILLION, GREEN), strict=True):
@@ -195,8 +197,7 @@ def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
             )
         slope = 1.2 * np.max(errors) * np.array(cells) / cells[0]
         right.loglog(np.array(cells) / MILLI, slope, ":", color=GREY, label="first order")
-        right.set_xlabel("cell / mm")
-        right.set_ylabel("difference / %")
+        right.set(xlabel="cell / mm", ylabel="difference / %")
         right.set_xticks(np.array(cells) / MILLI, [f"{cell / MILLI:.2f}" for cell in cells])
         right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         right.yaxis.set_major_formatter(FormatStrFormatter("%g"))
@@ -255,6 +256,5 @@ def picture(axes, block, known):
     along, half = (known.side / MILLI).T
     outline = np.concatenate([along, along[::-1]]), np.concatenate([half, -half[::-1]])
     axes.plot(*outline, "--", color=VERMILLION, linewidth=1.0)
-    axes.set_aspect("equal")
-    axes.set_ylabel("y / mm")
+    axes.set(aspect="equal", ylabel="y / mm")
     axes.figure.colorbar(shown, ax=axes, label="plastic strain")

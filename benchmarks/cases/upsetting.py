@@ -66,9 +66,7 @@ def rough_plates(cells=(25e-6, 20e-6, 12.5e-6, 10e-6)):
         ):
             left.plot(way / MICRO, pressures, color=colour, label=f"cell {cell / MICRO:g} µm")
         left.axhline(PRANDTL, color="black", linestyle="--", linewidth=0.9, label="Prandtl")
-        left.set_ylim(0, 2.4)
-        left.set_xlabel("way of the plate / µm")
-        left.set_ylabel("mean pressure / 2k")
+        left.set(ylim=(0, 2.4), xlabel="way of the plate / µm", ylabel="mean pressure / 2k")
         left.legend()
         fine = np.linspace(0, cells[0], 2)
         right.plot(

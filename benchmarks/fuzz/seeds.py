@@ -20,10 +20,10 @@ from vtkmodules.vtkIOParallel import vtkEnSightWriter
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
+from chipglow.io.sources.movie import FieldMovie, MovieSource
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from movies import CODECS, GIF, drawn, encode, known_field
+from movies import CODECS, GIF, NamedMap, drawn, encode, known_field
 
 GRIDS = (
     "grid.h5", "five.mat", "grid.npy", "grid.npz", "four.nc", "three.nc", "grid.csv", "grid.tif",
@@ -71,8 +71,8 @@ def source_of(folder, name):
     if name in CLOUDS:
         return CloudSource(str(path), interval=1e-6)
     if name in MOVIES:
-        movie = FieldMovie(path, (293.15, 1400.0), NamedMap("jet"))
-        return MovieSource({"temperature": movie}, 1.0 / 64, (0.0, 64.0), frame_interval=1e-6)
+        movie = FieldMovie(str(path), 293.15, 1400.0, "jet")
+        return MovieSource(movie, pixel=1.0 / 64, origin=(0.0, 64.0), interval=1e-6)
     return MeshSource(path / name, section=0.5) if name == "case.foam" else MeshSource(path)
 
 

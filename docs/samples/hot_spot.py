@@ -60,11 +60,11 @@ def _packaged() -> str:
 def source() -> MovieSource:
     """The movie as import-movie.md describes it."""
     return MovieSource(
-        {"temperature": FieldMovie(MOVIE, (COLDEST, HOTTEST))},
-        metre_per_pixel=2e-6,
+        FieldMovie(str(MOVIE), COLDEST, HOTTEST),
+        pixel=2e-6,
         origin=(185.0, 150.0),
         crop=(0, 0, 250, 240),
-        frame_interval=0.2e-6,
+        interval=0.2e-6,
         tool_colour=(128, 128, 128),
     )
 

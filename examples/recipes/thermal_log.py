@@ -30,11 +30,6 @@ class ThermalLog(Source, Part):
     files: str = ""
     offset: Annotated[float, Parameter("Added to the temperatures, in K.")] = 0.0
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The file."""
-        return (self.files,)
-
     def survey(self) -> Survey:
         """Look at what is there."""
         values, spacing, interval = self._read()

@@ -5,12 +5,10 @@ import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from glob import iglob
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any, Final, TypeAlias
 
@@ -20,22 +18,12 @@ from chipglow.scene import Raster, SampledFrame
 MEMORY: Final = 2 * 1024**3
 """What a reader may take for itself, in bytes."""
 
-PATIENCE: Final = 60.0
-"""Maximum time in s for one answer about the smallest file.
+PATIENCE: Final = 600.0
+"""Maximum time in s for one answer.
 
-With five times as many busy processes as cores, starting a reader took 30 s.
+The slowest reader, that of Abaqus' text, takes 0.4 us a byte: 1.5 GB in this time.
 """
 
-PATIENCE_PER_BYTE: Final = 1e-6
-"""How much longer for each byte of the files, in s.
-
-There the slowest reader, that of Abaqus' text, took 0.4 us a byte; a slow disk gives 20 MB/s.
-"""
-
-MOST_PATIENCE: Final = 1800.0
-"""How long a reader may take for one answer at most, in s."""
-
-_MOST_FILES: Final = 100_000
 # -P: nothing beside the data is taken for a module.
 _CHILD: Final = ("-P", "-c", "from chipglow.io.sandbox import main; main()")
 
@@ -55,7 +43,7 @@ class Sandbox:
     """
 
     name: str
-    patience: float
+    patience: float = PATIENCE
     memory: int = MEMORY
 
     @contextmanager
@@ -114,17 +102,12 @@ class Sandbox:
 
 @dataclass(frozen=True)
 class Isolated(Source):
-    """Another source, read in a subprocess: see `Sandbox`; by default `patience_for` its files."""
+    """Another source, read in a subprocess: see `Sandbox`."""
 
     source: Source
     name: str
     memory: int = MEMORY
-    patience: float | None = None
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Those of the other source."""
-        return self.source.inputs
+    patience: float = PATIENCE
 
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
@@ -139,30 +122,11 @@ class Isolated(Source):
 
     @property
     def _sandbox(self) -> Sandbox:
-        patience = patience_for(self.inputs) if self.patience is None else self.patience
-        return Sandbox(self.name, patience, self.memory)
+        return Sandbox(self.name, self.patience, self.memory)
 
 
 def _survey(source: Source) -> Iterator[Survey]:
     yield source.survey()
-
-
-def patience_for(inputs: Sequence[str]) -> float:
-    """Return the time in s to wait for an answer about files, folders and patterns."""
-    size = sum(_size(file) for name in inputs for file in islice(_files_of(name), _MOST_FILES))
-    return min(PATIENCE + PATIENCE_PER_BYTE * size, MOST_PATIENCE)
-
-
-def _files_of(name: str) -> Iterator[Path]:
-    if Path(name).is_dir():
-        return (Path(at, file) for at, _, files in os.walk(name) for file in files)
-    return map(Path, (name,) if Path(name).exists() else iglob(name))  # noqa: PTH207
-
-
-def _size(file: Path) -> int:
-    with suppress(OSError):
-        return file.stat().st_size
-    return 0
 
 
 def main() -> None:

@@ -53,7 +53,7 @@ class Calibration(ABC):
 class FittedCalibration(Calibration):
     """A calibration whose parameters were fitted to blackbodies; `kind` is its name in files."""
 
-    kind: ClassVar[str] = ""
+    kind = ""
     NAMES: ClassVar[tuple[str, ...]] = ()
     UNITS: ClassVar[tuple[str, ...]] = ()
 
@@ -148,7 +148,7 @@ class FittedCalibration(Calibration):
 class LinearCalibration(FittedCalibration):
     """Counts that are a straight line over the in-band radiance: S = offset + gain L(T)."""
 
-    kind: ClassVar[str] = "linear"
+    kind = "linear"
     description: ClassVar[str] = "straight line over the in-band radiance"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "gain")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "counts m² sr/W")
@@ -191,7 +191,7 @@ class SakumaHattori(FittedCalibration):
     Their signal has no offset; the counts of a camera have one.
     """
 
-    kind: ClassVar[str] = "sakuma-hattori"
+    kind = "sakuma-hattori"
     description: ClassVar[str] = "Planckian form of Sakuma and Hattori"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "A", "B", "C")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "m", "m K", "counts")

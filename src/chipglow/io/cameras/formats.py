@@ -12,7 +12,7 @@ from chipglow.io.cameras.flir import Flir, has_packed_counts
 from chipglow.io.cameras.hcc import Hcc
 from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
-from chipglow.io.sandbox import Sandbox, patience_for
+from chipglow.io.sandbox import Sandbox
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.source import files_of, reading
 from chipglow.quantities import of_other_packages
@@ -190,8 +190,7 @@ def read_recording(
         )
     if not one.in_subprocess(path):
         return read_here(path, kind, frames, stated)
-    sandbox = Sandbox(str(path), patience_for((str(path),)))
-    with sandbox.answers(partial(_answer, path, kind, frames, stated)) as answers:
+    with Sandbox(str(path)).answers(partial(_answer, path, kind, frames, stated)) as answers:
         recording: Recording = next(answers)
         return recording
 

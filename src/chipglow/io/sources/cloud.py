@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
@@ -70,15 +69,6 @@ class CloudSource(Source, Part):
     interval: float | None = None
     units: Units = field(default_factory=Units)
     placement: Placement = field(default_factory=Placement)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
-            raise ValueError(f"interval: {self.interval!r}, expected over 0")
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return (self.files,)
 
     def survey(self) -> Survey:
         with ExitStack() as stack:

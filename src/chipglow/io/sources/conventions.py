@@ -1,8 +1,8 @@
 """Names, units and axes of fields in other programs' files."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,6 +167,11 @@ class Units(Part):
         return self.length if name.startswith("material_") else SI
 
 
+PlacedGrid: TypeAlias = tuple[
+    NDArray[np.float64], NDArray[np.float64], Callable[[NDArray[Any]], NDArray[Any]]
+]
+"""Centres of columns in m, ascending, and of rows, descending; and what turns samples so."""
+
 Floats = TypeVar("Floats", np.float32, np.float64)
 
 _AXES: Final = ("x", "y", "z")
@@ -240,6 +245,21 @@ class Placement(Part):
         """Return components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
         turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
         return turned
+
+    def grid(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> PlacedGrid:
+        """Return columns and rows of the scene for those of a file at x and y in m."""
+        along, up = (
+            ((x, y)[axis] - origin) * sign
+            for axis, origin, sign in zip(self.axes, self.origin, self.signs, strict=True)
+        )
+        columns = slice(None, None, -1 if along[0] > along[-1] else 1)
+        rows = slice(None, None, -1 if up[0] < up[-1] else 1)
+
+        def turned(values: NDArray[Any]) -> NDArray[Any]:
+            values = values.swapaxes(-1, -2) if self.axes == (1, 0) else values
+            return np.ascontiguousarray(values[..., rows, columns])
+
+        return along[columns], up[rows], turned
 
     def in_file(self, name: str) -> str:
         """Return the name of a field, which may be a component, in the file's axes."""

@@ -34,6 +34,7 @@ from chipglow.io.sources.source import (
     SourceError,
     Survey,
     even_times,
+    extent_of,
     span_of,
 )
 from chipglow.quantities import FileBeside, Parameter, Part
@@ -106,14 +107,12 @@ class GridSource(Source, Part):
             raise ValueError(
                 f"axes: {self.axes!r}, expected time, y and x in any order, or y and x"
             )
-        if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
-            raise ValueError(f"interval: {self.interval!r}, expected over 0")
         if self.placement.depth != 2:
             raise ValueError("placement: a grid has the axes x and y, expected no z")
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        return tuple(self.files.values()) if isinstance(self.files, dict) else (str(self.files),)
+    def own_files(self) -> Any:
+        return self.files
 
     def survey(self) -> Survey:
         with ExitStack() as stack:
@@ -122,10 +121,10 @@ class GridSource(Source, Part):
             return Survey(
                 kind=grid.kind,
                 times=grid.times,
-                extent=grid.extent,
+                extent=extent_of(grid.x, grid.y),
                 found={name: layer.array.name for name, layer in grid.layers.items()},
                 unused=grid.unused,
-                spacing=min(grid.steps),
+                spacing=min(abs(float(np.ptp(one)) / (one.size - 1)) for one in (grid.x, grid.y)),
                 temperatures=temperatures,
                 notes=Notes() + grid.notes,
             )
@@ -184,7 +183,9 @@ class _Grid:
 
     def __init__(self, source: GridSource, stack: ExitStack) -> None:
         self._source, self.notes = source, Notes()
-        self._files = {path: list(open_arrays(path, stack).values()) for path in source.inputs}
+        files = source.files
+        paths = tuple(files.values()) if isinstance(files, dict) else (str(files),)
+        self._files = {path: list(open_arrays(path, stack).values()) for path in paths}
         layers = {name: self._layer(name, array) for name, array in self._choose().items()}
         used = {layer.array.name for layer in layers.values()} | set(source.names.values())
         self._first = first = next(iter(layers.values()))
@@ -198,8 +199,8 @@ class _Grid:
         if not layers:
             raise SourceError(f"{first.array}: is a material, expected a temperature too")
         self.layers = {source.placement.in_file(name): layer for name, layer in layers.items()}
-        self.x, self.y = self._placed(self._positions("x"), self._positions("y"))
-        """Centres of the columns, ascending, and of the rows, descending, in m in the scene."""
+        placed = source.placement.grid(self._positions("x"), self._positions("y"))
+        self.x, self.y, self._turned = placed
         self.times = self._find_times()
         _, rows, columns = first.shape
         self.kind = f"grid of {rows} x {columns} samples, {', '.join(self._files)}"
@@ -278,50 +279,12 @@ class _Grid:
         down = source.row_spacing or source.spacing
         return source.top - down * (number if source.top_first else number[::-1])
 
-    def _placed(
-        self, x: NDArray[np.float64], y: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        placement = self._source.placement
-        along, up = (
-            ((x, y)[axis] - origin) * sign
-            for axis, origin, sign in zip(
-                placement.axes, placement.origin, placement.signs, strict=True
-            )
-        )
-        self._backward, self._rising = bool(along[0] > along[-1]), bool(up[0] < up[-1])
-        return along[:: -1 if self._backward else 1], up[:: -1 if self._rising else 1]
-
-    def _turned(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return values of the file with rows and columns in the order of the scene."""
-        values = values.swapaxes(-1, -2) if self._source.placement.axes == (1, 0) else values
-        values = values[..., :: -1 if self._rising else 1, :: -1 if self._backward else 1]
-        return np.ascontiguousarray(values)
-
     def _find_times(self) -> NDArray[np.float64]:
         source = self._source
         array = self._coordinate("time") if source.interval is None else None
         if array is None:
             return even_times(self._first.shape[0], source.interval, self.notes)
         return check_times(str(array), read_list("time", array, source.units.time, self.notes))
-
-    @property
-    def steps(self) -> tuple[float, float]:
-        """Distance of the columns and of the rows in m."""
-        return (
-            float((self.x[-1] - self.x[0]) / (self.x.size - 1)),
-            float((self.y[0] - self.y[-1]) / (self.y.size - 1)),
-        )
-
-    @property
-    def extent(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top edge in m."""
-        across, down = (step / 2 for step in self.steps)
-        return (
-            float(self.x[0] - across),
-            float(self.x[-1] + across),
-            float(self.y[-1] - down),
-            float(self.y[0] + down),
-        )
 
     def check_ends(self) -> tuple[float, float] | None:
         """Return the smallest and the largest temperature of the first and the last frame.

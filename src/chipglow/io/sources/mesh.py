@@ -99,18 +99,10 @@ class MeshSource(Source, Part):
         object.__setattr__(self, "files", Path(self.files))
         if not all(isfinite(time) for time in self.times):
             raise ValueError(f"times: expected finite times, got {self.times!r}")
-        if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
-            raise ValueError(f"interval: must be finite and over 0 s, got {self.interval!r}")
         if self.times and self.interval is not None:
             raise ValueError("interval: times are given too, expected one of them")
         if isinstance(self.section, str) and self.section != "facing":
             raise ValueError(f"section: {self.section!r}, expected a position or facing")
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        suffix = self.files.suffix.lower()
-        alone = suffix in (*mesh_vtk.ALONE, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS)
-        return (str(self.files),) if alone else (str(self.files), str(self.files.parent))
 
     def survey(self) -> Survey:
         meshes = Meshes(self)

@@ -30,12 +30,6 @@ KINDS: Final[Mapping[str, str]] = {
 }
 """Formats by the ending of a file's name."""
 
-ALONE: Final = (
-    ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtk", ".vtkhdf", *OTHER_HDF, ".e", ".ex2", ".exo",
-    ".exii", ".cgns",
-)  # fmt: skip
-"""Endings of files that name no other files."""
-
 _NAMES: Final[Mapping[str, Mapping[str, str]]] = {"OpenFOAM": {"velocity": "U"}}
 """Names of fields in one format, which mean another thing in others."""
 

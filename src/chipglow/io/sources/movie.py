@@ -6,10 +6,11 @@ from functools import cached_property
 from math import hypot, isfinite, sqrt
 from pathlib import Path
 from statistics import fmean
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, ValidationInfo
 
 from chipglow.io.sources.colour_scale import (
     ColourScale,
@@ -17,7 +18,7 @@ from chipglow.io.sources.colour_scale import (
     Picture,
     colour_uncertainty,
 )
-from chipglow.io.sources.conventions import Placement
+from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, Placement
 from chipglow.io.sources.legend import (
     LEAST_EXPLAINED,
     explained,
@@ -33,71 +34,141 @@ from chipglow.io.sources.overlays import (
     FieldReader,
     box_mask,
     find_background,
+    place_of,
     polygon_mask,
 )
-from chipglow.io.sources.source import Source, SourceError, Survey, naming
-from chipglow.quantities import Parameter, Part
+from chipglow.io.sources.source import Source, SourceError, Survey, even_times, extent_of, naming
+from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities.units import LENGTH, parse_unit
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
 from chipglow.scene.regrid import regrid, taps
 from chipglow.text import Notes
 
-MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
-"""Fields that a movie can show; the first one given determines the material."""
+_EXAMPLES: Final = {
+    "temperature": "1127 degC",
+    "plastic_strain": "4",
+    "plastic_strain_rate": "1e5 1/s",
+}
+"""Fields that a movie can show, with a value of each; the temperature determines the material."""
 
 Pixel = tuple[float, float]
 """Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
 _HALF: Final = 0.5
-_EARLY: Final = 100
 _ROUNDING: Final = 0.29
+_LOWEST: Final = 0.02
+"""Fraction of a scale up to which a colour at the border is taken for its lowest value."""
+
+
+def _text_of_file(value: str | float, info: ValidationInfo) -> str | float:
+    """Return a number of a file as text: it may lack its unit. Python's numbers are in SI."""
+    return str(value) if info.context else value
+
+
+_Value = Annotated[str | int | float, AfterValidator(_text_of_file)]
 
 
 @dataclass(frozen=True)
-class NamedMap:
-    """Colour map that is known by its name, see `ColourScale.named`."""
+class FieldMovie(Part):
+    """A movie of one field; its values are text with a unit, or numbers in SI units."""
 
-    name: str
-    """``rainbow`` or a map of matplotlib."""
-    bands: int = 0
-    """Number of bands; 0 for a map without steps."""
+    file: Annotated[FileBeside | None, Parameter("The movie.")] = None
+    first: Annotated[
+        _Value, Parameter("Value of the first colour, or at the bottom or left of the legend.")
+    ] = ""
+    last: Annotated[
+        _Value, Parameter("Value of the last colour, or at the top or right of the legend.")
+    ] = ""
+    colours: Annotated[
+        str | None,
+        Parameter(
+            "Name of the colour map; none: the legend in the picture is read.",
+            allowed="none, rainbow, jet, viridis, ... of matplotlib",
+        ),
+    ] = None
+    bands: Annotated[
+        int,
+        Parameter("Number of the map's bands; 0: it runs without steps.", allowed="0, 2 to 256"),
+    ] = 0
+    legend: Annotated[
+        Box | None,
+        Parameter(
+            "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
+            allowed="none, or [600, 40, 620, 400]",
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not (self.bands == 0 or 2 <= self.bands <= 256):
             raise ValueError(f"bands: {self.bands!r}, expected 0 or 2 to 256")
 
-
-@dataclass(frozen=True)
-class FieldMovie:
-    """Movie of one field."""
-
-    path: Path
-    values: tuple[float, float]
-    """Values in SI units at the first and last colour of a map, or the ends of a legend.
-
-    Those of a legend are at its bottom and top, or left and right.
-    """
-    colours: NamedMap | Box | None = None
-    """Map of the colours, or the edges of a legend in the first picture, which is found if None."""
-
-    def __post_init__(self) -> None:
-        first, last = self.values
+    def ends(self, name: str) -> tuple[float, float]:
+        """Return the values of a field at the ends of the scale in SI units."""
+        first, last = (
+            _number(f"movie.{name}.{end}", name, getattr(self, end)) for end in ("first", "last")
+        )
         if not (isfinite(first) and isfinite(last) and first != last):
-            raise ValueError(f"values: {self.values!r}, expected two different finite numbers")
+            raise ValueError(
+                f"movie.{name}: first {first:g} and last {last:g}, expected two finite values"
+            )
+        return first, last
+
+
+def _number(place: str, name: str, value: str | float) -> float:
+    """Return a value of a field in SI, such as ``1127 degC`` or ``4``."""
+    if not isinstance(value, str):
+        return float(value)
+    number, _, unit = value.strip().partition(" ")
+    if not number or (not unit and name != "plastic_strain"):
+        what = f"{value!r} has no unit" if number else "is missing"
+        raise ValueError(f"{place}: {what}, expected a value such as {_EXAMPLES[name]}")
+    try:
+        return float(parse_unit(unit, SI_UNITS[name], name).to_si(float(number)))
+    except ValueError:
+        raise ValueError(
+            f"{place}: {value!r}, expected a value such as {_EXAMPLES[name]}"
+        ) from None
 
 
 @dataclass(frozen=True)
 class MovieSource(Source, Part):
-    """Fields shown by movies, one movie for each field, by names of `MOVIE_FIELDS`.
+    """Movies of fields with a colour scale, a movie a field.
 
-    The movies have the same size and number of pictures. ``metre_per_pixel`` is the side of a
-    pixel in m, ``frame_interval`` the time from picture to picture in s, by default that of
-    playing. In the ``placement`` ``x`` is to the right in the picture and ``y`` up.
+    They have the same size and number of pictures. ``files`` is the movie of the temperature if
+    that names none; an ``interval`` in s replaces the time of playing. In the ``placement`` ``x``
+    is to the right in the picture and ``y`` up.
     """
 
-    movies: Mapping[str, FieldMovie]
-    metre_per_pixel: float
+    title: ClassVar[str] = "a movie"
+    endings: ClassVar[tuple[str, ...]] = (
+        ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
+    )  # fmt: skip
+    temperature: Annotated[FieldMovie, Parameter("The movie of the temperature.")] = field(
+        default_factory=FieldMovie
+    )
+    plastic_strain: Annotated[FieldMovie | None, Parameter("The movie of the plastic strain.")] = (
+        None
+    )
+    plastic_strain_rate: Annotated[
+        FieldMovie | None, Parameter("The movie of the plastic strain rate.")
+    ] = None
+    pixel: Annotated[float | None, Parameter("Side of a pixel.", LENGTH, over=0.0)] = None
+    pixel_height: Annotated[
+        float | None,
+        Parameter("Height of a pixel, where pixel is its width; none: the same.", LENGTH, over=0.0),
+    ] = None
+    scale_from: Annotated[
+        Pixel | None,
+        Parameter(
+            "A point whose distance from another is known, in pixels right and down.",
+            allowed="none, or [120, 400]",
+        ),
+    ] = None
+    scale_to: Annotated[Pixel | None, Parameter("The other point.")] = None
+    scale_length: Annotated[float | None, Parameter("Their distance.", LENGTH, over=0.0)] = None
     origin: Annotated[
         Pixel,
         Parameter(
@@ -112,9 +183,7 @@ class MovieSource(Source, Part):
             "none: all."
         ),
     ] = None
-    frame_interval: float | None = None
     every: Annotated[int, Parameter("Take one picture of so many.", least=1)] = 1
-    placement: Placement = field(default_factory=Placement)
     background: Annotated[
         tuple[Colour, ...] | None,
         Parameter(
@@ -140,16 +209,12 @@ class MovieSource(Source, Part):
     tool_colour: Annotated[Colour | None, Parameter("Colour of a tool that shows no values.")] = (
         None
     )
+    files: str = ""
+    interval: float | None = None
+    placement: Placement = field(default_factory=Placement)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        unknown = sorted(set(self.movies) - set(MOVIE_FIELDS))
-        if unknown or not self.movies:
-            raise ValueError(f"movies: {unknown}, expected one or more of {list(MOVIE_FIELDS)}")
-        for name in ("metre_per_pixel", "frame_interval"):
-            value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value > 0):
-                raise ValueError(f"{name}: {value!r}, expected a finite number over 0")
         colours = [*(self.background or ()), *([self.tool_colour] if self.tool_colour else [])]
         for colour in colours:
             if len(colour) != 3 or not all(0 <= part <= 255 for part in colour):
@@ -162,20 +227,24 @@ class MovieSource(Source, Part):
                 "pixels"
             )
 
+        if self.files:  # the description of an import is whole
+            _ = self._sides, [(self._path(name), m.ends(name)) for name, m in self._movies.items()]
+
     @property
-    def inputs(self) -> tuple[str, ...]:
-        return tuple(str(movie.path) for movie in self.movies.values())
+    def own_files(self) -> str | None:
+        return self.temperature.file
 
     def survey(self) -> Survey:
         indices, _, assumed = self._opened
-        index = indices[self._names[0]]
+        index = indices["temperature"]
         times, clock = self._times(index)
+        x, y, _ = self._grid(index)
         return Survey(
             kind=f"movie, {index.count} pictures of {index.columns} x {index.rows}, {index.codec}",
             times=times,
-            extent=self._pixels(index).extent,
-            found={name: self.movies[name].path.name for name in self._names},
-            spacing=self.metre_per_pixel,
+            extent=extent_of(x, y),
+            found={name: self._path(name).name for name in self._movies},
+            spacing=min(self._sides),
             notes=Notes([*clock, *assumed, *_doubts(self.uncertainty())]),
         )
 
@@ -185,80 +254,99 @@ class MovieSource(Source, Part):
         A tool that is known by its colour has no values.
         """
         indices, readers, _ = self._opened
-        index = indices[self._names[0]]
+        index = indices["temperature"]
         times, _ = self._times(index)
-        if start >= len(times):
-            return
-        pixels = self._pixels(index)
-        across = taps(pixels.x, raster.spacing, raster.x)
-        down = taps(-pixels.y, raster.spacing, -raster.y)
-        shown = [
-            pictures(self.movies[name].path, indices[name], start * self.every, self.every)
-            for name in self._names
-        ]
-        for number, together in enumerate(zip(*shown, strict=True), start):
+        x, y, turned = self._grid(index)
+        across, down = taps(x, raster.spacing, raster.x), taps(-y, raster.spacing, -raster.y)
+        numbers = range(start * self.every, index.count, self.every)
+        shown = [pictures(self._path(name), indices[name], numbers) for name in readers]
+        for number, *together in zip(numbers, *shown, strict=True):
             read = {
-                name: self._read(name, readers[name], picture, number * self.every)
-                for name, picture in zip(self._names, together, strict=True)
+                name: self._read(name, reader, picture, number)
+                for (name, reader), picture in zip(readers.items(), together, strict=True)
             }
-            values, material = regrid(*self._fields(read), across, down)
+            material = read["temperature"].material
+            values, material = regrid(turned(_values(read)), turned(material), across, down)
             *means, distance, filled = values
             quality = np.round(np.nan_to_num(distance)).astype(np.uint8)
             quality[filled > _HALF] = FILLED
-            fields = dict(zip(self._names, means, strict=True))
-            yield SampledFrame(float(times[number]), fields, material, quality)
+            fields = dict(zip(readers, means, strict=True))
+            yield SampledFrame(float(times[number // self.every]), fields, material, quality)
 
     def uncertainty(self) -> dict[str, ColourUncertainty]:
-        """Return the uncertainty of each field, from three pictures.
-
-        They are the first, the middle and the last one, or early ones of a movie that cannot be
-        searched.
-        """
+        """Return the uncertainty of each field, from the first, the middle and the last picture."""
         indices, readers, _ = self._opened
         result = {}
         for name, reader in readers.items():
-            movie, index = self.movies[name], indices[name]
-            last = index.count - 1 if index.marks else min(index.count - 1, _EARLY)
+            last = indices[name].count - 1
+            numbers = sorted({0, last // 2, last})
             values, distance, lines = [], [], []
-            for number in sorted({0, last // 2, last}):
-                picture = next(pictures(movie.path, index, number))
+            for number, picture in zip(
+                numbers, pictures(self._path(name), indices[name], numbers), strict=True
+            ):
                 read = self._read(name, reader, picture, number)
                 values.append(read.values[read.seen])
                 distance.append(read.distance[read.seen])
                 lines.append(reader.error_of_filling(read))
             result[name] = replace(
                 colour_uncertainty(reader.scale, np.concatenate(values), np.concatenate(distance)),
-                legend=_uncertainty_of_legend(movie, reader.legend),
+                legend=_uncertainty_of_legend(
+                    self._movies[name], reader.legend, self._movies[name].ends(name)
+                ),
                 lines=sqrt(fmean(error**2 for error in lines)),
             )
         return result
 
     @property
-    def _names(self) -> tuple[str, ...]:
-        return tuple(name for name in MOVIE_FIELDS if name in self.movies)
+    def _movies(self) -> dict[str, FieldMovie]:
+        movies = {name: getattr(self, name) for name in _EXAMPLES}
+        return {name: movie for name, movie in movies.items() if movie is not None}
+
+    def _path(self, name: str) -> Path:
+        file = self._movies[name].file or (name == "temperature" and self.files)
+        if not file:
+            raise ValueError(f"movie.{name}.file: is missing, expected the name of a movie")
+        return Path(file)
+
+    @property
+    def _sides(self) -> tuple[float, float]:
+        """Width and height of a pixel in m."""
+        if self.pixel is not None:
+            return self.pixel, self.pixel_height or self.pixel
+        if self.scale_from is None or self.scale_to is None or self.scale_length is None:
+            raise ValueError(
+                "movie.pixel: is missing, expected the side of a pixel such as 1 um, "
+                "or scale_from, scale_to and scale_length"
+            )
+        (left, top), (right, bottom) = self.scale_from, self.scale_to
+        pixels = hypot(right - left, bottom - top)
+        if not pixels:
+            raise ValueError(f"movie.scale_to: {self.scale_to}, expected another point")
+        return self.scale_length / pixels, self.scale_length / pixels
 
     @cached_property
     def _opened(self) -> tuple[dict[str, MovieIndex], dict[str, FieldReader], list[str]]:
         """Indices of the movies, which must agree, readers of their pictures, and assumptions."""
-        paths = {name: self.movies[name].path for name in self._names}
+        paths = {name: self._path(name) for name in self._movies}
         indices = {name: index_movie(path) for name, path in paths.items()}
-        first = indices[self._names[0]]
+        first = indices["temperature"]
         shape = (first.rows, first.columns)
         self._crop(first)
         tool = self._cropped(polygon_mask(shape, self.tool_polygon))
         square = "The pixels are square, although the movie states otherwise."
-        assumed = [] if first.square else [square]
+        assumed = [] if first.square or self.pixel_height else [square]
         readers = {}
         for name, index in indices.items():
             if (index.rows, index.columns, index.count) != (*shape, first.count):
                 raise SourceError(
                     f"{paths[name]}: {index.count} pictures of {index.columns} x {index.rows}, "
                     f"expected {first.count} of {first.columns} x {first.rows} as in "
-                    f"{paths[self._names[0]]}"
+                    f"{paths['temperature']}"
                 )
-            picture = next(pictures(paths[name], index))
+            picture = next(pictures(paths[name], index, (0,)))
             with naming(paths[name]):
-                scale, legend, said = _scale(self.movies[name], picture)
+                movie = self._movies[name]
+                scale, legend, said = _scale(movie, movie.ends(name), picture)
                 background, also = self._background(self._cropped(picture), scale)
                 covered = box_mask(shape, self.covered)
                 if legend is not None:
@@ -271,31 +359,21 @@ class MovieSource(Source, Part):
         return indices, readers, assumed
 
     def _times(self, index: MovieIndex) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-        if self.frame_interval is not None:
-            times = self.frame_interval * np.arange(index.count, dtype=np.float64)
-            return times[:: self.every], ()
-        path = self.movies[self._names[0]].path
+        if self.interval is not None:
+            return even_times(index.count, self.interval, Notes())[:: self.every], ()
         if index.times is None:
-            raise SourceError(f"{path}: it has no times, expected frame_interval")
+            raise SourceError(f"{self._path('temperature')}: it has no times, expected interval")
         step = index.times[-1] / max(index.count - 1, 1)
         said = f"The times are those of playing the movie, {step:.6g} s per frame."
         return index.times[:: self.every], (said,)
 
-    def _pixels(self, index: MovieIndex) -> Raster:
-        """Return the pixels of the cropped and turned picture in the scene."""
+    def _grid(self, index: MovieIndex) -> PlacedGrid:
+        """Return the pixels of the cropped picture in the scene."""
         left, top, right, bottom = self._crop(index)
-        side = self.metre_per_pixel
-        spans = (
-            (side * (left - self.origin[0]), side * (right - self.origin[0])),
-            (side * (self.origin[1] - bottom), side * (self.origin[1] - top)),
-        )
-        across, up = (
-            sorted(sign * end for end in spans[axis])
-            for axis, sign in zip(self.placement.axes, self.placement.signs, strict=True)
-        )
-        shape = (bottom - top, right - left)
-        rows, columns = shape[::-1] if self.placement.axes == (1, 0) else shape
-        return Raster(across[0], up[1], side, rows, columns)
+        width, height = self._sides
+        x = width * (np.arange(left, right, dtype=np.float64) + 0.5 - self.origin[0])
+        y = height * (self.origin[1] - np.arange(top, bottom, dtype=np.float64) - 0.5)
+        return self.placement.grid(x, y)
 
     def _crop(self, index: MovieIndex) -> Box:
         box = self.crop or (0, 0, index.columns, index.rows)
@@ -318,19 +396,24 @@ class MovieSource(Source, Part):
     ) -> tuple[tuple[Colour, ...], tuple[str, ...]]:
         if self.background is not None:
             return self.background, ()
-        found, refused = find_background(picture, scale)
+        found, values = find_background(picture, scale)
         if self.tool_colour is not None:
             tool = np.array(self.tool_colour)
-            found = tuple(colour for colour in found if np.abs(tool - colour).max() > 16)
-            refused = tuple(colour for colour in refused if np.abs(tool - colour).max() > 16)
-        if refused and not found:
+            found, values = (
+                tuple(colour for colour in colours if np.abs(tool - colour).max() > 16)
+                for colours in (found, values)
+            )
+        # What is as cold as the scale shows may as well be nothing; what is hotter may not.
+        coldest = scale.values[0] + _LOWEST * (scale.values[-1] - scale.values[0])
+        hotter = [colour for colour in values if place_of(scale, colour)[0] > coldest]
+        if hotter and not found:
             raise SourceError(
-                f"background: {refused[0]} at the border is a colour of the scale too, expected "
+                f"background: {hotter[0]} at the border is a colour of the scale too, expected "
                 "another background, or background: [] if it shows values"
             )
         named = ", ".join(str(colour) for colour in found) or "none"
         said = [f"Background colours at the border: {named}."]
-        said += [f"The colour {colour} at the border is a value." for colour in refused]
+        said += [f"The colour {colour} at the border is a value." for colour in values]
         return found, tuple(said)
 
     def _read(self, name: str, reader: FieldReader, picture: Picture, number: int) -> FieldPicture:
@@ -339,67 +422,37 @@ class MovieSource(Source, Part):
         workpiece = read.material == Material.WORKPIECE
         if workpiece.any() and not np.isfinite(read.values[workpiece]).any():
             raise SourceError(
-                f"{self.movies[name].path}: picture {number + 1} has no colour of the scale"
+                f"{self._path(name)}: picture {number + 1} has no colour of the scale"
             )
         return read
 
-    def _fields(
-        self, read: Mapping[str, FieldPicture]
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Return values of pictures, distances from the scale, what is filled; and the material."""
-        material = read[self._names[0]].material
-        completed = [_completed(picture, material) for picture in read.values()]
-        quality = np.max([of for _, of in completed], axis=0)
-        filled = quality == FILLED
-        distance = np.where(filled, np.nan, quality)
-        values = np.stack([*(of for of, _ in completed), distance, filled]).astype(np.float32)
-        return self._turned(values), self._turned(material)
 
-    def _turned(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return pictures as they lie in the scene."""
-        if self.placement.axes == (1, 0):
-            values = values[..., ::-1, :].swapaxes(-1, -2)[..., ::-1, :]
-        across, up = (int(sign) for sign in self.placement.signs)
-        return np.ascontiguousarray(values[..., ::up, ::across])
-
-
-def _uncertainty_of_legend(movie: FieldMovie, box: Box | None) -> float:
+def _uncertainty_of_legend(movie: FieldMovie, box: Box | None, ends: tuple[float, float]) -> float:
     """Return the uncertainty of a legend's ends: a pixel if it was found, else its rounding."""
     if box is None:
         return 0.0
     left, top, right, bottom = box
-    pixel = abs(movie.values[1] - movie.values[0]) / max(right - left, bottom - top)
-    return pixel * (_ROUNDING if movie.colours else 1.0)
+    pixel = abs(ends[1] - ends[0]) / max(right - left, bottom - top)
+    return pixel * (_ROUNDING if movie.legend else 1.0)
 
 
-def metre_per_pixel(
-    first: tuple[float, float], second: tuple[float, float], length: float
-) -> float:
-    """Return the side of a pixel in m from two points in pixels and their distance in m."""
-    pixels = hypot(second[0] - first[0], second[1] - first[1])
-    if not (isfinite(pixels) and pixels > 0):
-        raise ValueError(f"scale: points {first!r}, {second!r}, expected two different points")
-    if not (isfinite(length) and length > 0):
-        raise ValueError(f"scale: length {length!r}, expected a finite number of m over 0")
-    return length / pixels
-
-
-def _scale(movie: FieldMovie, picture: Picture) -> tuple[ColourScale, Box | None, list[str]]:
+def _scale(
+    movie: FieldMovie, ends: tuple[float, float], picture: Picture
+) -> tuple[ColourScale, Box | None, list[str]]:
     """Return the scale of a movie, the place of its legend, and the assumptions."""
-    if isinstance(movie.colours, NamedMap):
-        name, bands = movie.colours.name, movie.colours.bands
-        return ColourScale.named(name, movie.values, bands), None, []
-    box = movie.colours or find_legend(picture)
+    if movie.colours is not None:
+        return ColourScale.named(movie.colours, ends, movie.bands), None, []
+    box = movie.legend or find_legend(picture)
     if box is None:
         raise SourceError(
             "no legend was found in the first picture, expected the box of one, or a named map"
         )
-    if not movie.colours and is_cut(picture, box):
+    if not movie.legend and is_cut(picture, box):
         raise SourceError(
             f"legend: an end of the one found at {box} cannot be told from what is beside it, "
             "expected the box of the legend, or a named map"
         )
-    scale = ColourScale.from_legend(legend_pixels(picture, box), movie.values)
+    scale = ColourScale.from_legend(legend_pixels(picture, box), ends)
     fraction = explained(picture, box, scale)
     if fraction < LEAST_EXPLAINED:
         raise SourceError(
@@ -407,10 +460,20 @@ def _scale(movie: FieldMovie, picture: Picture) -> tuple[ColourScale, Box | None
             f"expected {LEAST_EXPLAINED:.0%} or more; give the box of the legend, or a named map"
         )
     kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
-    found = "" if movie.colours else f"Legend found at {box} (left, top, right, bottom). "
-    first, last = movie.values
-    ends = f"{first:g} at its lower or left end, {last:g} at the other"
-    return scale, box, [f"{found}Legend of {kind}, {ends}."]
+    found = "" if movie.legend else f"Legend found at {box} (left, top, right, bottom). "
+    first, last = ends
+    limits = f"{first:g} at its lower or left end, {last:g} at the other"
+    return scale, box, [f"{found}Legend of {kind}, {limits}."]
+
+
+def _values(read: Mapping[str, FieldPicture]) -> NDArray[np.float32]:
+    """Return values of pictures, distances from the scale, and what is filled."""
+    material = read["temperature"].material
+    completed = [_completed(picture, material) for picture in read.values()]
+    quality = np.max([of for _, of in completed], axis=0)
+    filled = quality == FILLED
+    distance = np.where(filled, np.nan, quality)
+    return np.stack([*(of for of, _ in completed), distance, filled]).astype(np.float32)
 
 
 def _completed(

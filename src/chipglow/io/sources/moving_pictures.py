@@ -1,7 +1,6 @@
 """Pictures of a movie, one at a time, through PyAV (FFmpeg)."""
 
-from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,12 +25,6 @@ _OPTIONS: Final = {
     "format_whitelist": _FORMATS,
     "max_pixels": str(_MOST_PIXELS),
 }
-_WHOLE: Final = ("gif", "apng")
-"""Formats whose pictures build on all before them, though they claim to be complete.
-
-So do those of AVI in part: its times are those of decoding, and a search leads to a wrong picture.
-"""
-
 _GIF_TAIL: Final = 64
 
 
@@ -47,8 +40,6 @@ class MovieIndex:
     """Number of pictures."""
     times: NDArray[np.float64] | None
     """Times of the pictures in s from the first; None if the movie contains none."""
-    marks: tuple[int, ...]
-    """Their times in the movie's own unit, ascending; empty if it cannot be searched."""
     square: bool
     """Whether the movie states square pixels."""
 
@@ -59,22 +50,19 @@ def index_movie(path: Path) -> MovieIndex:
     return _index(path, state.st_size, state.st_mtime_ns)
 
 
-def pictures(path: Path, index: MovieIndex, start: int = 0, every: int = 1) -> Iterator[Picture]:
-    """Decode pictures one at a time, from a number on and with a distance between them."""
-    searched = start > 0 and bool(index.marks) and _can_search(path, index, start)
-    number = start if searched else 0
+def pictures(path: Path, index: MovieIndex, numbers: Iterable[int]) -> Iterator[Picture]:
+    """Decode the pictures of some ascending numbers one at a time."""
+    wanted = iter(numbers)
+    following, number = next(wanted, index.count), 0
     with _opened(path) as (container, stream):
         interpolation = _interpolation()
-        if searched:
-            container.seek(index.marks[start], stream=stream)
         for frame in container.decode(stream):
-            if searched and _mark(index, frame) < start:
-                continue
             if number >= index.count:
                 break
             _check(path, index, frame, number)
-            if number >= start and (number - start) % every == 0:
+            if number == following:
                 yield frame.to_ndarray(format="rgb24", interpolation=interpolation)
+                following = next(wanted, index.count)
             number += 1
     if number < index.count:
         raise SourceError(
@@ -95,7 +83,6 @@ def _index(path: Path, size: int, changed: int) -> MovieIndex:
             if packet.dts is not None or packet.size > 0
         ]
         shown = [packet.pts for packet in packets if not packet.is_discard]
-        complete = all(packet.is_keyframe for packet in packets)
         corrupt = bool(packets) and packets[-1].is_corrupt
         kind = container.format.name.split(",")[0]
         expected, rate, unit = stream.frames, stream.average_rate, stream.time_base
@@ -110,17 +97,14 @@ def _index(path: Path, size: int, changed: int) -> MovieIndex:
             f"{path}: it ends in picture {len(packets)} of {max(expected, len(packets))}: "
             "truncated? expected a whole movie"
         )
-    known = sorted({mark for mark in shown if mark is not None})
-    marks = tuple(known) if len(known) == len(shown) else ()
+    marks = sorted({mark for mark in shown if mark is not None})
     times = None
-    if marks and unit:
+    if len(marks) == len(shown) and unit:
         times = (np.array(marks, np.float64) - marks[0]) * float(unit)
     elif rate:
         times = np.arange(len(shown)) / float(rate)
     _check_end(path, kind, times, duration)
-    if kind in _WHOLE or (kind == "avi" and not complete):
-        marks = ()
-    return MovieIndex(codec, *shape, len(shown), times, marks, square)
+    return MovieIndex(codec, *shape, len(shown), times, square)
 
 
 def _check_end(
@@ -136,21 +120,6 @@ def _check_end(
             short = not file.read().rstrip(b"\0\r\n ").endswith(b";")
     if short:
         raise SourceError(f"{path}: it ends before its end: truncated? expected a whole movie")
-
-
-def _can_search(path: Path, index: MovieIndex, start: int) -> bool:
-    """Whether a search for a picture leads to it or to one before it."""
-    with _opened(path) as (container, stream):
-        container.seek(index.marks[start], stream=stream)
-        for frame in container.decode(stream):
-            number = _mark(index, frame)
-            return number <= start and frame.pts == index.marks[number]
-    return False
-
-
-def _mark(index: MovieIndex, frame: Any) -> int:
-    """Return the number of a picture by its presentation time."""
-    return bisect_left(index.marks, frame.pts or 0, hi=index.count - 1)
 
 
 def _interpolation() -> Any:

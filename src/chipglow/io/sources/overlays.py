@@ -73,7 +73,7 @@ class FieldReader:
     def __post_init__(self) -> None:
         for name, colours in (("background", self.background), ("tool_colour", self._tools)):
             for colour in colours:
-                value, apart = _place(self.scale, colour)
+                value, apart = place_of(self.scale, colour)
                 if apart < MARK_TOLERANCE:
                     raise SourceError(
                         f"{name}: {colour} is the colour of {value:.5g} too, expected one that is "
@@ -169,7 +169,7 @@ def find_background(
     found: list[Colour] = []
     refused: list[Colour] = []
     for colour in plain_colours(picture):
-        if _place(scale, colour)[1] >= MARK_TOLERANCE:
+        if place_of(scale, colour)[1] >= MARK_TOLERANCE:
             found.append(colour)
         elif np.hypot(*lab(np.array(colour) / 255.0)[1:]) < _GREY:
             refused.append(colour)
@@ -235,7 +235,7 @@ def _like(picture: Picture, colour: Colour) -> NDArray[np.bool_]:
     return np.asarray(np.linalg.norm(apart, axis=-1) < MARK_TOLERANCE)
 
 
-def _place(scale: ColourScale, colour: Colour) -> tuple[float, float]:
+def place_of(scale: ColourScale, colour: Colour) -> tuple[float, float]:
     """Return the value of the nearest place of a scale, and its distance."""
     value, apart = scale.invert(np.array([[colour]], np.uint8))
     return float(value[0, 0]), float(apart[0, 0])

@@ -9,6 +9,7 @@ from errno import ENOENT
 from glob import glob, has_magic
 from importlib import import_module
 from itertools import pairwise
+from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -134,6 +135,8 @@ class Survey:
 
 def even_times(count: int, interval: float | None, notes: Notes) -> NDArray[np.float64]:
     """Return evenly spaced times in s: 1 s apart, which is noted, unless an interval is given."""
+    if interval is not None and not (isfinite(interval) and interval > 0):
+        raise SourceError(f"interval: {interval!r} s, expected over 0")
     if interval is None and count > 1:
         notes.assumed.append("The files contain no times: frames are 1 s apart.")
     return (1.0 if interval is None else interval) * np.arange(count, dtype=np.float64)
@@ -144,6 +147,12 @@ def span_of(values: ArrayLike) -> tuple[float, float]:
     numbers = np.asarray(values, np.float64)
     known = numbers[np.isfinite(numbers)]
     return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
+
+
+def extent_of(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of samples by their even centres, y descending."""
+    across, down = (x[-1] - x[0]) / (x.size - 1) / 2, (y[0] - y[-1]) / (y.size - 1) / 2
+    return float(x[0] - across), float(x[-1] + across), float(y[-1] - down), float(y[0] + down)
 
 
 class Source(ABC):
@@ -166,9 +175,9 @@ class Source(ABC):
     endings: ClassVar[tuple[str, ...]] = ()
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        """Paths and patterns of its files, and folders that may contain more of them."""
-        return ()
+    def own_files(self) -> Any:
+        """Files that its section of an import's description names itself, instead of a source."""
+        return None
 
     @abstractmethod
     def survey(self) -> Survey:
