@@ -56,7 +56,7 @@ class OpenedScene:
         coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
         if segment := _developed(coarse, duration, study.analysis.exposures):
             start, places = segment.start, _across(segment)
-        shown = shown_study(_with_places(study, *places), rounded(start))
+        shown = shown_study(_with_places(study, scene.raster, *places), rounded(start))
         controls = Controls.of_scene(shown, scene, duration)
         return cls(name, scene, None if coarse is scene else coarse, controls, file)
 
@@ -77,7 +77,7 @@ class OpenedMeasurement:
         raster = measurement.raster
         row, column = np.unravel_index(int(np.argmax(usable)), usable.shape)
         hottest = (raster.x[column], raster.y[row]) if np.isfinite(usable).any() else None
-        study = _with_places(Study(), *_through(raster, hottest))
+        study = _with_places(Study(), raster, *_through(raster, hottest))
         return cls(name, measurement, Controls.of_measurement(study, measurement.times, raster))
 
 
@@ -163,14 +163,19 @@ def _results(folder: Path) -> OpenedScene:
     return OpenedScene.of(scene, study, folder.name, study.scene)
 
 
-def _with_places(study: Study, cursor: _Points, *lines: _Points) -> Study:
-    """Return a study with these points and lines, rounded to a tenth of a micrometre."""
-    (point,), *ends = (
-        tuple((round(float(x), 7), round(float(y), 7)) for x, y in points)
-        for points in (cursor, *lines)
+def _with_places(study: Study, raster: Raster, *places: _Points) -> Study:
+    """Return a study with a cursor and lines within the image, to a tenth of a micrometre."""
+    left, right, bottom, top = raster.extent
+    (cursor,), *lines = (
+        np.round(np.clip(list(points), (left, bottom), (right, top)), 7).tolist()
+        for points in places
     )
-    places = {"points": {CURSOR: point}, "lines": dict(zip(LINES.values(), ends, strict=True))}
-    return unchecked(study, analysis=unchecked(study.analysis, **places))
+    corners = (tuple(map(tuple, line)) for line in lines)
+    plan = {
+        "points": {CURSOR: tuple(cursor)},
+        "lines": dict(zip(LINES.values(), corners, strict=True)),
+    }
+    return unchecked(study, analysis=unchecked(study.analysis, **plan))
 
 
 def _developed(scene: Scene, duration: float, count: int) -> Segment | None:
@@ -200,5 +205,4 @@ def _through(raster: Raster, place: tuple[float, float] | None = None) -> list[_
     left, right, bottom, top = raster.extent
     x, y = place or ((left + right) / 2, (bottom + top) / 2)
     across, up = 0.4 * (right - left), 0.4 * (top - bottom)
-    along_x = [(max(x - across, left), y), (min(x + across, right), y)]
-    return [[(x, y)], along_x, [(x, max(y - up, bottom)), (x, min(y + up, top))]]
+    return [[(x, y)], [(x - across, y), (x + across, y)], [(x, y - up), (x, y + up)]]

@@ -37,14 +37,12 @@ class Newest(Generic[_Job]):
         self._turn = Lock()
         self._superseded = Event()
         self._running = Event()
-        self._thread: Thread | None = None
 
     def ask(self, job: _Job) -> None:
         """Do this job next; waiting and running ones end."""
         self.cancel()
         self._superseded = Event()
-        self._thread = Thread(target=self._run, args=(job, self._superseded), daemon=True)
-        self._thread.start()
+        Thread(target=self._run, args=(job, self._superseded), daemon=True).start()
 
     def cancel(self) -> None:
         """End the running job and forget the waiting ones."""
@@ -73,12 +71,6 @@ class Newest(Generic[_Job]):
             except Exception as error:  # a defect: it must not leave the page waiting
                 _log.exception("chipglow app")
                 self._notify("failed", f"defect: {type(error).__name__}: {error}")
-
-    def settle(self, seconds: float) -> bool:
-        """Wait until no job is left; return whether that happened within the time."""
-        if self._thread is not None:
-            self._thread.join(seconds)
-        return self._thread is None or not self._thread.is_alive()
 
 
 Notify: TypeAlias = Callable[..., None]
@@ -154,10 +146,6 @@ class Session:
         self._pictures.cancel()
         self._draws.cancel()
 
-    def settle(self, seconds: float = 60.0) -> bool:
-        """Wait until everything is computed; return whether that happened within the time."""
-        return self._pictures.settle(seconds) and self._draws.settle(seconds)
-
     def _picture(self, state: State) -> None:
         """Always send one picture, so that a moving control is followed; then the exact one."""
         work, model = self._pictures, self.model
@@ -172,7 +160,7 @@ class Session:
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
             work.pause(PAUSE if model.has_quick_look else 0.0)
-        self._notify("readout", picture, model.readout(picture))
+        self._notify("numbers", picture, model.numbers(picture))
 
     def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""
