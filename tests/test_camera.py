@@ -16,7 +16,6 @@ from chipglow.camera import (
     CalibrationErrors,
     Camera,
     ChipglowWarning,
-    Exposure,
     Flag,
     GaussianPSF,
     MeasuredPSF,
@@ -200,22 +199,6 @@ def test_exposures_beside_a_gap_are_taken():
         indices, weights = frame_weights(times, STEP, start * STEP, 3 * STEP)
         assert indices == expected
         np.testing.assert_allclose(weights, 1 / 3)
-
-
-def test_peaks_count_only_what_the_exposure_covers():
-    temperature = np.full((4, 9, 9), 800.0)
-    temperature[3] = 1500.0
-    scene = make_scene(temperature)
-    (exposure,) = expose(scene, [View(BLACK.on(scene), Camera().band)], 0.0, 3 * STEP)
-    assert exposure.peak_temperature.max() == 800.0
-
-
-@given(st.integers(0, 405))
-def test_fifty_sub_frames_of_one_weight(first):
-    times = STEP * np.arange(455)
-    indices, weights = frame_weights(times, STEP, times[first], 10e-6)
-    assert indices == range(first, first + 50)
-    np.testing.assert_allclose(weights, 1 / 50, rtol=1e-9)
 
 
 @given(st.floats(0, 81e-6), st.floats(0.01e-6, 10e-6))
@@ -503,36 +486,6 @@ def test_broken_measurements_are_refused(broken):
         Measurement(data).radiance_temperature(flagged=True)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        {"pitch": 0.0},
-        {"pitch": 6.0},
-        {"shape": (0, 5)},
-        {"offset": (-1e-6, 0.0)},
-        {"fill_factor": 1.1},
-        {"psf": 12e-6},
-        {"psf_order": "both"},
-        {"integration_time": 10e-3},
-        {"frame_rate": -600.0},
-        {"detector": 3},
-        {"seed": -1},
-        {"lower_limit": 20.0},
-        {"band": "3-5 um"},
-        {"shape": 5},
-        {"shape": (5.0, 5.0)},
-        {"offset": 6e-6},
-        {"integration_time": "10 um"},
-        {"frame_rate": float("inf")},
-        {"reflected": "-300 degC"},
-    ],
-    ids=str,
-)
-def test_impossible_cameras_are_refused(values):
-    with pytest.raises(ValueError, match=rf"Camera.{next(iter(values))}(.\d)?: .*, expected"):
-        Camera(**values)
-
-
 @pytest.mark.parametrize("lower_limit", [300.0, 250, 370.0])
 def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
     with pytest.warns(
@@ -598,8 +551,6 @@ def test_exposures_of_different_grids_are_refused():
         Camera().form_measurement([one, other])
     with pytest.raises(ValueError, match="one or more exposures"):
         Camera().form_measurement([])
-    with pytest.raises(ValueError, match="mean_radiance has shape"):
-        Exposure(**{**vars(one), "mean_radiance": np.zeros((2, 2))})
 
 
 def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():

@@ -1,17 +1,14 @@
 """A camera with a detector: calibration, flags, NETD, range, seeds; the study that chooses it."""
 
 import json
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from analytic_chip import AnalyticChip
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from chipglow.analysis import Plan, analyse, error_images, headline, headlines, sensitivity_error
+from chipglow.analysis import error_images, headline
 from chipglow.camera import (
     UNUSABLE,
     AnnularAperturePSF,
@@ -38,7 +35,6 @@ from chipglow.report.facts import Facts
 from chipglow.report.rows import all_rows
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, errors, load_study, study_text
-from chipglow.surface import CHIP_1, CHIP_2
 
 SCENE = Raster(-120e-6, 90e-6, 2e-6, 90, 120)
 PLAIN = Camera(psf=None, lower_limit=None)
@@ -190,17 +186,6 @@ def test_the_lower_range_limit_is_where_the_signal_is_so_many_times_its_noise():
     assert limit == pytest.approx(expected, abs=1.0)
 
 
-def test_the_lower_range_limit_follows_exposure_and_bits():
-    made = camera(ShotNoise(), bits=14).detector
-    short, long = (
-        lower_range_limit(made, OperationPoint(BAND, integration_time=one)) for one in (2e-6, 50e-6)
-    )
-    coarse = lower_range_limit(replace(made, bits=10, offset=20.0), OperationPoint(BAND, 2e-6))
-    assert long < short < coarse
-    with pytest.raises(ValueError, match="never 1e\\+06 times its noise, expected a smaller"):
-        lower_range_limit(replace(made, least_signal=1e6), OperationPoint(BAND))
-
-
 def test_noise_follows_from_the_seed_and_when_a_frame_begins():
     made = camera(ShotNoise(), GainPattern(0.02))
     radiance = images(650.0, 3)
@@ -213,15 +198,6 @@ def test_noise_follows_from_the_seed_and_when_a_frame_begins():
     # Another noise, by the same detector.
     assert made.redrawn(1).calibration((30, 40)) is made.calibration((30, 40))
     assert np.corrcoef((other - first)[0].ravel(), (first[1] - first[2]).ravel())[0, 1] < 0.2
-
-
-def test_the_borders_warning_is_not_of_the_noise():
-    quiet = replace(PLAIN, psf=AnnularAperturePSF())
-    noisy = replace(quiet, detector=camera(ShotNoise(), ReadNoise(9e4)).detector)
-    assert (
-        noisy.form_measurement(exposure()).notes.warnings
-        == quiet.form_measurement(exposure()).notes.warnings
-    )
 
 
 def test_lag_without_a_frame_before_is_said():
@@ -307,29 +283,6 @@ def test_a_study_may_give_the_lower_limit_itself():
     assert Study(camera={"detector": "none"}).camera.build() == Camera.paper()
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("{detector: {full_well: 1e6}}", "detector.response: is missing"),
-        ("{lower_limit: detector}", "lower_limit: detector, expected a detector beside it"),
-        ("{detector: {response: {kind: x}}}", "kind: 'x', expected one of photon, energy, range"),
-        (
-            "{detector: {response: {kind: energy, per_radiance: 1}}}",
-            "Detector.gain: none, expected it or full_well",
-        ),
-        (
-            "{detector: {response: {kind: energy, per_radiance: 1}, gain: 1, terms: [{kind: y}]}}",
-            "terms.*kind: 'y', expected one of gain-pattern",
-        ),
-    ],
-)
-def test_a_study_with_an_impossible_detector_is_refused(tmp_path: Path, text, expected):
-    path = tmp_path / "study.yaml"
-    path.write_text(f"camera: {text}\n")
-    with pytest.raises(ValueError, match=re.compile(expected, re.DOTALL)):
-        load_study(path)
-
-
 def test_a_source_that_saturates_is_refused():
     with pytest.raises(ValueError, match=r"Detector.hot: 1227 °C fills the detector .* under 50"):
         camera(hot=1500.0).calibration((4, 4))
@@ -396,42 +349,6 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
         page = write_report(result, folder, "title", "", {}).read_text()
         assert ("NETD, half of the range filled" in page) == told
         assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
-
-
-@pytest.mark.slow
-def test_every_headline_draw_of_a_cut_has_noise_of_its_own():
-    """The noise is that of the detector, and another in each draw, chip and exposure."""
-    detector = Detector(
-        response=PhotonResponse(0.8, 15e-6, 5.0),
-        full_well=2e7,
-        bits=16,
-        terms=(ShotNoise(), ReadNoise(4000.0)),
-    )
-    plan = Plan(exposures=2, phases=2, textures=2, psf_widths=(12e-6,))
-    looking = Camera.paper()
-    quiet, noisy = (
-        analyse(AnalyticChip().scene(), {"chip 1": CHIP_1, "chip 2": CHIP_2}, one, plan)
-        for one in (looking, replace(looking, detector=detector))
-    )
-    netd = replace(looking, detector=detector).calibration((56, 70)).netd(800.0)
-    for name, found in headlines(noisy.data).items():
-        without = headline(quiet.data, name)
-        noise = (found.error.values - without.error.values).ravel()
-        assert np.unique(noise).size == noise.size >= 8
-        assert 0 < np.abs(noise).max() < 30 * netd
-    for order in ("detector", "optics"):
-        errors = (sensitivity_error(result.data, order, "band") for result in (noisy, quiet))
-        assert (next(errors) != next(errors)).all()
-    for name, measurement in noisy.measurements.items():
-        frame = measurement.radiance_temperature(flagged=True)[noisy.cut.developed]
-        image = noisy.data.image_measured.sel(surface=name, effects="all").values
-        known = np.isfinite(image) & np.isfinite(frame)
-        assert known.mean() > 0.3
-        np.testing.assert_allclose(image[known], frame[known], rtol=1e-9)
-    one, other = (noisy.measurements[name].radiance[0] for name in ("chip 1", "chip 2"))
-    clean = [quiet.measurements[name].radiance[0] for name in ("chip 1", "chip 2")]
-    # Two chips at the same time have other noise.
-    assert abs(np.corrcoef((one - clean[0]).ravel(), (other - clean[1]).ravel())[0, 1]) < 0.2
 
 
 def test_the_microbolometers_data_sheet_comes_back():

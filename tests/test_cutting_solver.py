@@ -163,19 +163,6 @@ def test_heat_fraction_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(
     assert heat_fraction(rate, material.heat_fractions()) == pytest.approx(fraction, rel=1e-14)
 
 
-def test_friction_of_a_block_on_the_rake_face():
-    """A block pressed on the face by its own motion: tangential force is μ times normal force."""
-    coefficient = 0.3
-    block = pressed_on_a_face(friction=coefficient)
-    block.advance(10)
-    normal, tangential = -block.force
-    assert normal > 1e3
-    assert tangential == pytest.approx(coefficient * normal, rel=1e-9, abs=1e-9 * normal)
-    work = coefficient * normal * 10 * block.step.time_step * 4.0
-    # The light nodes at the face slow down first: the slip is up to a tenth under 4 m/s.
-    assert 0.9 * work <= block.heat.sum() <= work
-
-
 @pytest.mark.parametrize(
     ("temperature", "by_hand"),
     # 0.4 (1 − (700/1400)²) = 0.3; at 293 K 1 − 0.0438; nothing is left from the melting point on.

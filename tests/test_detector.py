@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 from scipy.constants import c, h
 
 from chipglow.camera import (
@@ -158,16 +157,6 @@ def test_flicker_noise_has_the_spectrum_of_1_over_f():
         assert ratio.mean() == pytest.approx(1.0, abs=tolerance)
 
 
-def test_flicker_noise_of_single_frames_has_the_variance_of_its_decades():
-    term = FlickerNoise(100.0, since_correction=100.0)
-    processes = term.time_constants(1 / 600.0).size
-    # From 0.01 Hz to 300 Hz: 4.5 decades, two processes in each, and both ends.
-    assert processes == 10
-    counts = detector(term, offset=1e5).counts(np.zeros((1, 300, 300)), generator())
-    expected = 100.0**2 / 2 * processes
-    assert counts.var() == pytest.approx(expected, rel=5 * np.sqrt(2 / counts.size))
-
-
 def test_lag_is_a_filter_of_first_order():
     """A step's answer, and the transfer function (1 − a) / (1 − a exp(−iω)) of a sine."""
     made = detector(Lag(0.2), gain=100.0, bits=32)
@@ -183,13 +172,6 @@ def test_lag_is_a_filter_of_first_order():
         real, imaginary, _ = np.linalg.lstsq(design.T, seen, rcond=None)[0]
         expected = 1000.0 * 0.8 / (1 - 0.2 * np.exp(-1j * omega))
         assert real - 1j * imaginary == pytest.approx(expected, abs=0.01)
-
-
-def test_lag_is_only_of_a_frame_that_began_one_frame_time_before():
-    made = detector(Lag(0.5))
-    radiance = np.array([100.0, 300.0, 500.0])[:, None, None]
-    apart = made.counts(radiance, generator(), times=np.array([0.0, 1 / 600, 9.0]))
-    assert (apart[:, 0, 0] - 400).tolist() == [100, 200, 500]
 
 
 def test_elements_differ_by_their_patterns_and_dead_ones_see_nothing():
@@ -266,53 +248,6 @@ def test_another_term_leaves_the_noise_of_the_others_as_it_was():
     np.testing.assert_array_equal(*counts)
 
 
-every_term = st.sampled_from(
-    [
-        GainPattern(0.05),
-        OffsetPattern(30.0),
-        DeadElements(0.1),
-        Lag(0.3),
-        DarkCurrent(1e7),
-        ShotNoise(),
-        NonLinearity(0.2),
-        ReadNoise(20.0),
-        ColumnNoise(20.0),
-        FlickerNoise(10.0),
-        EquivalentNoise(1.0, 400.0),
-    ]
-)
-
-
-@settings(max_examples=25)
-@given(
-    terms=st.lists(every_term, unique_by=lambda term: term.kind),
-    radiance=st.floats(0.0, 1e5),
-    bits=st.integers(8, 16),
-    seed=st.integers(0, 100),
-)
-def test_counts_are_within_the_digitiser_and_follow_from_their_seed(terms, radiance, bits, seed):
-    made = detector(*terms, gain=None, full_well=5e4, bits=bits, offset=20.0)
-    counts = made.counts(np.full((3, 5, 6), radiance), generator(seed))
-    assert counts.max() < 1 << bits
-    np.testing.assert_array_equal(
-        counts, made.counts(np.full((3, 5, 6), radiance), generator(seed))
-    )
-
-
-@settings(max_examples=25)
-@given(
-    terms=st.lists(every_term, unique_by=lambda term: term.kind),
-    less=st.floats(0.0, 2e4),
-    more=st.floats(0.0, 1e4),
-)
-def test_more_light_is_no_fewer_counts_by_the_same_noise(terms, less, more):
-    """Without the shot noise, which grows with the light and is not of one sign."""
-    terms = [term for term in terms if not isinstance(term, ShotNoise)]
-    made = detector(*terms, full_well=5e4)
-    dim, bright = (frames(made, light, 2, (5, 6)) for light in (less, less + more))
-    assert (bright >= dim).all()
-
-
 def test_a_recording_knows_the_camera():
     radiance = BAND.radiance(np.full((2, 4, 5), 800.0))
     measured = Measurement.from_radiance(
@@ -329,34 +264,3 @@ def test_a_recording_knows_the_camera():
     measured.data.attrs["detector"] = "another"
     with pytest.raises(ValueError, match="the measurement has one already"):
         made.record(measured, generator())
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"gain": 0.0}, "Detector.gain: 0, expected over 0"),
-        ({"gain": None}, "Detector.gain: none, expected it or full_well"),
-        ({"offset": np.nan}, "Detector.offset: nan, expected 0 or more"),
-        ({"offset": 5000.0}, "Detector.offset: 5000, expected under the 4095 of 12 bits"),
-        ({"bits": 0}, "Detector.bits: 0, expected 1 to 32"),
-        ({"full_well": -1.0}, "Detector.full_well: -1, expected over 0"),
-        (
-            {"correction": "three-point"},
-            "Detector.correction: 'three-point', expected 'two-point'",
-        ),
-        ({"response": 3.0}, "Detector.response: kind: 3.0, expected one of photon, energy, range"),
-        ({"terms": (3,)}, "Detector.terms.0: kind: 3, expected one of gain-pattern"),
-        ({"terms": (ReadNoise(1.0),) * 2}, "two are of kind 'read-noise', expected one of each"),
-        ({"cold": 900.0, "hot": 800.0}, "Detector.hot: 800 K, expected over the 900 K of cold"),
-        ({"seed": -1}, "Detector.seed: -1, expected 0 or more"),
-        (lambda: ReadNoise(-1.0), "ReadNoise.standard_deviation: -1, expected 0 or more"),
-        (lambda: Lag(1.0), "Lag.fraction: 1, expected 0 or more, under 1"),
-        (lambda: PhotonResponse(1.5, 15e-6, 2.0), "quantum_efficiency: 1.5, expected over 0, up"),
-        (lambda: OperationPoint(frame_rate=0.0), "frame_rate: 0 Hz, expected over 0"),
-    ],
-)
-def test_impossible_detectors_are_refused(fields, message):
-    with pytest.raises(ValueError, match=message):
-        if callable(fields):
-            fields()
-        Detector(**{"response": EnergyResponse(1.0), "gain": 1.0, **fields})

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 from dataclasses import dataclass, replace
-from math import exp, sqrt
+from math import exp
 from pathlib import Path
 from typing import Annotated, ClassVar
 
@@ -13,12 +13,11 @@ import pytest
 import yaml
 from hypothesis import given, strategies as st
 from numba import njit
-from solver import STEEL as AISI_1045_JC, Block
+from solver import STEEL as AISI_1045_JC
 
 from chipglow.cutting import (
     AISI_1045,
     FLOW_LAWS,
-    CuttingSimulation,
     FlowStress,
     HyperbolicTangent,
     JohnsonCook,
@@ -42,43 +41,6 @@ CUBIC = ZerilliArmstrong(150e6, 1500e6, 0.006, 0.0002, 700e6, 0.2, 1.0, 2e3)
 @njit
 def slopes(strain, rate, temperature, law):
     return stress_and_slopes(strain, rate, temperature, law)
-
-
-def documented():
-    """What the example of a law of one's own in the documentation defines."""
-    place = Path(__file__).parents[1] / "docs" / "understand" / "cutting.md"
-    page = place.read_text(encoding="utf-8")
-    example = page.partition("### A law of your own")[2].partition("```python\n")[2]
-    names = {"__name__": "own"}
-    exec(example.partition("```")[0], names)
-    return names
-
-
-@pytest.mark.slow
-def test_law_of_the_documentation_is_what_the_solver_follows(own_laws):
-    """Isothermal simple shear at 1e5 /s; the law and its arguments are all in the result."""
-    names = documented()
-    law = names["law"]
-    assert FLOW_LAWS.find("power") is names["PowerLaw"]
-    assert isinstance(names["simulation"], CuttingSimulation)
-    rate = 1e5
-    material = replace(AISI_1045, flow_stress=law, damage=None, taylor_quinney=0.0)
-    # So heavy that nothing slows it: the shear stays as it was set.
-    block = Block((60e-6, 60e-6), material=material, mass=1e9, time_step=1e-3 / rate)
-    block.set_velocity(lambda x, y: rate * y + 0 * x, lambda x, y: 0 * x * y)
-    block.points["temperature"] = 700.0
-    block.advance(1000)
-    middle = np.hypot(block.points["material_x"] - 30e-6, block.points["material_y"] - 30e-6)
-    points = block.points[middle < 10e-6]
-    strain = points["strain"]
-    dxx, dyy, dxy = block.deviator()[:, middle < 10e-6]
-    stress = np.sqrt(3 * (dxx**2 + dyy**2 + dxx * dyy + dxy**2))
-    by_hand = 1500e6 * strain**0.15 * (rate / sqrt(3)) ** 0.01 * exp(-700.0 / 1200.0)
-    # The increment is solved for to a thousandth of the trial stress at worst.
-    assert stress == pytest.approx(by_hand, rel=2e-3)
-    assert (points["damage"] == 0.0).all()
-    shear_modulus = material.shear_modulus_at(700.0)
-    assert strain == pytest.approx(1 / sqrt(3) - by_hand / (3 * shear_modulus), rel=2e-3)
 
 
 def test_a_name_is_taken_but_by_the_same_class(own_laws):

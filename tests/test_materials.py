@@ -228,26 +228,6 @@ def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
     )  # fmt: skip
 
 
-def test_material_of_the_documentation(tmp_path: Path) -> None:
-    place = Path(__file__).parents[1] / "docs" / "look-up" / "materials.md"
-    page = place.read_text(encoding="utf-8")
-    blocks = [text.partition("```")[0] for text in page.split("```yaml\n")[1:]]
-    whole, law, fractions = (
-        next(text for text in blocks if text.startswith(key))
-        for key in ("kind: workpiece", "flow_stress:", "taylor_quinney:")
-    )
-    path = tmp_path / "steel.yaml"
-    path.write_text(whole, encoding="utf-8")
-    (mine,) = read_material(path).workpieces.values()
-    assert mine.damage is not None and mine.damage.fracture_energy == 15e3
-    data = yaml.safe_load(whole) | yaml.safe_load(fractions)
-    data["flow_stress"]["softening"] = yaml.safe_load(law)["flow_stress"]["softening"]
-    path.write_text(yaml.safe_dump(data), encoding="utf-8")
-    soft = read_material(path).workpieces["softening"]
-    assert isinstance(soft.flow_stress, HyperbolicTangent) and soft.damage is None
-    assert isinstance(soft.taylor_quinney, RateTable)
-
-
 def test_elastic_constants_over_the_temperature(tmp_path: Path) -> None:
     path = tmp_path / "steel.yaml"
     rows = "value: [[300 K, 0.3], [500 K, 0.35]]\n"

@@ -169,7 +169,8 @@ def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_
     assert all(row.paper is None for row in result_rows(chip_analysis, titanium))
     write_report(chip_analysis, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    told = page[page.index("<main>") : page.index('<div class="part" id="study">')]
+    told = page[page.index("<main>") : page.index("<script>")]
+    assert "Heigel" not in told
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()

@@ -148,24 +148,6 @@ def test_bad_input_is_one_line(folder, arguments, text):
     assert not (folder / "psf.nc").exists()
 
 
-@pytest.mark.parametrize(
-    ("section", "text"),
-    [
-        ({"file": "psf.nc", "spacing": "1 um"}, "expected none: the file states it"),
-        ({"file": "psf.npy"}, "expected a length such as 1e-6 m"),
-        ({"file": "edge.nc"}, "edge.nc is not a kernel"),
-        ({"file": "cut.nc"}, "cut.nc is not a kernel: cut short"),
-        ({"file": "missing.nc"}, "missing.nc: there is no such file"),
-    ],
-)
-def test_a_file_that_is_no_kernel_is_one_error(folder, section, text):
-    np.save(folder / "psf.npy", np.ones((3, 3)))
-    (folder / "cut.nc").write_bytes((folder / "edge.nc").read_bytes()[:3000])
-    with pytest.raises(ValueError, match="camera") as caught:
-        Study(camera={"psf": {"kind": "measured", **section}})
-    assert text in str(caught.value)
-
-
 def write_counts(folder, name, fwhm=10e-6, offset=300.0, gain=400.0, normal=5.0):
     """Counts of an edge as a camera's file, cut off at 0 and 16 bits."""
     radiance = edge_radiance(gaussian_edge(fwhm), normal, background=2.0, step=5.0)

@@ -141,15 +141,6 @@ def test_bands_of_which_one_holds_the_other_have_a_range():
     assert (thermometer.sensitivity(np.array([high - 5, high + 5])) > 0).tolist() == [True, False]
 
 
-def test_what_a_thermometer_refuses():
-    with pytest.raises(ValueError, match=r"bands: .* expected the band of the shorter wavelengths"):
-        RatioThermometer(LONG, SHORT)
-    with pytest.raises(ValueError, match="emissivity_ratio: 0, expected over 0"):
-        RatioThermometer(SHORT, LONG, 0)
-    with pytest.raises(ValueError, match="emissivity_ratio_uncertainty: -1, expected 0"):
-        RatioThermometer(SHORT, LONG, 1.0, -1)
-
-
 # --- bands in one sweep, and cameras in other bands
 
 
@@ -342,20 +333,6 @@ def test_noise_is_that_of_both_channels():
     )
     # A second way: frames of a flat field, of 64 x 64 elements.
     assert float(study.noise[0, -1]) == pytest.approx(found, rel=0.03)
-
-
-def test_what_a_ratio_camera_refuses():
-    camera = two()
-    for field, value in (("pitch", 5e-6), ("shape", (3, 3)), ("offset", (1e-6, 0.0))):
-        other = replace(camera.second, **{field: value})
-        with pytest.raises(ValueError, match=f"{field} is .* expected the same of both"):
-            RatioCamera(camera.first, other)
-    with pytest.raises(ValueError, match="the band of the shorter wavelengths first"):
-        RatioCamera(camera.second, camera.first)
-    with pytest.raises(ValueError, match="shift"):
-        two(shift=(np.nan, 0.0))
-    with pytest.raises(ValueError, match="delay"):
-        two(delay=np.inf)
 
 
 # --- the choice of bands

@@ -56,12 +56,6 @@ def test_view_factor_of_a_groove(angle):
     assert found == pytest.approx(1 - np.sin(np.radians(angle) / 2), abs=5e-4)
 
 
-def test_view_factor_of_opposite_strips():
-    exchange = Exchange(*lines([[1, 0.7], [0, 0.7]], [[0, 0], [1, 0]]))
-    expected = np.hypot(1, 0.7) - 0.7  # within two of 2048 rays
-    np.testing.assert_allclose(exchange.view_factors[[0, 1], [1, 0]], expected, atol=1e-3)
-
-
 @given(st.floats(0.3, 3.0), st.floats(0.1, 0.9), st.integers(2, 9))
 @settings(max_examples=25)
 def test_rows_have_the_sum_one_and_are_reciprocal(angle, radius, count):
@@ -387,31 +381,3 @@ def test_a_study_switches_it_on():
         (shape,) = on[name].modifiers
         assert shape.angle == pytest.approx(np.radians(60))
         assert replace(shape, angle=Wedge().angle) == Wedge()
-
-
-def reflecting(**section):
-    return Study(surface={"reflections": {"kind": "wedge", **section}})
-
-
-WITHOUT_TOOL = {"temperature": np.full((1, *RASTER.shape), HOT)}
-MIRRORED = UniformSurface(0.4).modified(Wedge())
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Wedge(overhang=-40e-6), "covers the rake face"),
-        (lambda: MIRRORED.on(a_scene()), "no band is given"),
-        (
-            lambda: CAMERA.lay(MIRRORED, Scene.from_fields(RASTER, [0.0], WITHOUT_TOOL)),
-            "does not state its tool",
-        ),
-        (lambda: reflecting(kind="groove"), "expected one of wedge"),
-        (lambda: reflecting(angle="95 deg"), "up to 90 deg"),
-        (lambda: reflecting(angle="90 deg"), "covers the rake face"),
-        (lambda: reflecting(mirror=1.5), "0 to 1"),
-    ],
-)
-def test_what_cannot_reflect_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()

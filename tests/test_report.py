@@ -126,10 +126,10 @@ def test_every_figure_is_there_as_picture_and_as_drawing(folder):
 
 def test_the_page_stands_alone_and_escapes_text(page, result, facts):
     assert page.open == []
-    assert all(s.startswith(("data:image/png;base64,", "#")) for s in page.sources)
+    inside = ("data:image/png;base64,", "#", "study.yaml")
+    assert all(source.startswith(inside) for source in page.sources)
     assert page.seen.count("script") == 1 and not {"b", "i", "link"} & set(page.seen)
     shown = "".join(page.text)
-    assert STUDY in shown
     for value in (*PROVENANCE.values(), *REMARKS, *sentences_of(facts)):
         assert value in shown
     rows = all_rows(facts)
@@ -152,13 +152,14 @@ def sentences_of(facts):
 
 
 def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, facts):
-    assert page.sections == ["answer", "causes", "comparison", "tables", "repeat"]
+    assert page.sections == ["answer", "causes", "details", "comparison", "tables", "repeat"]
+    assert page.seen.count("details") == 4  # all but the answer and its causes is folded
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2
     sentences = sentences_of(facts)
     assert len(sentences) == 4
     assert "steady" not in shown.lower()
-    later = (REMARKS[0], "Causes of the errors\n", "Figure 2:", "Table 1:", STUDY)
+    later = (REMARKS[0], "would reduce it", "Figure 2:", "Table 1:", "study.yaml")
     places = [shown.index(text) for text in (TITLE, *sentences, *later)]
     assert places == sorted(places)
 

@@ -20,7 +20,6 @@ from chipglow.cutting import (
     OutputWindow,
     SolverError,
 )
-from chipglow.cutting.points import block_of_points, fastest_point, find_trouble
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink
@@ -286,15 +285,6 @@ def test_a_run_that_goes_wrong_says_what_where_and_when(name, value, what):
     assert 10.0 <= when <= 11.1
     assert -200 <= x <= 50
     assert -1100 <= y <= 0
-
-
-def test_the_fastest_point_is_found():
-    points = block_of_points(np.arange(4.0), np.arange(3.0), 1.0, 300.0, 4.0)
-    assert find_trouble(points) is None
-    points["vy"][7] = -41.0
-    speed, index = fastest_point(points)
-    assert speed == pytest.approx(np.hypot(4.0, 41.0))
-    assert index == 7
 
 
 def test_a_run_that_goes_wrong_keeps_its_last_good_state_and_names_it(cache, monkeypatch):

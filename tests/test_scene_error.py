@@ -217,7 +217,7 @@ def test_the_command_reports_without_a_word_of_cutting(folder, reported):
     assert not re.search(r"\b(chip|rake|shear|cut|cutting|tool|workpiece|paper)\b", told, re.I)
     assert "Measurement error of plate.nc" in told
     sections = re.findall(r'<section id="(\w+)">', page)
-    assert sections == ["answer", "causes", "comparison", "repeat"]
+    assert sections == ["answer", "causes", "details", "comparison", "repeat"]
     assert set(re.findall(r'href="#([^"]+)"', page)) <= set(re.findall(r' id="([^"]+)"', page))
     # Two exposures of three views, and a scale of colours each.
     assert page.count("<img data-frame=") == 6 and page.count('<div class="scale">') == 3

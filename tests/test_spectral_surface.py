@@ -7,7 +7,7 @@ from scipy.integrate import quad
 
 from chipglow.camera import Camera
 from chipglow.radiometry import Band
-from chipglow.radiometry.planck import spectral_radiance
+from chipglow.radiometry.band import spectral_radiance
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.surface import HagenRubens, SpectralTable
@@ -85,20 +85,6 @@ def test_resistivity_grows_with_temperature():
 def test_without_a_camera_there_is_no_band():
     with pytest.raises(ValueError, match="spectral: no band"):
         TABLE.on(scene(500.0))
-
-
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [
-        ((), "0 rows"),
-        (((3e-6, 300.0, 0.6), (4e-6, 400.0, 0.6)), "2 rows of 2 wavelengths"),
-        (((3e-6, 300.0, 0.6), (3e-6, 300.0, 0.7)), "each pair of them once"),
-        (((3e-6, 300.0, 1.6),), "expected 0 to 1"),
-    ],
-)
-def test_impossible_tables_are_refused(rows, message):
-    with pytest.raises(ValueError, match=message):
-        SpectralTable(rows)
 
 
 @pytest.mark.parametrize(

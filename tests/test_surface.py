@@ -12,7 +12,6 @@ from chipglow.surface import (
     CHIP_2,
     Emissivity,
     EmissivityStack,
-    PhaseSurface,
     Texture,
     UniformSurface,
     chip_fraction,
@@ -83,14 +82,6 @@ def test_without_restoring_enlarging_takes_a_fifth():
     # 16384 deviates: 0.55 % standard deviation of a standard deviation; four of it.
     found = texture(0.5, 0.05, restore=False).standard_deviation
     assert found == pytest.approx(0.05 * 57 / 70, rel=0.022)
-
-
-@pytest.mark.parametrize("restore", [True, False])
-@pytest.mark.parametrize("seed", range(3))
-def test_mean_is_that_asked_for(restore, seed):
-    map_ = texture(0.42, 0.07, seed=seed, restore=restore)
-    # 16384 deviates, widened by at most a quarter: four standard errors of the mean.
-    assert map_.mean == pytest.approx(0.42, abs=4 * 0.07 * 1.25 / MAP_SIZE)
 
 
 @pytest.mark.parametrize(
@@ -302,37 +293,3 @@ def test_a_uniform_surface_is_black_but_for_the_void():
 def test_no_kernel_of_the_surface_waits_by_spinning():
     for kernel in (_blend, _look_up):
         assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")
-
-
-def emissivity_of_another_shape():
-    other = a_scene(raster=replace(RASTER, rows=10)).frame(0)
-    replace(CHIP_1, follow="none").on(a_scene()).emissivity(other)
-
-
-def emissivity_of_a_bare_frame():
-    CHIP_1.on(a_scene(coordinates=at_rest())).emissivity(a_scene().frame(0))
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: replace(CHIP_1, grain=0.0), "FeatureSurface.grain: 0 m, expected over 0 m"),
-        (lambda: replace(CHIP_1, follow="chip"), "follow: 'chip', expected 'material', 'mean' or"),
-        (lambda: replace(CHIP_1, seed=-1), "FeatureSurface.seed: -1, expected 0 or more"),
-        (lambda: Emissivity(1.2, 0.1), "Emissivity.mean: 1.2, expected 0 to 1"),
-        (lambda: Emissivity(0.4, 0.45), "0.45, expected up to 0.441 about a mean of 0.4"),
-        (lambda: Emissivity(1.0, 0.1), "deviation: 0.1, expected up to 0 about a mean of 1"),
-        (lambda: UniformSurface(-0.5), "UniformSurface.emissivity: -0.5, expected 0 to 1"),
-        (lambda: texture(grain=0.0), "grain must be over 0 m, got 0.0 m"),
-        (
-            lambda: CHIP_1.on(a_scene()),
-            "no coordinates of the material for 'material'",
-        ),
-        (emissivity_of_another_shape, r"has shape \(10, 60\), expected \(50, 60\)"),
-        (emissivity_of_a_bare_frame, "frame: has no material coordinates"),
-        (lambda: PhaseSurface(0.4, 0.2, 1700.0, 1600.0), "liquidus: 1600 K, expected over"),
-    ],
-)
-def test_impossible_surfaces_are_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()

@@ -289,26 +289,6 @@ def test_a_line_comes_back_from_its_file_with_its_covariance(tmp_path):
     assert stored.estimate.warnings == line.estimate.warnings
 
 
-def test_the_error_of_a_calibration_cancels_by_a_line_too():
-    """A gain that is off is in the emissivity and in the image: nothing of it is left."""
-    calibration = fitted(common=0.5)
-    rows = [
-        determine_emissivity(
-            [developed(calibration, one, on_the_line(one))], replace(HEATING, reference=one)
-        )
-        .of(WHOLE)
-        .line
-        for one in HEATED
-    ]
-    line, seen = emissivity_line(rows), developed(calibration, 750.0, on_the_line(750.0))
-    one, other = (
-        true_temperature([seen], WHOLE, line, calibration=known) for known in (None, calibration)
-    )
-    assert other.correlation > 0.9
-    left, all_of_it = (float(o.estimate.contribution("calibration")) for o in (other, one))
-    assert left < 0.5 * all_of_it
-
-
 def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     """Means of two regions, as anyone reads them who knows obsarray's attributes."""
     halves = [

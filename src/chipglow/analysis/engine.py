@@ -1,6 +1,6 @@
 """The analysis of a scene: the schedule of its images, the places that are read, the result."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
@@ -35,6 +35,7 @@ from chipglow.laboratory.chip import (
     resolution_warnings,
 )
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
+from chipglow.scene.lines import nearest
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.surface import EmissivityField, Surface
 
@@ -214,7 +215,8 @@ def analyse(
     data = xr.Dataset(variables, attrs=attributes)
     data = data.set_coords([name for name in _COORDINATES if name in data])
     exposure = schedule.drawn.index(schedule.shown)
-    places = {place.name: place for view in schedule.views for place in view.places[exposure]}
+    read = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
+    warnings += _range_warnings(measurements, schedule.shown, read)
     return Analysis(
         data=data,
         plan=plan,
@@ -222,7 +224,7 @@ def analyse(
         raster=scene.raster,
         frame=frame,
         tool=scene.tool,
-        places=tuple(places.values()),
+        places=tuple({place.name: place for _, place in read}.values()),
         measurements=measurements,
         cut=cut,
         warnings=tuple(warnings),
@@ -485,6 +487,26 @@ def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
     for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"
+
+
+def _range_warnings(
+    measurements: Mapping[str, Measurement], shown: int, read: Sequence[tuple[str, Place]]
+) -> Iterator[str]:
+    """Yield a sentence for each image and place that the camera hardly sees."""
+    for name, one in measurements.items():
+        unusable = ~one.usable[shown]
+        parts: dict[str, tuple[float, Array]] = {f"Image of {name}": (0.9, unusable)}
+        for surface, place in read:
+            outline = place.outline()
+            if surface == name and outline is not None:
+                seen = nearest(unusable.astype(np.float64), one.raster, outline)
+                parts[f"{place.name[0].upper()}{place.name[1:]} ({name})"] = 0.5, seen
+        for title, (most, values) in parts.items():
+            if np.nanmean(values) >= most:
+                yield (
+                    f"{title}: {100 * np.nanmean(values):.0f} % of the pixels are outside the "
+                    "camera's range, so that a real camera does not show them."
+                )
 
 
 def _unread(data: xr.Dataset) -> Iterator[str]:

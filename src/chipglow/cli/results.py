@@ -44,7 +44,7 @@ def write_results(
             steady, failed = _steady(steady_study, progress, resume)
             analysis = replace(analysis, failed={**analysis.failed, **failed})
             progress("report", 0.0)
-            titled = _titled(study, analysis)
+            titled = _titled(study)
             report = write_report(
                 analysis,
                 temporary,
@@ -69,7 +69,8 @@ def write_results(
         summary = (folder / "summary.json").read_text(encoding="utf-8")
         screen.values({"summary": json.loads(summary)})
     screen.file(folder / report.relative_to(temporary), "Report")
-    screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}. {CITATION}")
+    method = f" {CITATION}" if study.is_papers else ""
+    screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}.{method}")
 
 
 def _steady(
@@ -87,11 +88,11 @@ def _steady(
     return analysis, {}
 
 
-def _titled(study: Study, analysis: Analysis) -> Study:
-    """Return the study, with a title of its own if it is no cut and has the default title."""
-    if analysis.cut is not None or study.title != Study().title:
+def _titled(study: Study) -> Study:
+    """Return the study, with a title of its own if it has the default one and is another study."""
+    if study.is_papers or study.title != Study().title:
         return study
-    of = Path(study.scene).name if study.scene is not None else "the cut"
+    of = Path(study.scene).name if study.scene is not None else "a cut"
     return changed(study, {"title": f"Measurement error of {of}"})
 
 

@@ -1,7 +1,7 @@
 """The flow-stress laws that come with chipglow."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from numba import njit
@@ -56,7 +56,7 @@ class JohnsonCook(FlowStress):
     ε̇/ε̇₀ at least 1.
     """
 
-    kind: ClassVar[str] = "johnson-cook"
+    kind = "johnson-cook"
     yield_stress: Annotated[float, Parameter("A.", STRESS, over=0.0)]
     hardening: Annotated[float, Parameter("B.", STRESS, least=0.0)]
     hardening_exponent: Annotated[float, Parameter("n.", over=0.0)]
@@ -84,7 +84,7 @@ class HyperbolicTangent(JohnsonCook):
     the exponent s is that of Sima and Özel (2010), Int. J. Mach. Tools Manuf. 50, 943.
     """
 
-    kind: ClassVar[str] = "tanh"
+    kind = "tanh"
     hardening_limit: Annotated[float, Parameter("a.", least=0.0)]
     recovery_temperature: Annotated[float, Parameter("b.", least=0.0)]
     recovery_strain: Annotated[float, Parameter("c.", over=0.0)]
@@ -115,7 +115,7 @@ class MarusichOrtiz(FlowStress):
     not seen.)
     """
 
-    kind: ClassVar[str] = "marusich-ortiz"
+    kind = "marusich-ortiz"
     yield_stress: Annotated[float, Parameter("σ₀.", STRESS, over=0.0)]
     reference_strain: Annotated[float, Parameter("ε₀.", over=0.0)]
     reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)]
@@ -163,7 +163,7 @@ class ZerilliArmstrong(FlowStress):
     (Equations as widely cited; neither paper was seen.)
     """
 
-    kind: ClassVar[str] = "zerilli-armstrong"
+    kind = "zerilli-armstrong"
     athermal_stress: Annotated[float, Parameter("C₀.", STRESS, over=0.0)]
     thermal_stress: Annotated[float, Parameter("C₁.", STRESS, least=0.0)]
     thermal_softening: Annotated[float, Parameter("C₃.", PER_KELVIN, least=0.0)]

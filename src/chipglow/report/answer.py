@@ -54,7 +54,7 @@ def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
     template = texts()["answers"].get(name, texts()["answers"]["any"])
     values = {"name": name, "surface": found.surface, "error": error_text(found.error)}
     parts = [facts.text(template, **values)]
-    fraction = found.psf_fraction
+    fraction = found.psf_fraction if facts.analysis.cut else None
     if fraction is not None and fraction.mean > 0:  # blur may raise the temperature beside a band
         percent = spread_text(100 * fraction.mean, 100 * fraction.expanded_uncertainty, "%", 0)
         parts.append(f"the point spread function accounts for {percent} of the error")
@@ -74,6 +74,21 @@ def _of_true_temperature(facts: Facts, name: str) -> str:
         plain=_side(found.true_error.mean),
         corrected=_side(found.corrected_error.mean),
     )
+
+
+def changes(facts: Facts, errors: Sequence[Row]) -> list[str]:
+    """Return a sentence for each main error: its largest part, and what would reduce it."""
+    rows = {row.key: row for row in errors}
+    sentences = []
+    for name in islice(_main(facts), _MAX_SENTENCES):
+        row = rows[f"{slug(name)}_error_degC"]
+        if row.here is None or not row.parts:
+            continue
+        sign = -1 if row.here < 0 else 1
+        part, draws = max(row.parts.items(), key=lambda item: sign * item[1].mean)
+        values = {"quantity": row.quantity, "here": row.here, "part": draws.mean}
+        sentences.append(facts.text(texts()["changes"][part], **values))
+    return sentences
 
 
 def error_text(error: Distribution) -> str:

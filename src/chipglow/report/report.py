@@ -13,7 +13,7 @@ from chipglow.analysis import Analysis, with_errors
 from chipglow.drawing import drawing
 from chipglow.io import write_dataset
 from chipglow.report import cut_figures, figures, paper
-from chipglow.report.answer import answer
+from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
 from chipglow.report.player import exposure_player
@@ -87,7 +87,7 @@ def write_report(
     title : str
         Title of the page.
     study_text : str
-        The study's YAML, written as ``study.yaml`` and shown in the report.
+        The study's YAML, written as ``study.yaml``, to which the report leads.
     provenance : mapping
         Origin, time, version, seed and the like, in the order of display.
     remarks : sequence of str
@@ -117,10 +117,10 @@ def write_report(
     (folder / "figures").mkdir()
     values = {
         "title": title,
-        "study_text": study_text,
         "provenance": provenance,
         "remarks": remarks,
         "answer": answer(facts, rows["errors"]),
+        "changes": changes(facts, rows["errors"]),
         "note": facts.text(texts()["note"]),
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),

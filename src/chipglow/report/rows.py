@@ -176,7 +176,7 @@ def _reading(facts: Facts, name: str) -> Iterator[Row]:
         more: Any = {"reference": celsius, "parts": parts}
         yield _drawn(facts, name, "error_degC", found.error, one.error, **more)
     fraction = found.psf_fraction if found else None
-    if found and fraction is None and facts.analysis.cut is None:
+    if found and facts.analysis.cut is None:
         yield _drawn(facts, name, "psf_portion_degC", found.psf_portion, one.psf_portion)
     else:
         draws = fraction and replace(fraction, values=100 * fraction.values, limits=(0.0, 100.0))

@@ -33,7 +33,7 @@ class Study(Part):
     """
 
     title: Annotated[str, Parameter("What the report is headed with.")] = (
-        "The effects of emissivity and camera point spread function (Heigel and Whitenton 2010)"
+        "Reproduction of Heigel and Whitenton (2010) by chipglow"
     )
     seed: Annotated[int, Parameter("Seed of all random numbers.", least=0)] = 2010
     scene: Annotated[
@@ -97,7 +97,7 @@ class Study(Part):
     @classmethod
     def quick(cls) -> Self:
         """Return the paper's study on a coarse cell and coarse samples."""
-        title = "Quick look at the study of Heigel and Whitenton (2010)"
+        title = "Quick reproduction of Heigel and Whitenton (2010) by chipglow"
         cutting = {
             "window": {"interval": "0.5 us", "later_bands": 1},
             "field_of_view": {"spacing": "1.5 um", "rows": 520, "columns": 460},

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass
 from math import cos, radians
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,8 +76,8 @@ class Fresnel(Direction):
     the angle.
     """
 
-    kind: ClassVar[str] = "fresnel"
-    example: ClassVar[str] = "{kind: fresnel, n: 4.6, k: 15, tilt: 10 deg}"
+    kind = "fresnel"
+    example = "{kind: fresnel, n: 4.6, k: 15, tilt: 10 deg}"
     n: Annotated[float, Parameter("Refractive index in the camera's band.", over=0.0)]
     k: Annotated[float, Parameter("Its extinction coefficient.", least=0.0)]
 

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,10 +84,8 @@ class ParabolicOxide(Oxide):
     at nanometres and microseconds is an assumption.
     """
 
-    kind: ClassVar[str] = "parabolic"
-    example: ClassVar[str] = (
-        "{kind: parabolic, rate: 6.1e-4 m^2/s, activation_energy: 169.5 kJ/mol}"
-    )
+    kind = "parabolic"
+    example = "{kind: parabolic, rate: 6.1e-4 m^2/s, activation_energy: 169.5 kJ/mol}"
     rate: Annotated[float, Parameter("Its factor k₀.", OXIDATION_RATE, over=0.0)] = 6.1e-4
     activation_energy: Annotated[
         float, Parameter("Its activation energy Q.", ACTIVATION_ENERGY, over=0.0)

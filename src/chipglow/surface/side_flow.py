@@ -4,7 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, radians, sin
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -282,8 +282,8 @@ class Wedge(SideShape):
     a wedge of 71 um that is 29 um deep, 1 % of the width of the paper's disc.
     """
 
-    kind: ClassVar[str] = "wedge"
-    example: ClassVar[str] = "{kind: wedge, angle: 45 deg, bulge_radius: 100 um}"
+    kind = "wedge"
+    example = "{kind: wedge, angle: 45 deg, bulge_radius: 100 um}"
     angle: Annotated[
         float,
         Parameter(

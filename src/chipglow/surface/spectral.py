@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +77,8 @@ class SpectralSurface(Surface):
 class SpectralTable(SpectralSurface):
     """A table over wavelength and true temperature, linear between, constant beyond its ends."""
 
-    kind: ClassVar[str] = "spectral"
-    example: ClassVar[str] = "{kind: spectral, table: [[3 um, 20 degC, 0.3], [5 um, 20 degC, 0.2]]}"
+    kind = "spectral"
+    example = "{kind: spectral, table: [[3 um, 20 degC, 0.3], [5 um, 20 degC, 0.2]]}"
     table: Annotated[
         tuple[tuple[Wavelength, Temperature, float], ...],
         Parameter("Wavelength, temperature, emissivity a row: every pair of the first two once."),
@@ -126,10 +126,8 @@ class HagenRubens(SpectralSurface):
     on; oxide and roughness emit more.
     """
 
-    kind: ClassVar[str] = "hagen-rubens"
-    example: ClassVar[str] = (
-        "{kind: hagen-rubens, resistivity: 1.7e-7 ohm*m, coefficient: 0.005 K^-1}"
-    )
+    kind = "hagen-rubens"
+    example = "{kind: hagen-rubens, resistivity: 1.7e-7 ohm*m, coefficient: 0.005 K^-1}"
     resistivity: Annotated[
         float, Parameter("Electrical resistivity at 20 °C.", RESISTIVITY, over=0.0)
     ]

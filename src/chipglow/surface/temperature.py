@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,8 +37,8 @@ class HomogeneousSurface(Surface):
 class UniformSurface(HomogeneousSurface):
     """The same emissivity everywhere."""
 
-    kind: ClassVar[str] = "uniform"
-    example: ClassVar[str] = "{kind: uniform, emissivity: 0.5}  everywhere the same"
+    kind = "uniform"
+    example = "{kind: uniform, emissivity: 0.5}  everywhere the same"
     emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)]
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
@@ -53,10 +53,8 @@ class TemperatureSurface(HomogeneousSurface):
     Two rows of one temperature are a jump.
     """
 
-    kind: ClassVar[str] = "temperature"
-    example: ClassVar[str] = (
-        "{kind: temperature, table: [[20 degC, 0.2], [1400 degC, 0.4]]}  linear between"
-    )
+    kind = "temperature"
+    example = "{kind: temperature, table: [[20 degC, 0.2], [1400 degC, 0.4]]}  linear between"
     table: Annotated[
         tuple[tuple[Temperature, float], ...],
         Parameter("Temperature and emissivity, a pair a row; linear between."),
@@ -92,10 +90,8 @@ class TemperatureSurface(HomogeneousSurface):
 class PhaseSurface(HomogeneousSurface):
     """Solid or liquid, by the true temperature."""
 
-    kind: ClassVar[str] = "phase"
-    example: ClassVar[str] = (
-        "{kind: phase, solid: 0.4, liquid: 0.25, solidus: 1658 K, liquidus: 1723 K}"
-    )
+    kind = "phase"
+    example = "{kind: phase, solid: 0.4, liquid: 0.25, solidus: 1658 K, liquidus: 1723 K}"
     solid: Annotated[float, Parameter("Emissivity up to the solidus.", least=0.0, most=1.0)]
     liquid: Annotated[
         float,

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from math import pi
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from scipy.constants import c, h
@@ -64,10 +64,8 @@ class PhotonResponse(DetectorResponse):
     energy. A is the part of the element's square that takes light.
     """
 
-    kind: ClassVar[str] = "photon"
-    example: ClassVar[str] = (
-        "{kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5}"
-    )
+    kind = "photon"
+    example = "{kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5}"
     quantum_efficiency: Annotated[
         float, Parameter("Electrons for each photon.", over=0.0, most=1.0)
     ]
@@ -108,8 +106,8 @@ class PhotonResponse(DetectorResponse):
 class EnergyResponse(DetectorResponse):
     """A detector of which the response to radiance is known, as of a calibration."""
 
-    kind: ClassVar[str] = "energy"
-    example: ClassVar[str] = "{kind: energy, per_radiance: 1.2e4}"
+    kind = "energy"
+    example = "{kind: energy, per_radiance: 1.2e4}"
     per_radiance: Annotated[
         float, Parameter("Electrons that 1 W/(m² sr) makes in a frame.", over=0.0)
     ]
@@ -123,8 +121,8 @@ class EnergyResponse(DetectorResponse):
 class RangeResponse(DetectorResponse):
     """A camera of which only the measuring range is known: a blackbody at its end fills it."""
 
-    kind: ClassVar[str] = "range"
-    example: ClassVar[str] = "{kind: range, hottest: 140 degC}"
+    kind = "range"
+    example = "{kind: range, hottest: 140 degC}"
     hottest: Annotated[float, Parameter("Upper end of the range.", TEMPERATURE)]
 
     def electrons(self, point: OperationPoint, capacity: float) -> float:

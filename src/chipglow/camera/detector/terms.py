@@ -108,9 +108,9 @@ class GainPattern(DetectorTerm):
     n becomes n (1 + s z) with one normal deviate z for each element.
     """
 
-    kind: ClassVar[str] = "gain-pattern"
-    example: ClassVar[str] = "{kind: gain-pattern, standard_deviation: 0.02}"
-    stage: ClassVar[Stage] = Stage.LIGHT
+    kind = "gain-pattern"
+    example = "{kind: gain-pattern, standard_deviation: 0.02}"
+    stage = Stage.LIGHT
     standard_deviation: Annotated[
         float, Parameter("Of the elements' gains, as a fraction of their mean.", least=0.0)
     ]
@@ -125,9 +125,9 @@ class GainPattern(DetectorTerm):
 class DeadElements(DetectorTerm):
     """Elements that do not answer to light, at random places."""
 
-    kind: ClassVar[str] = "dead-elements"
-    example: ClassVar[str] = "{kind: dead-elements, fraction: 0.002}"
-    stage: ClassVar[Stage] = Stage.LIGHT
+    kind = "dead-elements"
+    example = "{kind: dead-elements, fraction: 0.002}"
+    stage = Stage.LIGHT
     fraction: Annotated[float, Parameter("Of all elements.", least=0.0, under=1.0)]
 
     def mask(self, shape: tuple[int, ...], seed: int) -> NDArray[np.bool_]:
@@ -148,9 +148,9 @@ class Lag(DetectorTerm):
     where it is not among the frames, the scene is taken to have been as it is.
     """
 
-    kind: ClassVar[str] = "lag"
-    example: ClassVar[str] = "{kind: lag, fraction: 0.02}"
-    stage: ClassVar[Stage] = Stage.LIGHT
+    kind = "lag"
+    example = "{kind: lag, fraction: 0.02}"
+    stage = Stage.LIGHT
     fraction: Annotated[float, Parameter("Of the frame before.", least=0.0, under=1.0)]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
@@ -176,9 +176,9 @@ def follows(times: Array, frame_time: float) -> NDArray[np.bool_]:
 class DarkCurrent(DetectorTerm):
     """Electrons that come without light: current times integration time (EMVA 1288, 2.3)."""
 
-    kind: ClassVar[str] = "dark-current"
-    example: ClassVar[str] = "{kind: dark-current, current: 50 kHz}  electrons a second"
-    stage: ClassVar[Stage] = Stage.DARK
+    kind = "dark-current"
+    example = "{kind: dark-current, current: 50 kHz}  electrons a second"
+    stage = Stage.DARK
     current: Annotated[
         float, Parameter("Electrons a second and element.", ELECTRON_RATE, least=0.0)
     ]
@@ -195,9 +195,9 @@ class ShotNoise(DetectorTerm):
     They are taken as normal, which a Poisson process is from some 100 electrons on.
     """
 
-    kind: ClassVar[str] = "shot-noise"
-    example: ClassVar[str] = "{kind: shot-noise}"
-    stage: ClassVar[Stage] = Stage.CHARGE
+    kind = "shot-noise"
+    example = "{kind: shot-noise}"
+    stage = Stage.CHARGE
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
         noise = readout.normal(*electrons.shape[1:])
@@ -212,9 +212,9 @@ class NonLinearity(DetectorTerm):
     Beyond the capacity it goes on as n (1 − f).
     """
 
-    kind: ClassVar[str] = "non-linearity"
-    example: ClassVar[str] = "{kind: non-linearity, fraction: 0.01}"
-    stage: ClassVar[Stage] = Stage.TRANSFER
+    kind = "non-linearity"
+    example = "{kind: non-linearity, fraction: 0.01}"
+    stage = Stage.TRANSFER
     fraction: Annotated[
         float,
         Parameter(
@@ -232,9 +232,9 @@ class NonLinearity(DetectorTerm):
 class OffsetPattern(DetectorTerm):
     """Elements that differ in the dark (EMVA 1288: DSNU)."""
 
-    kind: ClassVar[str] = "offset-pattern"
-    example: ClassVar[str] = "{kind: offset-pattern, standard_deviation: 2000}"
-    stage: ClassVar[Stage] = Stage.READOUT
+    kind = "offset-pattern"
+    example = "{kind: offset-pattern, standard_deviation: 2000}"
+    stage = Stage.READOUT
     standard_deviation: Annotated[
         float, Parameter("Of the elements' offsets, in electrons.", least=0.0)
     ]
@@ -249,9 +249,9 @@ class OffsetPattern(DetectorTerm):
 class ReadNoise(DetectorTerm):
     """Noise of reading, which does not depend on the light (EMVA 1288, 2.2)."""
 
-    kind: ClassVar[str] = "read-noise"
-    example: ClassVar[str] = "{kind: read-noise, standard_deviation: 300}"
-    stage: ClassVar[Stage] = Stage.READOUT
+    kind = "read-noise"
+    example = "{kind: read-noise, standard_deviation: 300}"
+    stage = Stage.READOUT
     standard_deviation: Annotated[float, Parameter("In electrons.", least=0.0)]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
@@ -263,9 +263,9 @@ class ReadNoise(DetectorTerm):
 class ColumnNoise(DetectorTerm):
     """Noise of the columns' amplifiers: in every frame the same in all elements of a column."""
 
-    kind: ClassVar[str] = "column-noise"
-    example: ClassVar[str] = "{kind: column-noise, standard_deviation: 100}"
-    stage: ClassVar[Stage] = Stage.READOUT
+    kind = "column-noise"
+    example = "{kind: column-noise, standard_deviation: 100}"
+    stage = Stage.READOUT
     standard_deviation: Annotated[float, Parameter("In electrons.", least=0.0)]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
@@ -284,11 +284,9 @@ class FlickerNoise(DetectorTerm):
     frame rate; the frames of the correction have it too.
     """
 
-    kind: ClassVar[str] = "flicker-noise"
-    example: ClassVar[str] = (
-        "{kind: flicker-noise, standard_deviation: 50, since_correction: 100 s}  1/f"
-    )
-    stage: ClassVar[Stage] = Stage.READOUT
+    kind = "flicker-noise"
+    example = "{kind: flicker-noise, standard_deviation: 50, since_correction: 100 s}  1/f"
+    stage = Stage.READOUT
     standard_deviation: Annotated[
         float, Parameter("In electrons, of each decade of frequencies.", least=0.0)
     ]
@@ -324,9 +322,9 @@ class EquivalentNoise(DetectorTerm):
     light. It holds all noise: no other term of noise should stand beside it.
     """
 
-    kind: ClassVar[str] = "netd"
-    example: ClassVar[str] = "{kind: netd, netd: 50 mK, temperature: 30 degC}"
-    stage: ClassVar[Stage] = Stage.READOUT
+    kind = "netd"
+    example = "{kind: netd, netd: 50 mK, temperature: 30 degC}"
+    stage = Stage.READOUT
     netd: Annotated[
         float, Parameter("Difference as large as the noise.", TEMPERATURE_DIFFERENCE, least=0.0)
     ]

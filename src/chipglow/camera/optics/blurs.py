@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from math import ceil, cos, pi, sin
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from scipy import fft
@@ -85,8 +85,8 @@ class _RandomBlur(BlurTerm):
 class ChargeDiffusion(_RandomBlur):
     """Charge that diffuses into neighbouring detector elements before it is collected."""
 
-    kind: ClassVar[str] = "charge-diffusion"
-    example: ClassVar[str] = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
+    kind = "charge-diffusion"
+    example = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
 
 
 @BLURS.part
@@ -94,8 +94,8 @@ class ChargeDiffusion(_RandomBlur):
 class Jitter(_RandomBlur):
     """Vibration at random with many periods in an integration time."""
 
-    kind: ClassVar[str] = "jitter"
-    example: ClassVar[str] = "{kind: jitter, standard_deviation: 1 um}"
+    kind = "jitter"
+    example = "{kind: jitter, standard_deviation: 1 um}"
 
 
 @BLURS.part
@@ -103,8 +103,8 @@ class Jitter(_RandomBlur):
 class LinearMotion(BlurTerm):
     """Camera and scene that move against each other, evenly, while the camera integrates."""
 
-    kind: ClassVar[str] = "linear-motion"
-    example: ClassVar[str] = "{kind: linear-motion, distance: 4 um, direction: 0 deg}"
+    kind = "linear-motion"
+    example = "{kind: linear-motion, distance: 4 um, direction: 0 deg}"
     distance: Annotated[
         float, Parameter("Way within an integration time, on the scene.", LENGTH, over=0.0)
     ]
@@ -123,8 +123,8 @@ class LinearMotion(BlurTerm):
 class Vibration(BlurTerm):
     """Sinusoidal vibration along a line with many periods in an integration time."""
 
-    kind: ClassVar[str] = "vibration"
-    example: ClassVar[str] = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
+    kind = "vibration"
+    example = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
     amplitude: Annotated[
         float, Parameter("Greatest displacement from the middle, on the scene.", LENGTH, over=0.0)
     ]

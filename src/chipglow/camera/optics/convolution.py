@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Literal, NamedTuple, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ from chipglow.surface.blend import in_blocks
 Beyond: TypeAlias = Literal["edge", "nothing"]
 """What is taken to be beyond the edges of a field."""
 
-_Kernel: TypeAlias = tuple[Array, tuple[Array, ...]]
-"""A kernel, and its sums over all that is beyond the left, right, upper and lower edge."""
+_Grid: TypeAlias = tuple[Raster, Raster, float]
+"""Samples and pixels of an image, and the pixels' fill factor."""
 
 _ROUNDING: Final = 1e-13
 _COLUMNS: Final = 32
@@ -35,29 +35,31 @@ def blur(
     Beyond its edges the field goes on with the value at the nearest edge, however far, or there is
     nothing. Nothing wraps around, and no tail of the point spread function is left out.
     """
-    image = _transfer(psf, spacing, radiance.shape).within(radiance)
-    if beyond == "edge":
-        image += _edges(psf, spacing, radiance.shape).light(radiance)
-    return _without_rounding(image)
+    edge, nothing = blurs(radiance, psf, spacing)
+    return edge if beyond == "edge" else nothing
 
 
 def blurs(radiance: Array, psf: PointSpreadFunction, spacing: float) -> tuple[Array, Array]:
     """Return both images by `blur`: of a field that goes on, and of one with nothing beyond."""
-    within = _transfer(psf, spacing, radiance.shape).within(radiance)
-    light = _edges(psf, spacing, radiance.shape).light(radiance)
-    return _without_rounding(within + light), _without_rounding(within)
+    return _optics(psf, spacing, radiance.shape, None).images(radiance)
 
 
 def images_on_pixels(
     radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[Array, Array]:
-    """Return what pixels integrate of the images by `blur`, formed on the pixels alone.
+    """Return what pixels integrate of both images by `blur`, formed on the pixels alone."""
+    grid = scene, sensors, fill_factor
+    return _optics(psf, scene.spacing, scene.shape, grid).images(radiance)
 
-    The first is of a field that goes on beyond its edges, the second of one with nothing there.
-    """
-    seen = _seen(psf, scene, sensors, fill_factor)
-    within = seen.within(radiance)
-    return _without_rounding(within + seen.from_edges(radiance)), _without_rounding(within)
+
+class _Kernel(NamedTuple):
+    """A kernel for fields of one shape."""
+
+    spectrum: NDArray[np.complex128]
+    shape: tuple[int, int]
+    """Size of the transform, so large that what wraps around falls beside the field."""
+    beyond: tuple[Array, ...]
+    """Sums over all beyond the left, right, upper and lower edge, for each line beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,167 +67,123 @@ class _Strip:
     """What the values of one edge of a field, which go on beyond it, send into the field.
 
     `spectrum` (n, frequency) is the transform along the edge of the kernel's sums over all that is
-    beyond, for the n lines of the field beside the edge that its light reaches, or n means of them;
-    `length` is that of what is transformed, and `reach` that of the kernel to either side.
+    beyond, for the `lines` beside the edge that its light reaches; `length` is that of what is
+    transformed, and `reach` that of the kernel to either side.
     """
 
+    lines: NDArray[np.intp]
     spectrum: NDArray[np.complex128]
     length: int
     reach: int
 
     @classmethod
-    def of(cls, lines: Array, count: int) -> "_Strip":
-        """Make that of an edge of so many values, from the kernel's sums (n, along the edge)."""
-        reach = lines.shape[1] // 2
+    def of(cls, sums: Array, weights: sparse.csr_array, count: int) -> "_Strip":
+        """Return that of an edge of `count` values, for weighted sums of the lines beside it."""
+        lines = weights[:, : len(sums)] @ sums[: weights.shape[1]]
+        lit = np.flatnonzero(lines.any(axis=1))
+        reach = sums.shape[1] // 2
         length = fft.next_fast_len(count + 2 * reach, real=True)
-        return cls(fft.rfft(lines, n=length), length, reach)
+        return cls(lit, fft.rfft(lines[lit], n=length), length, reach)
 
-    def light(self, edge: Array, beyond: Literal["edge", "constant"]) -> Array:
-        """Return the light of an edge that goes on at its ends, or not, shape (n, edge.size)."""
+    def add(self, edge: Array, beyond: Literal["edge", "constant"], light: Array) -> None:
+        """Add the light of an edge that goes on at its ends, or not, to that of all lines."""
         line = fft.rfft(np.pad(edge, self.reach, mode=beyond), n=self.length)
         sent = fft.irfft(line * self.spectrum, n=self.length, overwrite_x=True)
-        return np.asarray(sent[:, 2 * self.reach :][:, : edge.size])
-
-
-class _Edges(NamedTuple):
-    """Light from beyond each edge of a field."""
-
-    left: _Strip
-    right: _Strip
-    top: _Strip
-    bottom: _Strip
-
-    def light(self, field: Array) -> Array:
-        """Return the light from beyond a field that goes on with the value at the nearest edge."""
-        light = np.zeros(field.shape)
-        left, right, top, bottom = self.strips(field)
-        for towards, sent in (
-            (light.T, left),
-            (light[:, ::-1].T, right),
-            (light, top),
-            (light[::-1], bottom),
-        ):
-            towards[: len(sent)] += sent
-        return light
-
-    def strips(self, field: Array) -> tuple[Array, ...]:
-        """Return the light by the edge it comes over, (lines away from the edge, along it)."""
-        # Above and below the field the left and the right edge go on as its corners.
-        return (
-            self.left.light(field[:, 0], "edge"),
-            self.right.light(field[:, -1], "edge"),
-            self.top.light(field[0], "constant"),
-            self.bottom.light(field[-1], "constant"),
-        )
+        light[self.lines] += sent[:, 2 * self.reach :][:, : edge.size]
 
 
 @dataclass(frozen=True, eq=False)
-class _Transfer:
-    """Transform of a kernel, `shape` so large that what wraps around falls beside the field."""
+class _Optics:
+    """A kernel and the pixels on which images are formed.
 
-    spectrum: NDArray[np.complex128]
-    shape: tuple[int, int]
+    `down` and `across` are weights of a column's and a row's values in the pixels; `edges` are the
+    left, right, upper and lower one.
+    """
 
-    def within(self, field: Array, down: sparse.csr_array | None = None) -> Array:
-        """Return the convolution of a field with nothing beyond, or weighted sums of its rows."""
-        rows, columns = field.shape
+    kernel: _Kernel
+    down: sparse.csr_array
+    across: sparse.csr_array
+    edges: tuple[_Strip, ...]
+
+    def images(self, field: Array) -> tuple[Array, Array]:
+        """Return the image of a field that goes on beyond its edges, or with nothing beyond."""
+        within = _sums(self.across, self._within(field).T).T
+        left, right, top, bottom = self.edges
+        beside = np.zeros((self.across.shape[0], field.shape[0]))
+        over = np.zeros((self.down.shape[0], field.shape[1]))
+        # Above and below the field the left and the right edge go on as its corners.
+        left.add(field[:, 0], "edge", beside)
+        right.add(field[:, -1], "edge", beside)
+        top.add(field[0], "constant", over)
+        bottom.add(field[-1], "constant", over)
+        beyond = _sums(self.down, beside.T) + _sums(self.across, over.T).T
+        return _without_rounding(within + beyond), _without_rounding(within)
+
+    def _within(self, field: Array) -> Array:
+        """Return weighted sums of the rows of the convolution of a field with nothing beyond."""
+        (rows, columns), (spectrum, shape, _) = field.shape, self.kernel
         # Rows beyond the field hold nothing: they are transformed in one direction only.
-        lines = fft.rfft(field, n=self.shape[1], axis=1)
-        kept = np.empty((rows if down is None else down.shape[0], lines.shape[1]), np.complex128)
+        lines = fft.rfft(field, n=shape[1], axis=1)
+        kept = np.empty((self.down.shape[0], lines.shape[1]), np.complex128)
 
         def convolve(begin: int, end: int) -> None:
-            block = fft.fft(lines[:, begin:end], n=self.shape[0], axis=0)
-            block *= self.spectrum[:, begin:end]
+            block = fft.fft(lines[:, begin:end], n=shape[0], axis=0)
+            block *= spectrum[:, begin:end]
             own = fft.ifft(block, axis=0, overwrite_x=True)[:rows]
-            kept[:, begin:end] = own if down is None else down @ own
+            kept[:, begin:end] = _sums(self.down, own)
 
         # So few columns stay in a processor's cache from one transform to the other.
         in_blocks(lines.shape[1], convolve, _COLUMNS)
-        return np.asarray(fft.irfft(kept, n=self.shape[1], axis=1)[:, :columns])
+        return np.asarray(fft.irfft(kept, n=shape[1], axis=1)[:, :columns])
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """What pixels see of a scene: weights `down` and `across` of the samples in the pixels.
-
-    `edges` is light from beyond: over the left and the right edge on columns of pixels and rows of
-    samples, over the others on rows of pixels and columns of samples.
-    """
-
-    transfer: _Transfer
-    down: sparse.csr_array
-    across: sparse.csr_array
-    edges: _Edges
-
-    def within(self, radiance: Array) -> Array:
-        """Return the light from within the scene."""
-        return np.asarray((self.across @ self.transfer.within(radiance, self.down).T).T)
-
-    def from_edges(self, radiance: Array) -> Array:
-        """Return the light from beyond the scene, which goes on as at its edges."""
-        left, right, top, bottom = self.edges.strips(radiance)
-        beside, over = self.down @ (left + right).T, self.across @ (top + bottom).T
-        return np.asarray(beside + over.T)
-
-
-@lru_cache(maxsize=2)
-def _kernel(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Kernel:
-    rows, columns = (min(count, _FARTHEST) for count in shape)
-    kernel = psf.view_kernel(spacing, rows, columns)
-    beyond = (
-        _sums_beyond(kernel, shape[1]),
-        _sums_beyond(kernel[:, ::-1], shape[1]),
-        _sums_beyond(kernel.T, shape[0]),
-        _sums_beyond(kernel[::-1].T, shape[0]),
+@lru_cache(maxsize=4)
+def _optics(
+    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: _Grid | None
+) -> _Optics:
+    (rows, columns), kernel = shape, _transformed(psf, spacing, shape)
+    down, across = (
+        line_weights(*grid)
+        if grid is not None
+        else (sparse.eye_array(count, format="csr") for count in shape)
     )
-    return kernel, beyond
-
-
-def _sums_beyond(kernel: Array, count: int) -> Array:
-    """Return sums of a kernel over all beyond the left edge, for so many lines beside it."""
-    return kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1][:, :count].T
+    left, right, top, bottom = kernel.beyond
+    edges = (
+        _Strip.of(left, across, rows),
+        _Strip.of(right, across[:, ::-1], rows),
+        _Strip.of(top, down, columns),
+        _Strip.of(bottom, down[:, ::-1], columns),
+    )
+    return _Optics(kernel, down, across, edges)
 
 
 @lru_cache(maxsize=2)
-def _transfer(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Transfer:
-    kernel, _ = _kernel(psf, spacing, shape)
+def _transformed(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Kernel:
+    rows, columns = shape
+    kernel = psf.view_kernel(spacing, min(rows, _FARTHEST), min(columns, _FARTHEST))
+    towards = (kernel, kernel[:, ::-1], kernel.T, kernel[::-1].T)
     # No value of the field is farther from another than this.
     reach = tuple(min(n // 2, most - 1) for n, most in zip(kernel.shape, shape, strict=True))
     inner = resized(kernel, *reach)
     padded = (
-        fft.next_fast_len(shape[0] + reach[0]),
-        fft.next_fast_len(shape[1] + reach[1], real=True),
+        fft.next_fast_len(rows + reach[0]),
+        fft.next_fast_len(columns + reach[1], real=True),
     )
     whole = np.zeros(padded)
     whole[: inner.shape[0], : inner.shape[1]] = inner
     centred = np.roll(whole, (-reach[0], -reach[1]), axis=(0, 1))
-    return _Transfer(fft.rfft2(centred, overwrite_x=True), padded)
+    beyond = tuple(_sums_beyond(one) for one in towards)
+    return _Kernel(fft.rfft2(centred, overwrite_x=True), padded, beyond)
 
 
-@lru_cache(maxsize=2)
-def _edges(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Edges:
-    """Return the light from beyond on the values of a field."""
-    (left, right, top, bottom), (rows, columns) = _kernel(psf, spacing, shape)[1], shape
-    return _Edges(
-        _Strip.of(left, rows),
-        _Strip.of(right, rows),
-        _Strip.of(top, columns),
-        _Strip.of(bottom, columns),
-    )
+def _sums_beyond(kernel: Array) -> Array:
+    """Return sums of a kernel over all beyond the left edge, for each line beside it."""
+    return kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1].T
 
 
-@lru_cache(maxsize=4)
-def _seen(psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float) -> _Seen:
-    rows, columns = shape = scene.shape
-    down, across = line_weights(scene, sensors, fill_factor)
-    left, right, top, bottom = _kernel(psf, scene.spacing, shape)[1]
-    edges = _Edges(
-        _Strip.of(across[:, : len(left)] @ left, rows),
-        _Strip.of(across[:, ::-1][:, : len(right)] @ right, rows),
-        _Strip.of(down[:, : len(top)] @ top, columns),
-        _Strip.of(down[:, ::-1][:, : len(bottom)] @ bottom, columns),
-    )
-    return _Seen(_transfer(psf, scene.spacing, shape), down, across, edges)
+def _sums(weights: sparse.csr_array, values: NDArray[Any]) -> NDArray[Any]:
+    """Return weighted sums of rows; as many pixels as samples are the samples themselves."""
+    return values if weights.shape[0] == weights.shape[1] else weights @ values
 
 
 def _without_rounding(image: Array) -> Array:

@@ -6,7 +6,7 @@ from errno import ENOENT
 from functools import cached_property
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 import scipy
@@ -143,8 +143,8 @@ class AnnularAperturePSF(PointSpreadFunction):
     objective of 15 times.
     """
 
-    kind: ClassVar[str] = "annular-aperture"
-    example: ClassVar[str] = "{kind: annular-aperture, numerical_aperture: 0.28}"
+    kind = "annular-aperture"
+    example = "{kind: annular-aperture, numerical_aperture: 0.28}"
     wavelength: DiffractionWavelength = 4.5e-6
     numerical_aperture: Annotated[
         float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
@@ -223,8 +223,8 @@ class AnnularAperturePSF(PointSpreadFunction):
 class GaussianPSF(PointSpreadFunction):
     """A round Gaussian."""
 
-    kind: ClassVar[str] = "gaussian"
-    example: ClassVar[str] = "{kind: gaussian, fwhm: 12 um}"
+    kind = "gaussian"
+    example = "{kind: gaussian, fwhm: 12 um}"
     fwhm: Annotated[float, Parameter("Full width at half maximum.", LENGTH, over=0.0, most=0.1)]
 
     def __str__(self) -> str:
@@ -363,8 +363,8 @@ class ApertureChoice(PSFChoice):
 class AiryAperture(ApertureChoice):
     """Diffraction of a round aperture, by the data sheet of a lens."""
 
-    kind: ClassVar[str] = "airy"
-    example: ClassVar[str] = "{kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture"
+    kind = "airy"
+    example = "{kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture"
     wavelength: DiffractionWavelength = None
 
     def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
@@ -377,10 +377,8 @@ class AiryAperture(ApertureChoice):
 class MeasuredPSFFile(PSFChoice):
     """A kernel from a file."""
 
-    kind: ClassVar[str] = "measured"
-    example: ClassVar[str] = (
-        "{kind: measured, file: psf.nc}  of chipglow psf; .npy or .csv with spacing: 1 um"
-    )
+    kind = "measured"
+    example = "{kind: measured, file: psf.nc}  of chipglow psf; .npy or .csv with spacing: 1 um"
     file: Annotated[FileBeside, Parameter("File of the kernel, .npy, .csv or .nc.")]
     spacing: Annotated[
         float | None,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, factorial, log2, pi, sqrt
 from numbers import Integral, Real
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -326,8 +326,8 @@ class PupilPSF(PointSpreadFunction):
 class Pupil(ApertureChoice):
     """A pupil with obscuration, defocus and aberrations, over the camera's band."""
 
-    kind: ClassVar[str] = "pupil"
-    example: ClassVar[str] = (
+    kind = "pupil"
+    example = (
         "{kind: pupil, numerical_aperture: 0.28, obscuration: 0.35, defocus: 10 um,\n"
         "    zernike: {11: 0.2 um}}"
     )

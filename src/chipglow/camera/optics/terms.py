@@ -4,7 +4,7 @@ from abc import ABC
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import log, sqrt
-from typing import Annotated, ClassVar, Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -58,10 +58,8 @@ class OpticalElement(OpticsTerm):
     τ L + (1 − τ) L(T') for L: then L + (L(T) − L(T')) (1 − τ) / τ is shown.
     """
 
-    kind: ClassVar[str] = "element"
-    example: ClassVar[str] = (
-        "{kind: element, transmittance: 0.9, temperature: 40 degC, calibrated_at: 25 degC}"
-    )
+    kind = "element"
+    example = "{kind: element, transmittance: 0.9, temperature: 40 degC, calibrated_at: 25 degC}"
     transmittance: Annotated[
         float, Parameter("Fraction of the light in the band that it passes.", over=0.0, most=1.0)
     ]
@@ -96,8 +94,8 @@ class Narcissus(OpticsTerm):
     it is a Gaussian is an assumption.
     """
 
-    kind: ClassVar[str] = "narcissus"
-    example: ClassVar[str] = (
+    kind = "narcissus"
+    example = (
         "{kind: narcissus, reflectance: 0.01, radius: 150 um, housing: 45 degC,\n"
         "    corrected_at: 25 degC}"
     )
@@ -157,8 +155,8 @@ class Veil(OpticsTerm):
     62492-1; the kernel, which falls as 1/r³ as diffraction does, is an assumption.
     """
 
-    kind: ClassVar[str] = "veil"
-    example: ClassVar[str] = "{kind: veil, fraction: 0.03, radius: 300 um}"
+    kind = "veil"
+    example = "{kind: veil, fraction: 0.03, radius: 300 um}"
     fraction: Annotated[
         float, Parameter("Fraction of the light that is scattered.", least=0.0, under=1.0)
     ]
@@ -181,8 +179,8 @@ class Distortion(OpticsTerm):
     the other sign. Beyond the scene it sees the nearest edge.
     """
 
-    kind: ClassVar[str] = "distortion"
-    example: ClassVar[str] = "{kind: distortion, fraction: 0.01, radius: 400 um}"
+    kind = "distortion"
+    example = "{kind: distortion, fraction: 0.01, radius: 400 um}"
     fraction: Annotated[
         float,
         Parameter(
@@ -215,8 +213,8 @@ class FieldBlur(OpticsTerm):
     interpolated linearly in the variance.
     """
 
-    kind: ClassVar[str] = "field-blur"
-    example: ClassVar[str] = "{kind: field-blur, standard_deviation: 6 um, radius: 400 um}"
+    kind = "field-blur"
+    example = "{kind: field-blur, standard_deviation: 6 um, radius: 400 um}"
     standard_deviation: Annotated[
         float, Parameter("Of the blur at the radius, on the scene.", LENGTH, least=0.0)
     ]

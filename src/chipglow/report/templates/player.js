@@ -1,4 +1,12 @@
 "use strict";
+const unfold = () => {
+  const target = document.getElementById(location.hash.slice(1));
+  for (let one = target; one; one = one.parentElement) if (one.tagName === "DETAILS") one.open = true;
+  target?.querySelector("details")?.setAttribute("open", "");
+  target?.scrollIntoView();
+};
+addEventListener("hashchange", unfold);
+if (location.hash) unfold();
 for (const player of document.querySelectorAll(".player:has(input)")) {
   const slider = player.querySelector("input"), play = player.querySelector("button");
   const when = player.querySelector(".when"), times = JSON.parse(player.dataset.times);
