@@ -362,7 +362,7 @@ class Evaluation:
         """Calibration by the blackbodies, as ``chipglow calibrate`` makes it."""
         points = read_calibration_points(
             self.folder / "points.csv",
-            lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
+            lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS)[0],
         )
         fit = fit_calibration(
             LinearCalibration,

@@ -520,12 +520,12 @@ def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
     # Corrected pixels have the median pixel's offset and gain, here without any noise.
     expected = [np.median(cold), np.median(cold) + np.median(hot - cold)]
     for name, mean, level in (("cold.npy", cold, expected[0]), ("hot.npy", hot, expected[1])):
-        assert uniform_counts(name, CORRECTED) == pytest.approx(level, abs=1e-6)
-        assert uniform_counts(name, CAMERA) == pytest.approx(mean.mean(), rel=1e-12)
+        assert uniform_counts(name, CORRECTED)[0] == pytest.approx(level, abs=1e-6)
+        assert uniform_counts(name, CAMERA)[0] == pytest.approx(mean.mean(), rel=1e-12)
     # Straight between both: counts are linear in light.
     radiance = BAND.radiance(np.array([623.15, 873.15, 1123.15]))
     fraction = (radiance[1] - radiance[0]) / (radiance[2] - radiance[0])
-    body = uniform_counts("body 600.npy", CORRECTED)
+    body, _ = uniform_counts("body 600.npy", CORRECTED)
     assert body == pytest.approx(expected[0] + fraction * (expected[1] - expected[0]), abs=0.5)
 
 
@@ -533,10 +533,30 @@ def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
     seen_bodies(laboratory)
     arguments = [*settings_of(CORRECTED), "--out", "of files.yaml"]
     run("calibrate", "bodies.csv", "--band", "3.8-5.1 um", *arguments)
-    counts = [uniform_counts(f"body {celsius:g}.npy", CORRECTED) for celsius in CELSIUS[:4]]
+    counts = [uniform_counts(f"body {celsius:g}.npy", CORRECTED)[0] for celsius in CELSIUS[:4]]
     expected = fit_calibration(LinearCalibration, CELSIUS[:4] + 273.15, counts, BAND).calibration
     found = load_calibration("of files.yaml")
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
+
+
+def test_a_blackbody_before_a_background_is_refused_until_its_region_is_given(tmp_path):
+    """A hot disc on a cold ground, as an aperture shows it: its gain would be a fifth."""
+    y, x = np.mgrid[:64, :64]
+    disc, rng = np.hypot(x - 31.5, y - 31.5) < 16, np.random.default_rng(3)
+    lines, celsius = ["temperature_degC,file,counts"], (300.0, 400.0, 500.0, 600.0)
+    counts = 500.0 + 5.0 * BAND.radiance(np.array(celsius) + 273.15)
+    for one, level in zip(celsius, counts, strict=True):
+        frames = rng.normal(np.where(disc, level, 520.0), 3.0, (4, 64, 64))
+        np.save(tmp_path / f"{one:g}.npy", frames.round().astype(np.uint16))
+        lines.append(f"{one:g},{one:g}.npy,")
+    lines.append(f"350,,{500.0 + 5.0 * float(BAND.radiance(623.15)):.1f}")
+    (tmp_path / "points.csv").write_text("\n".join(lines))
+    given = [tmp_path / "points.csv", "--band", "3.8-5.1 um", *settings_of(CAMERA)]
+    refused = " ".join(run("calibrate", *given, code=2).split())
+    assert re.search(r"300\.npy: is not uniform, a part of it differs by \d+ counts", refused)
+    out = tmp_path / "calibration.yaml"
+    run("calibrate", *given, "--region", "22:42,22:42", "--out", out)
+    assert load_calibration(out).parameters == pytest.approx([500.0, 5.0], rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -546,7 +566,9 @@ def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
         ("temperature_degC,file\n300,hot.npy\n", [*CAMERA[:2], "saturation=2000"], "saturated"),
         ("temperature_degC,file\n300,hot.npy\n", ["unit=K", "interval=1 ms"], "expected counts"),
         ("temperature_degC,file\nhot,hot.npy\n", CAMERA, "line 2: 'hot,hot.npy', expected 2"),
-        ("temperature_degC,file,counts\n300,hot.npy,3\n", CAMERA, "unknown column 'counts'"),
+        ("temperature_degC,file,counts\n300,hot.npy,3\n", CAMERA, "line 2: expected either"),
+        ("temperature_degC,file,counts\n300,,\n", CAMERA, "line 2: expected either counts or"),
+        ("temperature_degC,file,counts\n300,,many\n", CAMERA, "line 2: '300,,many', expected"),
         ("temperature_degC,counts\n300,3\n400,5\n500,9\n", CAMERA, "--set: .* names no recordings"),
     ],
 )
@@ -569,4 +591,6 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
         Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
     )
     fields = [*CAMERA, f"flat_field.low={tmp_path / 'even.hcc'}"]
-    assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)
+    assert uniform_counts(tmp_path / "chip.npy", fields)[0] == pytest.approx(
+        np.median(counts), abs=1
+    )

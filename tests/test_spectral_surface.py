@@ -7,7 +7,7 @@ from scipy.integrate import quad
 
 from chipglow.camera import Camera
 from chipglow.radiometry import Band
-from chipglow.radiometry.planck import spectral_radiance
+from chipglow.radiometry.band import spectral_radiance
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.surface import HagenRubens, SpectralTable

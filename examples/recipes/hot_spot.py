@@ -44,7 +44,5 @@ class HotSpot(Part):
         return (
             Estimate(means.mean())
             .with_component("calibration", self.calibration)
-            .with_component(
-                "frames", scatter, independent="common", degrees_of_freedom=len(means) - 1
-            )
+            .with_component("frames", scatter, degrees_of_freedom=len(means) - 1)
         )

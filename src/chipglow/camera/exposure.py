@@ -44,14 +44,6 @@ class Exposure:
     warnings: tuple[str, ...] = ()
     """Why the surface may have another emissivity: `Origin.doubts`."""
 
-    def __post_init__(self) -> None:
-        for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
-            shape = getattr(self, name).shape
-            if shape != self.raster.shape:
-                raise ValueError(
-                    f"exposure: {name} has shape {shape}, expected {self.raster.shape}"
-                )
-
 
 @dataclass(frozen=True, eq=False)
 class View:

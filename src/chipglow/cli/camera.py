@@ -23,8 +23,8 @@ def calibrate(
         Path,
         opt.argument(
             "POINTS.csv",
-            "Blackbody points: columns temperature_degC (or _K), counts (or file, a recording of "
-            "each) and optionally the standard uncertainties count_uncertainty and "
+            "Blackbody points: columns temperature_degC (or _K), counts or file (a recording of "
+            "each), or both, and optionally the standard uncertainties count_uncertainty and "
             "temperature_uncertainty_K.",
         ),
     ],
@@ -59,6 +59,10 @@ def calibrate(
     range_name: Annotated[
         str | None, opt.value("NAME", "Measuring range of the camera.", "--range")
     ] = None,
+    region: Annotated[
+        str | None,
+        opt.value("ROWS,COLUMNS", "Part of the recordings that shows the blackbody: 10:70,20:90."),
+    ] = None,
     settings: opt.Settings = None,
 ) -> None:
     """Fit a calibration of camera counts to blackbody measurements.
@@ -85,6 +89,7 @@ def calibrate(
         common_uncertainty=common_uncertainty,
         integration_time=integration_time,
         range_name=range_name,
+        region=_region(region),
     )
     for name in result.fits:
         _print_fit(result, name)
@@ -169,7 +174,7 @@ def psf(
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.psf.figure import draw_knife_edge, sentences
 
-    window = None if region is None else _region(region)
+    window = _region(region)
     images = [lab.load_edge(path, settings or (), window) for path in edges]
     holes = [
         lab.aperture_image(load_measurement(path, settings or ()), diameter, path.name)
@@ -194,8 +199,10 @@ def psf(
     )
 
 
-def _region(text: str) -> tuple[slice, slice]:
-    """Parse rows and columns such as 10:70,20:90."""
+def _region(text: str | None) -> tuple[slice, slice]:
+    """Parse rows and columns such as 10:70,20:90; all without a text."""
+    if text is None:
+        return slice(None), slice(None)
     try:
         rows, columns = (
             slice(*(int(number) if number.strip() else None for number in part.split(":")))

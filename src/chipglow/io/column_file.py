@@ -4,7 +4,7 @@ import csv
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +27,7 @@ class Column:
     difference: bool = False  # the zero of the unit does not count
     required: bool = True
     number_of: Callable[[str], float] | None = None  # of cells of text, such as file names
+    blank: bool = False  # cells may be empty, which is NaN
 
     @property
     def title(self) -> str:
@@ -87,15 +88,22 @@ def read_calibration_points(
 ) -> dict[str, Array]:
     """Read a table of `POINT_COLUMNS` from a CSV file.
 
-    A column ``file`` may replace ``counts``: `counts_of` gives the counts of that recording.
+    A column ``file`` may stand for ``counts`` or beside it, where each line fills one of both:
+    `counts_of` gives the counts of that recording.
     """
     first = read_small_text(Path(path)).partition("\n")[0]
-    if "file" not in (cell.strip() for cell in first.split(",")):
+    names = {cell.strip() for cell in first.split(",")}
+    if "file" not in names:
         return read_columns(path, POINT_COLUMNS)
-    file_column = Column("file", number_of=counts_of)
-    table = read_columns(path, (TEMPERATURE, file_column, *_POINT_UNCERTAINTIES))
-    table["counts"] = table.pop("file")
-    return table
+    counts = Column("counts", required=False, blank=True)
+    file = Column("file", number_of=counts_of, blank=True)
+    table, lines = _table(Path(path), (TEMPERATURE, counts, file, *_POINT_UNCERTAINTIES))
+    stated = table.pop("counts", np.full(len(lines), nan))
+    read = table.pop("file")
+    for line, both in zip(lines, np.isfinite(stated) == np.isfinite(read), strict=True):
+        if both:
+            raise ValueError(f"{path}, line {line}: expected either counts or a file")
+    return {**table, "counts": np.fmax(stated, read)}
 
 
 def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
@@ -120,10 +128,9 @@ def _numbers(
     path: Path, number: int, row: list[str], columns: Sequence[tuple[Column, Unit]]
 ) -> list[float]:
     if len(row) == len(columns):
-        cells = list(zip(row, columns, strict=True))
-        plain = [cell for cell, (column, _) in cells if column.number_of is None]
-        if all(map(_is_number, plain)):
-            return [(column.number_of or float)(cell.strip()) for cell, (column, _) in cells]
+        cells = [(cell.strip(), column) for cell, (column, _) in zip(row, columns, strict=True)]
+        if all(_fits(cell, column) for cell, column in cells):
+            return [(column.number_of or float)(cell) if cell else nan for cell, column in cells]
     what = "numbers" if all(column.number_of is None for column, _ in columns) else "values"
     raise ValueError(
         f"{path}, line {number}: {','.join(row)[:80]!r}, expected {len(columns)} {what} separated "
@@ -131,9 +138,11 @@ def _numbers(
     )
 
 
-def _is_number(text: str) -> bool:
+def _fits(cell: str, column: Column) -> bool:
+    if not cell:
+        return column.blank
     try:
-        return isfinite(float(text))
+        return column.number_of is not None or isfinite(float(cell))
     except ValueError:
         return False
 

@@ -118,14 +118,6 @@ class Texture:
     """Distance between the nodes in m."""
     emissivity: Emissivity
 
-    def __post_init__(self) -> None:
-        if self.nodes.shape != (MAP_SIZE, MAP_SIZE):
-            raise ValueError(
-                f"texture: nodes have shape {self.nodes.shape}, expected {(MAP_SIZE, MAP_SIZE)}"
-            )
-        if not 0 < self.grain < np.inf:
-            raise ValueError(f"texture: grain must be over 0 m, got {self.grain!r} m")
-
     @classmethod
     def random(
         cls,

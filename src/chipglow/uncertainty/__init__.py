@@ -5,14 +5,13 @@ Numerics only: nothing here knows of cameras, files or screens.
 
 from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.dataset import from_xarray, to_xarray
-from chipglow.uncertainty.draws import coverage_interval, draw
+from chipglow.uncertainty.draws import draw
 from chipglow.uncertainty.estimate import Estimate, propagate
 
 __all__ = [
     "Cause",
     "Component",
     "Estimate",
-    "coverage_interval",
     "draw",
     "from_xarray",
     "propagate",

@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from chipglow.quantities import Array
-
-Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
 
 _MOST: Final = 200_000_000
 """Numbers that the effects of one component may take: 1.6 GB."""
@@ -34,13 +32,10 @@ class Cause:
     """Of the standard uncertainty of these errors; infinite if it is exactly known."""
     pooled: bool = True
     """Whether one estimate with these degrees of freedom serves all errors (JCGM 100:2008, H.3)."""
-    distribution: Distribution = "normal"
-    """Of an error (JCGM 101:2008, 6.4); normal is Student's with finite degrees of freedom."""
     parts: tuple[str, ...] = ()
     """Names of the errors in budgets, if each is to have a line of its own."""
 
     def __post_init__(self) -> None:
-        known = get_args(Distribution)
         rules = {
             f"its name is {self.name!r}, expected one": self.name.strip(),
             f"has {self.errors} errors, expected 1 or more": self.errors >= 1,
@@ -50,13 +45,9 @@ class Cause:
             f"has {len(self.parts)} parts, expected {self.errors}": (
                 len(self.parts) in (0, self.errors)
             ),
-            f"distribution is {self.distribution!r}, expected one of {', '.join(known)}": (
-                self.distribution in known
-            ),
         }
-        for text, holds in rules.items():
-            if not holds:
-                raise ValueError(f"component {self.name}: {text}")
+        if wrong := [text for text, holds in rules.items() if not holds]:
+            raise ValueError(f"component {self.name}: {wrong[0]}")
 
     @property
     def lines(self) -> tuple[str, ...]:

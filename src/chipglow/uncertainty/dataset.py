@@ -20,12 +20,6 @@ from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.estimate import Estimate, factor
 
-_SHAPES: Final[Mapping[str, str]] = {
-    "normal": "gaussian",
-    "rectangular": "rectangle",
-    "triangular": "triangle",
-    "arcsine": "arcsine",
-}
 _FEW: Final = 32
 """Errors of one component that are all kept, also where there are fewer values."""
 
@@ -124,7 +118,7 @@ def _compact(component: Component, name: str) -> Component:
 
 def _attributes(cause: Cause, error: int) -> dict[str, Any]:
     return {
-        "pdf_shape": _SHAPES[cause.distribution],
+        "pdf_shape": "gaussian",
         "cause": cause.name,
         "identity": cause.identity,
         "error": error,
@@ -160,7 +154,6 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
         values = values / 100 * variable.values
     effects, own = _effects(data, part, label, values.ravel())
     attributes = part.attrs
-    shapes = {text: name for name, text in _SHAPES.items()}
     cause = Cause(
         str(attributes.get("cause", label)),
         # A dataset of obsarray says nothing of other variables: its errors are its own.
@@ -168,7 +161,6 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
         int(attributes.get("errors", effects.shape[1])),
         float(attributes.get("degrees_of_freedom", np.inf)),
         bool(attributes.get("pooled", not own)),
-        shapes.get(attributes.get("pdf_shape", ""), "normal"),  # type: ignore[arg-type]
         _texts(attributes.get("parts", ())),
     )
     return cause, int(attributes.get("error", 0)), effects

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 from uuid import uuid4
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import Cause, Component, Distribution
+from chipglow.uncertainty.component import Cause, Component
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,28 +80,23 @@ class Estimate:
         name: str,
         effect: ArrayLike,
         *,
-        independent: Literal["common", "per element"] | None = None,
         identity: str | None = None,
+        per_element: bool = False,
         degrees_of_freedom: float = np.inf,
         pooled: bool = True,
-        distribution: Distribution = "normal",
     ) -> "Estimate":
         """Return the estimate with one more component.
 
         `effect` is its standard uncertainty, with the sign of its effect on each value: one number
-        or one for each value. By default the error is one, and the same wherever the name appears.
-        ``"common"``: it is one for all values, and independent of any other of that name;
-        ``"per element"``: every value has its own. An `identity` tells independent ones apart, by
-        default it is new. The rest is as in `Cause`.
+        or one for each value. The error is one for all values or, `per_element`, another for each.
+        It is independent of all other components, unless they have the same name and the same
+        `identity`, such as the serial number of an instrument: these are one error. The rest is as
+        in `Cause`.
         """
         signed = np.broadcast_to(np.asarray(effect, np.float64), self.values.shape).flatten()
-        per_element = independent == "per element"
-        if identity is None:
-            identity = "" if independent is None else uuid4().hex
-        elif independent is None:
-            raise ValueError(f"component {name}: has an identity, expected independent with it")
+        identity = uuid4().hex if identity is None else identity
         errors = signed.size if per_element else 1
-        cause = Cause(name, identity, errors, degrees_of_freedom, pooled, distribution)
+        cause = Cause(name, identity, errors, degrees_of_freedom, pooled)
         effects = _diagonal(signed) if per_element else signed[:, None]
         return replace(self, components=(*self.components, Component(cause, effects)))
 
@@ -220,9 +215,9 @@ class Estimate:
 
     def effect(self, name: str) -> Array:
         """Return the signed effect of the systematic component of a name; 0 if there is none."""
-        for component in self.components:
-            if component.cause.key == (name, "") and component.cause.errors == 1:
-                return np.asarray(component.effects, np.float64).reshape(self.shape)
+        found = [one for one in self.components if one.cause.name == name]
+        if len(found) == 1 and found[0].cause.errors == 1:
+            return np.asarray(found[0].effects, np.float64).reshape(self.shape)
         return np.zeros(self.shape)
 
     def budget(self) -> xr.Dataset:

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
-from chipglow.camera.calibration.errors import CALIBRATION
+from chipglow.camera.calibration.calibration import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
 from chipglow.laboratory.chip.ridge import (
@@ -268,7 +268,7 @@ def band_profile(
     estimate = measurement.estimate(temperature, calibration)
     known = np.isfinite(temperature)
     by_position = np.where(known, by_position, nan)
-    estimate = estimate.with_component(POSITION, by_position, independent="per element")
+    estimate = estimate.with_component(POSITION, by_position, per_element=True)
     if uncertainty is not None:
         effects = np.where(known, np.swapaxes(edge, 0, 1), nan)
         component = uncertainty.component(tool, effects)

@@ -55,7 +55,8 @@ def frame_scatter(frames: Array) -> Component:
 
     Successive frames that are alike count as fewer: the variance of the mean grows by
     1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that is
-    not positive (C. J. Geyer, Statistical Science 7 (1992) 473).
+    not positive (C. J. Geyer, Statistical Science 7 (1992) 473). Fewer than 8 frames do not show
+    their correlation: all of them count as one, with one degree of freedom.
     """
     known = np.isfinite(frames)
     count = known.sum(axis=0)
@@ -73,8 +74,10 @@ def _longer(away: Array) -> float:
     """Return by how much the variance of the mean is larger than of independent frames."""
     frames = away.reshape(len(away), -1)
     count, square = len(frames), float(np.sum(frames**2))
-    if count < _LEAST or square <= 0:
+    if square <= 0:
         return 1.0
+    if count < _LEAST:
+        return float(count)
     total, weight = 0.0, 0.0
     for lag in range(1, count // 2 + 1):
         fraction = float(np.sum(frames[lag:] * frames[:-lag])) / square * count / (count - lag)

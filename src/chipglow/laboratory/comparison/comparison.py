@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
-from math import degrees, radians, sqrt
+from math import degrees, isnan, nan, radians, sqrt
 from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import frame_mean, frame_scatter
+from chipglow.laboratory.chip.frames import FRAMES, frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
@@ -106,7 +106,7 @@ class Comparison:
     fits: pd.DataFrame
     """Fit of each simulation at each place, one row each. The bias is the mean of simulated minus
     measured; the confidence is the fraction of the draws of all uncertainties in which the
-    simulation has the least root mean square of the place.
+    simulation has the least root mean square of the place, NaN with one measured frame.
     """
     notes: Notes
 
@@ -152,10 +152,12 @@ def _sentence(best: pd.Series, others: pd.DataFrame) -> str:
     result = "; ".join(
         [result, *(f"{fit['simulation']} is {_fit_text(fit)}" for fit in others.iloc)]
     )
-    how = f"{100 * best['confidence']:.3g} % of the draws of the uncertainties"
+    how = f"in {100 * best['confidence']:.3g} % of the draws of the uncertainties"
     if best["confidence"] >= SURE:
-        return f"{place} {name} fits best (in {how}): it is {result}."
-    nearest = f"({name} is nearest, in {how}): {name} is {result}."
+        return f"{place} {name} fits best ({how}): it is {result}."
+    if isnan(best["confidence"]):
+        how = "but one measured frame does not show how much frames vary"
+    nearest = f"({name} is nearest, {how}): {name} is {result}."
     return f"{place} the sets cannot be distinguished {nearest}"
 
 
@@ -328,12 +330,12 @@ def _measured_squares(
     slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
     off = np.where(np.isfinite(found.values), np.hypot(*slopes), np.nan)
     off = off * _position(measured, stated)
-    return found.with_component(POSITION, off, independent="per element")
+    return found.with_component(POSITION, off, per_element=True)
 
 
 def _stated(found: Estimate, stated: StatedUncertainties) -> Estimate:
     """Add the stated uncertainty that all measured values have in common."""
-    return found.with_component("stated", stated.temperature, independent="common")
+    return found.with_component("stated", stated.temperature)
 
 
 def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertainties) -> Estimate:
@@ -343,7 +345,7 @@ def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertaintie
         # Kelvins of radiance temperature for a radiance that is off by its own amount.
         radiance = np.asarray(simulated.band.radiance(found.values), np.float64)
         spread = stated.emissivity * radiance / simulated.band.slope(found.values)
-    return found.with_component("emissivity", spread, independent="common")
+    return found.with_component("emissivity", spread)
 
 
 def _image(measured: Measurement, frame: int) -> ThermalImage | None:
@@ -450,7 +452,9 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
     position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
     mean = frame_mean(Estimate(frames, components, systematic.unevaluated))
-    mean = mean.with_component(POSITION, position.values, independent="per element")
+    mean = mean.with_component(POSITION, position.values, per_element=True)
+    if len(frames) == 1:
+        return mean.with_unevaluated(FRAMES)
     return replace(mean, components=(*mean.components, _scatter(frames)))
 
 
@@ -460,7 +464,7 @@ def _scatter(frames: Array) -> Component:
     several = count > 1
     if several.any() and (count == 1).any():
         effects = scatter.effects.copy()
-        effects[count == 1, 0] = sqrt(float((count * scatter.variance)[several].mean()))
+        effects[count == 1, 0] = sqrt(float(np.nanvar(frames[:, several], axis=0, ddof=1).mean()))
         scatter = replace(scatter, effects=effects)
     return scatter
 
@@ -507,7 +511,13 @@ def _fit(measured: Estimate, simulated: Estimate) -> dict[str, float]:
 
 
 def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[float]:
-    """Return the fraction of the draws of all uncertainties in which each set is the best."""
-    base, *others = draw([measured, *simulated], _DRAWS, np.random.default_rng(_SEED))
+    """Return the fraction of the draws of all uncertainties in which each set is the best.
+
+    NaN of one frame, which does not show how the frames vary.
+    """
+    if FRAMES in measured.unevaluated:
+        return [nan] * len(simulated)
+    generator = np.random.default_rng(_SEED)
+    base, *others = draw([measured, *simulated], _DRAWS, generator, heavy_tails=True)
     best = np.argmin([((other - base) ** 2).mean(axis=1) for other in others], axis=0)
     return [float((best == number).mean()) for number in range(len(others))]

@@ -27,19 +27,24 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
 def write_comparison(comparison: Comparison, folder: Path) -> None:
     """Write a comparison into an existing folder."""
     write_frame(comparison.to_frame(), folder / "comparison.csv")
-    fits = comparison.fits.set_index("place")
+    fits = comparison.fits.astype(object).where(comparison.fits.notna(), None).set_index("place")
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
         "places": [
             {
-                "place": best["place"],
+                "place": place,
                 "sentence": sentence,
-                "best": best["simulation"],
-                "confidence": best["confidence"],
-                "fits": fits.loc[[best["place"]]].to_dict("records"),
+                "best": best,
+                "confidence": fits.loc[[place]].query("simulation == @best")["confidence"].iloc[0],
+                "fits": fits.loc[[place]].to_dict("records"),
             }
-            for best, sentence in zip(comparison.best.iloc, comparison.sentences, strict=True)
+            for place, best, sentence in zip(
+                comparison.best["place"],
+                comparison.best["simulation"],
+                comparison.sentences,
+                strict=True,
+            )
         ],
         "assumed": comparison.notes.assumed,
         "warnings": comparison.notes.warnings,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.laboratory.emissivity.observations import (
+    ALL_IMAGES,
     RANDOM,
     UsedPixels,
     area_estimate,
@@ -147,7 +148,7 @@ class EmissivityMap:
         return found.with_component(
             "noise",
             noise,
-            independent="per element",
+            per_element=True,
             identity=self.identity,
             degrees_of_freedom=count - 1.0,
             pooled=False,
@@ -212,14 +213,15 @@ class EmissivityMap:
         known = propagate(
             found,
             Estimate(np.array(heating.reference)).with_component(
-                "reference", heating.reference_uncertainty
+                "reference", heating.reference_uncertainty, identity=ALL_IMAGES
             ),
             Estimate(np.array(heating.reflected)).with_component(
-                "reflected", heating.reflected_uncertainty
+                "reflected", heating.reflected_uncertainty, identity=ALL_IMAGES
             ),
         )
         effect = 0.0 if calibration is None else calibration / self._contrast
-        return replace(known.with_component("calibration", effect), values=values)
+        known = known.with_component("calibration", effect, identity=ALL_IMAGES)
+        return replace(known, values=values)
 
     @property
     def _contrast(self) -> float:
@@ -417,15 +419,13 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     identity = " ".join(
         part.cause.identity for one in estimates for part in one.only(RANDOM).components
     )
-    observed = Estimate(means).with_component(
-        RANDOM, random, independent="per element", identity=identity
-    )
+    observed = Estimate(means).with_component(RANDOM, random, per_element=True, identity=identity)
     for cause in COMMON:
         shift = np.array([one.effect(cause) for one in estimates])
         if cause == "reference":
             # An error of the temperature moves the points along the line too.
             shift = shift - line[1] * np.array([one.reference_uncertainty for one in heatings])
-        observed = observed.with_component(cause, shift)
+        observed = observed.with_component(cause, shift, identity=ALL_IMAGES)
     if not isfinite(residual) and any("drift" in one.unevaluated for one in estimates):
         observed = observed.with_unevaluated("drift")
     warnings = (warning for one in estimates for warning in one.warnings)

@@ -22,7 +22,7 @@ from chipglow.laboratory.emissivity.emissivity import (
     emissivity_covariance,
     emissivity_line,
 )
-from chipglow.laboratory.emissivity.observations import RANDOM, with_drift
+from chipglow.laboratory.emissivity.observations import ALL_IMAGES, RANDOM, with_drift
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import WAVELENGTHS
@@ -142,7 +142,7 @@ def _constant(row: xr.Dataset) -> EmissivityLine:
     name, observations = str(row["region"].values), str(row["observations"].values)
     estimate = Estimate(np.array(float(row["region_mean"])))
     for cause in COMMON:
-        estimate = estimate.with_component(cause, parts[cause])
+        estimate = estimate.with_component(cause, parts[cause], identity=ALL_IMAGES)
     if np.isfinite(parts["drift"]):
         estimate = with_drift(estimate, parts["drift"], observations)
     names = [cause for cause in ("repeatability", "noise") if np.isfinite(parts[cause])]

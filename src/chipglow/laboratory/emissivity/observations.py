@@ -13,6 +13,9 @@ from chipglow.quantities import Array
 from chipglow.scene import Area
 from chipglow.uncertainty import Cause, Component, Estimate
 
+ALL_IMAGES: Final = "all images"
+"""Identity of the errors that all images of a camera and all regions have in common."""
+
 RANDOM: Final = "random"
 """Name of the component of the random errors that observations show."""
 
@@ -112,7 +115,7 @@ def with_drift(estimate: Estimate, effect: Any, identity: str | None = None) -> 
     """Add the component ``drift``, which is unevaluated if its effect is None."""
     if effect is None:
         return estimate.with_unevaluated("drift")
-    return estimate.with_component("drift", effect, independent="common", identity=identity)
+    return estimate.with_component("drift", effect, identity=identity)
 
 
 def check_same_pixels(

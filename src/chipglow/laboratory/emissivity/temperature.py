@@ -14,6 +14,7 @@ import scipy
 from chipglow.camera import FittedCalibration, Measurement
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
 from chipglow.laboratory.emissivity.observations import (
+    ALL_IMAGES,
     RANDOM,
     UsedPixels,
     area_estimate,
@@ -58,9 +59,7 @@ def reflected_temperature(
         raise ValueError(
             f"reflected: standard uncertainty is {standard_uncertainty!r} K, expected 0 K or more"
         )
-    return Estimate(np.array(temperature)).with_component(
-        "reflected", standard_uncertainty, independent="common"
-    )
+    return Estimate(np.array(temperature)).with_component("reflected", standard_uncertainty)
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,11 +300,12 @@ def _mean_radiance(
     mean = float(values.mean())
     random = area_estimate(mean, values, uuid4().hex)
     repeatability = float(random.contribution("repeatability"))
-    found = Estimate(np.array(mean)).with_component("calibration", shared * calibration)
+    found = Estimate(np.array(mean)).with_component(
+        "calibration", shared * calibration, identity=ALL_IMAGES
+    )
     found = found.with_component(
         "calibration",
         sqrt(max(1 - shared**2, 0.0)) * calibration,
-        independent="common",
         identity="measurement",
     )
     found = with_drift(found, drift_effect(drift, mean, recordings, repeatability))
@@ -370,7 +370,7 @@ def _surroundings(emissivity: EmissivityLine) -> Estimate:
         return reflected_temperature()
     heating = emissivity.heatings[0]
     return Estimate(np.array(heating.reflected)).with_component(
-        "reflected", heating.reflected_uncertainty
+        "reflected", heating.reflected_uncertainty, identity=ALL_IMAGES
     )
 
 

@@ -5,16 +5,20 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pandas as pd
 
 from chipglow.camera import MODELS, Blackbody, CalibrationFit, FittedCalibration, fit_calibration
 from chipglow.io.column_file import read_calibration_points
-from chipglow.laboratory.measurement.camera_file import read_flat_fields, uniform_counts
+from chipglow.laboratory.measurement.camera_file import WHOLE, read_flat_fields, uniform_counts
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.text import Notes
+
+_MOST_UNEVEN: Final = 0.05
+"""Fraction of the range of the blackbodies' counts by which parts of one may differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,20 +64,25 @@ def calibrate_blackbodies(
     common_uncertainty: float | None = None,
     integration_time: float | None = None,
     range_name: str | None = None,
+    region: tuple[slice, slice] = WHOLE,
 ) -> BlackbodyCalibration:
-    """Fit calibrations of a camera's counts to blackbodies."""
+    """Fit calibrations of a camera's counts to blackbodies.
+
+    Recordings that the table names are read within `region`, where the blackbody is.
+    """
     points, settings = Path(points), list(settings)
-    recordings, read = [], lru_cache(maxsize=1)(read_flat_fields)
+    read, uneven = lru_cache(maxsize=1)(read_flat_fields), {}
 
     def counts_of(file: str) -> float:
-        recordings.append(file)
-        return uniform_counts(points.parent / file, settings, read)
+        counts, uneven[file] = uniform_counts(points.parent / file, settings, region, read)
+        return counts
 
     table = read_calibration_points(points, counts_of)
-    if settings and not recordings:
+    if settings and not uneven:
         raise ValueError(
             f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
         )
+    _check_uniform(uneven, float(np.ptp(table["counts"])))
     given = {"emissivity": emissivity, "surroundings": surroundings}
     known = {name: value for name, value in given.items() if value is not None}
     blackbody = Blackbody(emissivity_uncertainty=emissivity_uncertainty, **known)
@@ -107,6 +116,17 @@ def calibrate_blackbodies(
         ),
         best,
     )
+
+
+def _check_uniform(uneven: Mapping[str, float], span: float) -> None:
+    """Raise ValueError if a part of a recording differs from the rest of the blackbody."""
+    for file, difference in uneven.items():
+        if difference > _MOST_UNEVEN * span:
+            raise ValueError(
+                f"{file}: is not uniform, a part of it differs by {difference:.4g} counts, "
+                f"{difference / span:.0%} of the range of the blackbodies, expected up to "
+                f"{_MOST_UNEVEN:.0%}; take the part that shows the blackbody with --region"
+            )
 
 
 def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:

@@ -24,8 +24,14 @@ from chipglow.io.cameras.stacks import MissingError
 from chipglow.laboratory.measurement.calibration_file import load_calibration
 from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
 from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
+from chipglow.quantities import Array
 from chipglow.text import DescriptionError
 
+WHOLE: Final = np.s_[:, :]
+"""All rows and columns of an image."""
+
+_BLOCKS: Final = 4
+_CLEARLY: Final = 4.0
 _MOST_SATURATED: Final = 0.05
 """Fraction of a flat-field source's frames that may be saturated, as bad pixels are."""
 
@@ -107,11 +113,13 @@ def measurement_of(
 def uniform_counts(
     source: str | Path,
     settings: Iterable[str] = (),
+    region: tuple[slice, slice] = WHOLE,
     read: "FlatFieldReader | None" = None,
-) -> float:
-    """Return the mean counts of a recording of a flat-field source, such as a blackbody.
+) -> tuple[float, float]:
+    """Return the mean counts of a recording of a blackbody, and by how many a part of it differs.
 
-    Its pixels are corrected as those of a measurement with the same description.
+    Its pixels are corrected as those of a measurement with the same description. The difference
+    is that of the median of one of 4 x 4 blocks, 0 within four standard errors.
     """
     description = load_description(source, settings)
     recording = load_recording(description)
@@ -122,16 +130,33 @@ def uniform_counts(
         signal = recording.signal.astype(np.float64)
         if correction is not None:
             signal = correction.apply(signal)
-        good = np.isfinite(signal).all(axis=0) & (True if bad is None else ~bad)
+        good = np.isfinite(signal[:, *region]).all(axis=0)
+        if bad is not None:
+            good &= ~bad[region]
         if not good.any():
-            raise ValueError("all pixels are bad, expected some that are not")
+            raise ValueError("no pixel of the region is good, expected some")
         if recording.saturation is not None:
-            fraction = float(np.mean(recording.signal[:, good] > recording.saturation))
+            fraction = float(np.mean(recording.signal[:, *region][:, good] > recording.saturation))
             if fraction > 0:
                 raise ValueError(f"{fraction:.2%} of it is saturated, expected a darker object")
     except ValueError as error:
         raise DescriptionError(f"{source}: {error}") from error
-    return float(signal[:, good].mean())
+    signal = signal[:, *region]
+    image = np.where(good, signal.mean(axis=0), np.nan)
+    return float(signal[:, good].mean()), _unevenness(image)
+
+
+def _unevenness(image: Array) -> float:
+    """Return the largest difference of a block's median from the typical one; 0 within noise."""
+    strips = np.array_split(image, min(_BLOCKS, len(image)))
+    blocks = [part for one in strips for part in np.array_split(one, _BLOCKS, axis=1)]
+    values = [block[np.isfinite(block)] for block in blocks if np.isfinite(block).any()]
+    medians = np.array([np.median(one) for one in values])
+    spreads = [1.4826 * np.median(np.abs(one - np.median(one))) for one in values]
+    # The standard error of a median is 1.25 times that of the mean.
+    errors = 1.25 * np.median(spreads) / np.sqrt([one.size for one in values])
+    away = np.abs(medians - np.median(medians))
+    return float(np.max(away, where=away > _CLEARLY * errors, initial=0.0))
 
 
 def pixel_correction(
