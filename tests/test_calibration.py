@@ -107,7 +107,7 @@ def held(fault, repeats=60):
     for seed in range(repeats):
         fit = fault(np.random.default_rng(seed))
         error = np.abs(fit.calibration.radiance(signal) - truth)
-        within += error < fit.coverage_factor() * fit.calibration.uncertainty(signal)
+        within += error < 1.96 * fit.calibration.uncertainty(signal)
         said += bool(fit.calibration.warnings)
     return within.min() / repeats, said / repeats
 
