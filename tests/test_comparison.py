@@ -389,9 +389,6 @@ def test_the_command_writes_what_it_says(folder):
     ("options", "message"),
     [
         ((*FILES, "one.nc", "one.nc", *USUAL), "one.nc: is there twice"),
-        ((*FILES, "--uncertainty", "-5 K"), "--uncertainty: -5 K, expected over 0 K"),
-        ((*FILES, "--emissivity-uncertainty", "2"), "--emissivity-uncertainty: 2, expected 0"),
-        ((*FILES, "--curve", "one.nc"), "one.nc: expected"),
         (
             (*FILES, "--reference", "1 s"),
             "--reference: 1000000 us is not in the measurement, expected 0 us to 20 us",

@@ -165,7 +165,6 @@ def _write(path: Path, old: str, new: str) -> Path:
     ("old", "new", "message"),
     [
         ("212 GPa", "212", "young_modulus: 212 has no unit, expected a stress such as 553.1 MPa"),
-        ("212 GPa", "212 kg", "young_modulus: '212 kg' is not a stress"),
         ("value: 0.3\n", "value: 0.6\n", "poisson_ratio: 0.6, expected 0 to 0.49"),
         (
             "value: 0.3\n",
@@ -174,16 +173,13 @@ def _write(path: Path, old: str, new: str) -> Path:
         ),
         ("[400 degC, 184 GPa]", "[400 degC]", "young_modulus: ['400 degC'], expected [temperature"),
         ("[400 degC, 184 GPa]", "[100 degC, 184 GPa]", "young_modulus: temperature table: temp"),
-        ("poisson_ratio", "poison_ratio", "unknown key 'poison_ratio', did you mean"),
         ("    hardening: 580 MPa\n", "", "flow_stress.pantale.hardening: is missing"),
         ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a valid number"),
         ("d2: 3.44", "d2: -3.44", "damage: d1 + d2 exp(d3 triaxiality) falls to"),
-        ("kind: workpiece", "kind: chip", "kind: 'chip', expected workpiece or tool"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
         ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "duplicate key 'loss'"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K' is not a strain rate"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1000", "0.1"), "rates must ascend"),
-        ("value: 0.9\n", "value: [0.9]\n", "taylor_quinney: 0.9, expected [strain rate, value]"),
         (
             "  pantale:\n",
             "  pantale:\n    law: cheese\n",
@@ -191,7 +187,6 @@ def _write(path: Path, old: str, new: str) -> Path:
         ),
         ("  pantale:\n", "  pantale:\n    law: tanh\n", "pantale.hardening_limit: is missing"),
         ("  pantale:\n", "  pantale:\n    damage: mine\n", "pantale.damage: 'mine', expected none"),
-        ("kind: workpiece", "kind: [", "expected YAML"),
         ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
     ],
 )

@@ -3,8 +3,8 @@
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
-from math import ceil, nan
-from typing import Any, Final, TypeAlias, TypeVar
+from math import ceil, nan, sqrt
+from typing import Any, ClassVar, Final, TypeAlias, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.looks import Schedule, View, look
-from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
-from chipglow.app.opening import OpenedMeasurement, OpenedScene, with_samples
-from chipglow.camera import Camera, Exposure
+from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, Controls, State
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.sweep import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.io import StoredScene
 from chipglow.quantities import Array
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
@@ -88,31 +88,35 @@ class Drawn:
     error: Distribution | None
 
 
+@dataclass(eq=False)
 class SceneModel:
-    """Pictures of a scene for one session."""
+    """A scene, the controls of its study, and pictures; each session has a copy."""
 
-    def __init__(self, opened: OpenedScene) -> None:
-        self.opened, self.controls = opened, opened.controls
-        self._caches: dict[Hashable, dict[Hashable, Any]] = defaultdict(dict)
-        self._displayed = with_samples(opened.scene, DISPLAYED)
+    name: str
+    scene: Scene
+    coarse: Scene | None  # with fewer samples, for a quick look before the exact picture
+    controls: Controls
+    file: str | None  # the scene as a saved study names it; None for the study's cut
+    _caches: dict[str, dict[Hashable, Any]] = field(
+        init=False, default_factory=lambda: defaultdict(dict)
+    )
 
     @property
     def has_quick_look(self) -> bool:
-        """Whether a picture of a coarser scene precedes the exact one."""
-        return self.opened.coarse is not None
+        return self.coarse is not None
 
     def is_ready(self, state: State) -> bool:
         """Whether the exact picture takes milliseconds."""
         key = self._exposure_key(state)
         if key not in self._caches["exposure"]:
             return False
-        camera, coarse = state.study.camera, self.opened.coarse
+        camera, coarse = state.study.camera, self.coarse
         on_samples = camera.psf_order != "detector" and (
             camera.psf is not None and camera.psf.kind == "annular-aperture"
         )
         # A quick look at pixels hardly larger than the coarse samples takes half as long.
         if on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing):
-            return (key, self._camera(state, self.opened.scene), False) in self._caches["errors"]
+            return (key, self._camera(state, self.scene), False) in self._caches["errors"]
         return True
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
@@ -156,7 +160,7 @@ class SceneModel:
         """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
         assert picture.camera and picture.exposure and picture.parts
         state, at, exposure = picture.state, picture.state.cursor, picture.exposure
-        camera, raster, scene = picture.camera, picture.raster, self.opened.scene
+        camera, raster, scene = picture.camera, picture.raster, self.scene
 
         def sample_of(name: str) -> float:
             return float(nearest(self._field(state, name, scene, exposure), scene.raster, at))
@@ -179,7 +183,7 @@ class SceneModel:
         """Return lines and error at the cursor over `phases`² pixel positions and textures."""
         # This is done in another thread than the pictures, whose caches it leaves alone.
         study = state.study
-        fitted = fit(study, self.opened.scene)
+        fitted = fit(study, self.scene)
         scene, (surface,) = fitted.scene, fitted.surfaces.values()
         camera = study.camera.on(scene.raster, study.seed)
         places = PointPlace(CURSOR, state.cursor), *map(state.line, LINES)
@@ -220,7 +224,7 @@ class SceneModel:
         return state.key(*(_ROLLING if state.study.camera.line_time is not None else _EXPOSURE))
 
     def _on(self, state: State, quick: bool) -> tuple[Scene, Surface]:
-        base = self.opened.coarse if quick else self.opened.scene
+        base = self.coarse if quick else self.scene
         assert base is not None
 
         def make() -> tuple[Scene, Surface]:
@@ -273,7 +277,8 @@ class SceneModel:
         return self._kept(2, "exposure", key, make)
 
     def _scene_panel(self, state: State, exposure: Exposure) -> Panel:
-        name, scene = state.study.scene_image, self._displayed
+        name = state.study.scene_image
+        scene = self._kept(1, "displayed", "", lambda: with_samples(self.scene, DISPLAYED))
         label, unit = SCENE_IMAGES[name]
         values = self._field(state, name, scene, exposure)
         colours = HEAT if unit == "°C" else PLAIN
@@ -284,7 +289,7 @@ class SceneModel:
     ) -> NDArray[np.float32]:
         """Return a field in the middle of the exposure in its image's unit; NaN off material."""
         study, of_surface = state.study, name in ("radiance_temperature", "emissivity")
-        index = self.opened.scene.frame_at(study.start + study.camera.integration_time / 2)
+        index = self.scene.frame_at(study.start + study.camera.integration_time / 2)
         surface = (self._exposure_key(state), exposure.raster.shape) if of_surface else ()
 
         def make() -> NDArray[np.float32]:
@@ -310,20 +315,21 @@ class SceneModel:
         return scene.field(name, index)
 
 
+@dataclass(eq=False)
 class MeasurementModel:
-    """Pictures of a measurement: its frames."""
+    """A measurement, its controls, and its frames as pictures."""
 
-    has_quick_look = False
-
-    def __init__(self, opened: OpenedMeasurement) -> None:
-        self.opened, self.controls = opened, opened.controls
+    name: str
+    measurement: Measurement
+    controls: Controls
+    has_quick_look: ClassVar = False
 
     def is_ready(self, state: State) -> bool:
         return True
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
-        measurement = self.opened.measurement
+        measurement = self.measurement
         index, raster = self._index(state), measurement.raster
         images = {
             "measured": measurement.data["radiance_temperature"][index].values.astype(np.float64),
@@ -335,7 +341,7 @@ class MeasurementModel:
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
-        measurement, index = self.opened.measurement, self._index(picture.state)
+        measurement, index = self.measurement, self._index(picture.state)
         data = picture.data
         if measurement.calibration_errors is not None:
             effects = measurement.calibration_effects(index)[None]
@@ -344,7 +350,18 @@ class MeasurementModel:
         return _at(data, picture.raster, picture.state.cursor)
 
     def _index(self, state: State) -> int:
-        return int(np.abs(self.opened.measurement.times - state.study.start).argmin())
+        return int(np.abs(self.measurement.times - state.study.start).argmin())
+
+
+Model: TypeAlias = SceneModel | MeasurementModel
+
+
+def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
+    """Return a spline scene with at most `count` samples a frame; others as they are."""
+    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / count))
+    if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
+        return scene
+    return scene.coarser(step, step if fewer_frames else 1)
 
 
 def _at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:

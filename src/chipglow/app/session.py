@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import State, Texts
-from chipglow.app.opening import Opened, OpenedScene
-from chipglow.app.pictures import MeasurementModel, Picture, SceneModel
+from chipglow.app.pictures import Model, Picture, SceneModel
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
@@ -80,10 +80,8 @@ Notify: TypeAlias = Callable[..., None]
 class Session:
     """The state of one user, by default that of the study."""
 
-    def __init__(self, opened: Opened, notify: Notify) -> None:
-        self.model: SceneModel | MeasurementModel = (
-            SceneModel(opened) if isinstance(opened, OpenedScene) else MeasurementModel(opened)
-        )
+    def __init__(self, opened: Model, notify: Notify) -> None:
+        self.model = replace(opened)
         self.state = opened.controls.initial
         self._settled, self._at = [self.state], 0
         self._notify = notify

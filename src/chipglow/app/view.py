@@ -26,8 +26,8 @@ from panel.io import unlocked
 from chipglow.analysis.images import PARTS
 from chipglow.app.controls import ERROR_IMAGES, Texts
 from chipglow.app.figures import TEXT, TITLES, Figures
-from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
-from chipglow.app.pictures import Drawn, Picture, SceneModel
+from chipglow.app.opening import MOST_UPLOADED, OpenFiles
+from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
@@ -64,7 +64,7 @@ class View:
 
     def __init__(
         self,
-        opened: Opened,
+        opened: Model,
         texts: Texts | None = None,
         link: Texts | None = None,
         files: OpenFiles | None = None,
@@ -79,8 +79,8 @@ class View:
             self.session.restore(texts or {})
         except ValueError as error:
             self._refused = f"Link: {error}"
-        is_scene = isinstance(opened, OpenedScene)
-        shown = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
+        is_scene = isinstance(opened, SceneModel)
+        shown = opened.scene if isinstance(opened, SceneModel) else opened.measurement
         self.figures = Figures(
             shown.raster, shown.tool, tuple(TITLES) if is_scene else ("measured",)
         )
@@ -173,7 +173,7 @@ class View:
         from chipglow.app.files import chip_picture  # Matplotlib takes long to import
 
         assert isinstance(self.session.model, SceneModel)
-        self._send("chip", chip_picture(self.session.model.opened.scene, TEXT[theme]))
+        self._send("chip", chip_picture(self.session.model.scene, TEXT[theme]))
 
     def _on_save(self, name: str) -> None:
         from chipglow.app.files import measurement_file, study_file
@@ -327,10 +327,10 @@ def readable(text: str) -> str:
     return text
 
 
-def _html(opened: Opened, figures: Figures, may_upload: bool, embedded: bool) -> str:
+def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> str:
     """Return the page without figures and numbers."""
     rows = (row for row in opened.controls.rows.values() if row.group)
-    scene = opened.scene if isinstance(opened, OpenedScene) else None
+    scene = opened.scene if isinstance(opened, SceneModel) else None
     return _TEMPLATES.get_template("page.html").render(
         name=opened.name,
         is_scene=scene is not None,
@@ -344,7 +344,7 @@ def _html(opened: Opened, figures: Figures, may_upload: bool, embedded: bool) ->
     )
 
 
-def _spec(opened: Opened, figures: Figures, embedded: bool) -> str:
+def _spec(opened: Model, figures: Figures, embedded: bool) -> str:
     """Return what page.js needs beside the page."""
     left, right, bottom, top = figures.extent
     return json.dumps(
