@@ -15,12 +15,14 @@ import xarray as xr
 from PIL import Image
 
 from chipglow.analysis import Distribution, one_draw, with_errors
+from chipglow.io import open_scene
 from chipglow.report import Row, result_rows, results_frame, write_report
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
+from chipglow.scene import SceneError
 from chipglow.study import Study
 
 TITLE = "My <i>own</i> study"
@@ -356,6 +358,12 @@ def test_arrays_and_study_are_as_written(folder, result, facts):
         assert all(data[name].attrs.get("units") for name in data.data_vars)
         assert data.attrs["provenance_Seed"] == "1"
     assert (folder / "study.yaml").read_text(encoding="utf-8") == STUDY
+
+
+@pytest.mark.parametrize("name", ["", "results.nc"])
+def test_results_in_the_place_of_a_scene_are_named_with_what_to_do_next(folder, name):
+    with pytest.raises(SceneError, match=r"results of an analysis.*chipglow cut study\.yaml"):
+        open_scene(folder / name)
 
 
 def test_the_comparison_holds_what_the_paper_states(result):
