@@ -367,6 +367,13 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
         names the file.
     """
     path = Path(path)
+    results = path / "results.nc" if path.is_dir() else path
+    if holds(results, ("reading", "measured")):
+        raise SceneError(
+            f"{path}: results of an analysis, expected a scene: see report.html beside "
+            "results.nc, open the folder by chipglow app, or write the scene by chipglow cut "
+            "study.yaml --out scene.nc"
+        )
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected a scene")
     try:
