@@ -472,22 +472,3 @@ def test_a_part_that_fails_is_shown_beside_the_others(result, undrawn, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["failed"] == failed
     assert summary["results"]["rake_error_degC"] < 0
-
-
-def test_the_papers_emissivities_come_back_from_heated_objects(result):
-    """Within what the procedure states, and what the camera's blur is known to do."""
-    found = {row.feature: row for heated in result.cut.heated for row in heated.rows}
-    assert set(found) == set(TABLE_1)
-    for feature, paper in TABLE_1.items():
-        row = found[feature]
-        assert row.true == paper
-        # Few grains of 20 um in a region: the mean of the textures scatters by the deviation over
-        # the root of some ten grains. Narrow bands are drawn toward the bodies by up to 0.06.
-        spread = 3 * paper.standard_deviation / np.sqrt(10 * row.means.size)
-        drawn = 0.06 if "shear band" in feature else 0.02
-        assert row.means.mean() == pytest.approx(paper.mean, abs=spread + drawn)
-        if "shear band" not in feature:  # whose region holds the slope to the bodies too
-            assert (row.deviations < paper.standard_deviation).all()
-    for chip in ("chip 1", "chip 2"):
-        body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
-        assert band.mean > body.mean + 2 * band.estimate.standard_uncertainty

@@ -151,7 +151,7 @@ def errors(
     resume: bool = False,
 ) -> Analysis:
     """Return the measurement error of any scene, exposure by exposure, at the study's places."""
-    any_scene = unchecked(study, analysis=replace(study.analysis, cut=False))
+    any_scene = unchecked(study, analysis=unchecked(study.analysis, cut=False))
     return run(any_scene, progress, resume)
 
 
