@@ -6,8 +6,8 @@ Emissivity: radiance temperature is not temperature
    :alt: Emissivity: radiance temperature is not temperature
 
 A camera measures radiance, and a chip radiates less than a blackbody does. Its *radiance
-temperature* is the temperature of the blackbody with the same radiance in the camera's band. For an emissivity
-:math:`\varepsilon` it is
+temperature* is the temperature of the blackbody with the same radiance in the camera's band. For an
+emissivity :math:`\varepsilon` it is
 
 .. math:: T_r = L^{-1}\bigl(\varepsilon L(T) + (1 - \varepsilon) L(T_\mathrm{env})\bigr),
    \qquad L(T) = \int_{\lambda_1}^{\lambda_2}

@@ -12,8 +12,8 @@ time :math:`t_l`. What moves at :math:`v` along the rows is skewed by
 
 a row; what stands still is seen as with a global shutter.
 
-What you see: hot segments of 60 µm that move to the right at 4 m/s, exposed for 2 µs; 0.25 µs per row
-make 1 µm a row, so the last row sees them 79 µm farther to the right.
+What you see: hot segments of 60 µm that move to the right at 4 m/s, exposed for 2 µs; 0.25 µs per
+row make 1 µm a row, so the last row sees them 79 µm farther to the right.
 
 More: :doc:`/understand/detector`.
 """

@@ -5,9 +5,9 @@ Calibration with blackbodies
 .. image:: images/sphx_glr_calibration_001.png
    :alt: Calibration with blackbodies
 
-Blackbodies of known temperature relate counts to radiance. A straight line over the in-band radiance
-needs the band; the Planckian form of Sakuma and Hattori finds its effective wavelength from the
-points:
+Blackbodies of known temperature relate counts to radiance. A straight line over the in-band
+radiance needs the band; the Planckian form of Sakuma and Hattori finds its effective wavelength
+from the points:
 
 .. math:: S = S_0 + g\,L(T) \qquad\text{or}\qquad
    S = S_0 + \frac{C}{\exp\bigl(c_2/(A\,T + B)\bigr) - 1} .

@@ -6,8 +6,8 @@ Temperature along the rake face
    :alt: Temperature along the rake face
 
 The paper lays squares of 3 by 3 pixels on the chip, which stand on the rake face, and averages the
-radiance temperature in each. Pixels in a turned square are not distributed evenly around its centre, so the
-mean weights them:
+radiance temperature in each. Pixels in a turned square are not distributed evenly around its
+centre, so the mean weights them:
 
 .. math:: \sum_i w_i = 1, \qquad \sum_i w_i\,\mathbf{r}_i = \mathbf{r}_\mathrm{middle}, \qquad
    \sum_i w_i^2 \to \min .
