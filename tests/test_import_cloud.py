@@ -486,8 +486,8 @@ def test_a_dump_without_times_or_units_says_what_is_assumed(tmp_path):
     [
         (lambda text: text[:-40], "cut short"),
         (lambda text: text[:-3], "cut short"),
-        (lambda text: text[:-10] + "\n", "600 atoms, it is cut short"),
-        (lambda text: text.replace(" 3 1 0 ", " 3 1\n", 1), "0 of 600 atoms, it is cut short"),
+        (lambda text: text[:-10] + "\n", "expected 600 of 9: it is cut short"),
+        (lambda text: text.replace(" 3 1 0 ", " 3 1\n", 1), "damaged"),
         (lambda text: text.replace("ITEM: NUMBER OF ATOMS\n600", "ITEM: NUMBER OF ATOMS\nmany"),
          "head is damaged"),
         (str, "oblique box"),
