@@ -78,14 +78,6 @@ def test_the_surface_is_within_half_a_spacing(jitter, angle):
     assert area == pytest.approx(COLUMNS * ROWS * A**2, rel=0.02)
 
 
-def test_surface_of_a_lattice_converges_to_the_truth():
-    """On a straight side the half of the filled fraction is the surface itself."""
-    raster = Raster(10e-6, 45e-6, 0.1e-6, 500, 3)
-    _, material = sample_cloud(a_cloud(lattice()), raster)
-    top = raster.y[np.flatnonzero(material[:, 1])[0]] + raster.spacing / 2
-    assert top == pytest.approx(ROWS * A, abs=0.15 * A)
-
-
 def test_values_do_not_cross_a_gap():
     """Hot and cold halves, a gap of 1.01 spacings between them."""
     cold = lattice()
