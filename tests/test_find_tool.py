@@ -185,10 +185,7 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
             ["told.nc", "--at", "1 s"],
             "--at: 1000000 us is not in the measurement, expected 0 us to 10 us",
         ),
-        (["told.nc", "--depth", "3 s"], "--depth: '3 s' is not a length"),
-        (["told.nc", "--depth", "3 um"], "rake grid: depth is 3e-06 m"),
         (["told.nc", "--tool", "away.yaml"], "no square on the rake face is inside the image"),
-        (["told.nc", "--tool", "none.yaml"], "none.yaml: No such file"),
     ],
 )
 def test_what_is_wrong_is_one_line(folder, arguments, message):

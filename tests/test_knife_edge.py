@@ -5,7 +5,6 @@ from math import cos, degrees, exp, pi, radians, sqrt
 
 import numpy as np
 import pytest
-from scipy.special import j0
 from synthetic_edge import (
     FWHM_PER_SIGMA,
     PITCH,
@@ -89,18 +88,6 @@ def test_a_model_with_the_sensor_is_the_mean_over_its_square(name, normal):
     response = edge_response(lambda f: model.transfer(values, f, angle), angle, PITCH, 250e-6)
     # Tails of diffraction that wrap around the table are the greatest of the errors.
     np.testing.assert_allclose(response(distance), measured, atol=1e-5)
-
-
-def test_the_annular_transfer_function_is_the_transform_of_the_closed_form():
-    model, values, _ = truth_of("annular")
-    unit = WAVELENGTH / (2 * pi * MIRROR[0])
-    v = np.linspace(1e-6, 3000.0, 300001)
-    light = annular_density(v, MIRROR[1]) * v
-    for frequency in (0.2e5, 0.6e5, 1.1e5):
-        transform = np.trapezoid(light * j0(2 * pi * frequency * unit * v), v)
-        expected = transform * (1 - MIRROR[1] ** 2) / 2
-        found = model.transfer(values, np.array([frequency]), 0.0)
-        assert found[0] == pytest.approx(expected, abs=1e-4)
 
 
 def test_the_signal_in_an_aperture_is_the_encircled_light():

@@ -237,8 +237,6 @@ def test_a_tool_is_read_from_its_file(tmp_path):
             "rake_angle: 80 deg\n",
             "tool.yaml: rake_angle: 80 deg, expected over -60 deg, under 60",
         ),
-        ("[1, 2\n", "tool.yaml: line"),
-        ("outline: none.csv\n", "tool.yaml: outline: .*none.csv"),
     ],
 )
 def test_a_file_that_is_no_tool_is_one_error(tmp_path, text, message):

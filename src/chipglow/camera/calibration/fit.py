@@ -126,10 +126,6 @@ class CalibrationFit(Generic[Kind]):
             return float(stdtrit(free, _QUANTILE) / ndtri(_QUANTILE))
         return max(float(np.sqrt(self.chi_squared / free)), 1.0) if free else 1.0
 
-    def coverage_factor(self) -> float:
-        """Return the normal distribution's factor of an interval of 95 %."""
-        return float(ndtri(_QUANTILE))
-
 
 def fit_calibration(
     kind: type[Kind],
