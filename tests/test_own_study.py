@@ -139,7 +139,7 @@ def test_a_response_file_weighs_the_band(tmp_path):
         ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
         ({"preset": {}}, "{} is unknown, expected one of flir-lepton-3"),
         ({"preset": "alpha-nir"}, "magnification: must be given"),
-        ({"psf": {"kind": "airy", "f_number": 2.5}}, "magnification: must be given, expected it with"),
+        ({"psf": {"kind": "airy", "f_number": 2.5}}, "magnification: is missing, expected it with"),
         ({"psf": {"kind": "airy"}}, "expected one of numerical_aperture and f_number"),
         (
             {"psf": {"kind": "airy", "f_number": 2.0, "numerical_aperture": 0.2}},
