@@ -246,9 +246,9 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
         ({"camera.pitch": "6 mm"}, "Pixel pitch: camera: pitch of 6000 um at an offset"),
         ({"camera.lower_limit": "9999"}, "Lower range limit: 9999 degC"),
         ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 x,y in µm"),
-        ({"rake_line": "1,2;3,461"}, "expected x from -620.0 to 40.0 µm and y from -80.0 to 460.0"),
+        ({"rake_line": "1,2;3,701"}, "expected x from -650.0 to 40.0 µm and y from -80.0 to 700.0"),
         ({"cursor": "here"}, "Cursor: 'here', expected 1 x,y in µm"),
-        ({"cursor": "999,0"}, "Cursor: outside the image, expected x from -620.0 to 40.0 µm"),
+        ({"cursor": "999,0"}, "Cursor: outside the image, expected x from -650.0 to 40.0 µm"),
         ({"zoom": "2"}, "zoom: unknown control"),
     ],
 )
