@@ -172,8 +172,8 @@ def test_the_app_opens_where_the_shear_band_is_hottest_with_the_line_on_its_ridg
 
 def test_the_rake_face_is_marked_where_its_line_enters_the_tool(model):
     picture = model.picture(model.controls.initial)
-    assert picture.crossings["rake_line"] == pytest.approx(60, abs=0.2)
-    assert picture.crossings["band_line"] is None
+    assert picture.crossings["rake_line"] == pytest.approx(60, abs=0.5)
+    assert "band_line" not in picture.crossings
 
 
 def test_a_limit_above_all_temperatures_says_so_and_leaves_the_scene_visible(opened, model):
@@ -238,7 +238,7 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
         ({"camera.pitch": "5 kg"}, "expected one such as 6 um"),
         ({"camera.psf.numerical_aperture": "1.5"}, "expected"),
         ({"surface": OWN, f"surface.chips.{OWN}.body.mean": "2"}, "mean: 2, expected 0 to 1"),
-        ({"camera.band.0": "6"}, "reversed"),
+        ({"camera.band.0": "6"}, "Band from: 6-5.1 um is reversed"),
         ({"camera.psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
         ({"seed": "1.5"}, "Seed: 1.5, expected a valid integer"),
         ({"seed": "-1"}, "Seed: -1, expected 0 or more"),
@@ -246,9 +246,9 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
         ({"camera.pitch": "6 mm"}, "Pixel pitch: camera: pitch of 6000 um at an offset"),
         ({"camera.lower_limit": "9999"}, "Lower range limit: 9999 degC"),
         ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 x,y in µm"),
-        ({"rake_line": "1,2;3,461"}, "expected x from -620.0 to 40.0 µm and y from -80.0 to 460.0"),
+        ({"rake_line": "1,2;3,701"}, "expected x from -650.0 to 40.0 µm and y from -80.0 to 700.0"),
         ({"cursor": "here"}, "Cursor: 'here', expected 1 x,y in µm"),
-        ({"cursor": "999,0"}, "Cursor: outside the image, expected x from -620.0 to 40.0 µm"),
+        ({"cursor": "999,0"}, "Cursor: outside the image, expected x from -650.0 to 40.0 µm"),
         ({"zoom": "2"}, "zoom: unknown control"),
     ],
 )
@@ -287,10 +287,13 @@ def test_a_decimal_comma_and_the_units_of_the_page_are_read(model):
     assert readable("413 us to 503 us, 6 um, 300 degC") == "413 µs to 503 µs, 6 µm, 300 °C"
 
 
-def test_a_saved_study_names_a_scene_of_the_user_and_none_of_the_cache(model):
+def test_a_saved_study_names_a_scene_of_the_user_and_none_of_the_cache(model, tmp_path):
     scene, initial = model.scene, model.controls.initial
     of_results = scene_model(scene, Study.quick(), "results", None)
-    assert "\nscene: none\n" in study_file(of_results, of_results.controls.initial).decode()
+    saved = tmp_path / "study.yaml"
+    saved.write_bytes(study_file(of_results, of_results.controls.initial))
+    assert load_study(saved).scene is None
+    assert load_study(saved).cutting == Study.quick().cutting
     uploaded = replace(model, file="mine.nc")
     assert "\nscene: mine.nc\n" in study_file(uploaded, initial).decode()
 

@@ -23,7 +23,6 @@ from chipglow.laboratory.chip import (
     read_curve,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
-from chipglow.scene import PlacedTool
 from chipglow.uncertainty import from_xarray
 
 PITCH = RASTER.spacing
@@ -269,7 +268,7 @@ def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"tool": PlacedTool(TOOL, (1.0, 0.0))}, r"^tool: its edge at .* outside the image"),
+        ({"tool": TOOL.at((1.0, 0.0))}, r"^tool: its edge at .* outside the image"),
         ({"width": -1e-6}, "width is -1e-06 m, expected 0 m or more"),
         ({"position": np.nan}, "position is nan m"),
         ({"frames": [3]}, "frame 3, expected 0 to 0"),

@@ -18,7 +18,6 @@ from chipglow.camera import (
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
-from chipglow.scene import PlacedTool
 from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -219,7 +218,7 @@ def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     one = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
     same = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
     assert (one - same).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
-    elsewhere = PlacedTool(TOOL, (1e-6, 0.0))
+    elsewhere = TOOL.at((1e-6, 0.0))
     other = rake_grid(frame, elsewhere, uncertainty=FOUND).frame_estimate[0, 3]
     assert (one - other).standard_uncertainty > one.standard_uncertainty
 

@@ -19,7 +19,7 @@ from chipglow.io import write_measurement
 from chipglow.laboratory.chip.frames import frame_scatter
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
 from chipglow.laboratory.comparison.comparison import SURE, _confidences
-from chipglow.scene import PlacedTool, ToolGeometry
+from chipglow.scene import ToolGeometry
 from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -77,7 +77,7 @@ def test_pixels_and_places_may_differ():
     """The same linear field in images of 6 and 5 µm, where the tips are at different places."""
     tip = (33e-6, -21e-6)
     x, y = np.meshgrid(FINE.x, FINE.y)
-    simulated = frames(field(x - tip[0], y - tip[1]), raster=FINE).with_tool(PlacedTool(TOOL, tip))
+    simulated = frames(field(x - tip[0], y - tip[1]), raster=FINE).with_tool(TOOL.at(tip))
     result = compare(frames(field(X, Y)), {"same": simulated}, TOOL, CURVE, STATED)
     assert result.grid is not None
     assert result.band is not None

@@ -61,7 +61,7 @@ def test_the_face_is_within_its_stated_uncertainty(found_in):
 def test_the_shape_says_where_to_look_and_what_the_edge_is(seen):
     """A rake face over 20 degrees from the shape's is not found without a warning."""
     measurement = noisy(seen[-7.0, "chip 2"], 1)
-    found = find_tool(measurement, ToolGeometry(radians(0.0), radians(10.0), 8e-6)).tool.tool
+    found = find_tool(measurement, ToolGeometry(radians(0.0), radians(10.0), 8e-6)).tool
     assert degrees(found.rake_angle) == pytest.approx(-7.0, abs=4.0)  # as stated above
     assert (found.clearance_angle, found.edge_radius) == (radians(10.0), 8e-6)
     elsewhere = find_tool(measurement, ToolGeometry(radians(30.0)))

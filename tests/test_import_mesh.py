@@ -76,14 +76,38 @@ def survey_of(source):
     return pickle.loads(pickle.dumps(source)).survey()
 
 
-@pytest.mark.parametrize("kind", [22, 23, 28])
+QUADRATIC = {
+    22: [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
+    23: [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)],
+}
+QUADRATIC[28] = [*QUADRATIC[23], (0.5, 0.5)]
+
+
+@pytest.mark.parametrize("kind", QUADRATIC)
+def test_curved_elements_meet_without_a_gap(tmp_path, kind):
+    inside = np.array(QUADRATIC[kind], float)
+    inside = np.stack((inside, 1.0 - inside) if kind == 22 else (inside,))
+    corners = np.stack(np.meshgrid(np.arange(3), np.arange(3)), -1).reshape(-1, 1, 1, 2)
+    every = np.round((corners + inside) / 3, 12).reshape(-1, 2)
+    points, number = np.unique(every, axis=0, return_inverse=True)
+    cells = number.reshape(-1, inside.shape[1])
+    edge = ((points == 0) | (points == 1)).any(axis=1)
+    bent = np.where(edge[:, None], points, points + 0.02 * np.sin(7.0 * points[:, ::-1]))
+    grid = pv.UnstructuredGrid({kind: cells}, np.pad(bent, ((0, 0), (0, 1))))
+    grid.point_data["temperature"] = 300.0 + 100.0 * bent[:, 0]
+    grid.cell_data["PEEQ"] = np.arange(len(cells)) / len(cells)
+    grid.save(tmp_path / "bent.vtu")
+    raster = Raster(0.0, 1.0, 1 / 150, 150, 150)  # some of its samples are on edges
+    frame = only_frame(MeshSource(tmp_path / "bent.vtu"), raster)
+    assert (frame.material == WORKPIECE).all()
+    expected = np.broadcast_to(300.0 + 100.0 * raster.x, raster.shape)
+    np.testing.assert_allclose(frame.fields["temperature"], expected, atol=0.5)
+    assert len(np.unique(frame.fields["plastic_strain"])) == len(cells)
+
+
+@pytest.mark.parametrize("kind", QUADRATIC)
 def test_quadratic_elements_are_not_taken_for_linear(tmp_path, kind):
-    reference = {
-        22: [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
-        23: [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)],
-    }
-    reference[28] = [*reference[23], (0.5, 0.5)]
-    points = np.pad(np.array(reference[kind], float), ((0, 0), (0, 1))) * 1e-3
+    points = np.pad(np.array(QUADRATIC[kind], float), ((0, 0), (0, 1))) * 1e-3
     grid = pv.UnstructuredGrid([len(points), *range(len(points))], [kind], points)
     grid.point_data["temperature"] = 300.0 + 1000.0 * (points[:, 0] * 1e3) ** 2
     grid.save(tmp_path / "bent.vtu")

@@ -1,6 +1,5 @@
 """Movies of fields: known values drawn, encoded and read back, and what is refused."""
 
-import pickle
 import struct
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import pairwise
@@ -131,13 +130,6 @@ def test_a_map_that_returns_to_a_colour_is_refused(name):
 def test_an_unknown_map_is_refused():
     with pytest.raises(SourceError, match="jett: unknown colour map"):
         ColourScale.named("jett", ENDS)
-
-
-def test_bands_have_the_end_colours_of_the_map():
-    scale = ColourScale.named("rainbow", ENDS, 10)
-    assert scale.colours[0] == pytest.approx([0, 0, 1], abs=1e-9)
-    assert scale.colours[-1] == pytest.approx([1, 0, 0], abs=1e-9)
-    assert scale.values[0] == pytest.approx(ENDS[0] + (ENDS[1] - ENDS[0]) / 20)
 
 
 def test_a_scale_may_descend():
@@ -282,13 +274,6 @@ def test_some_pictures_are_those_of_the_whole_movie(tmp_path, codec):
     assert index.count == len(whole) == 14
     some = list(pictures(path, index, (0, 7, 13)))
     assert all((one == whole[number]).all() for one, number in zip(some, (0, 7, 13), strict=True))
-
-
-def test_a_source_can_be_handed_to_another_process(tmp_path):
-    source = a_source(a_movie(tmp_path / "a.avi"))
-    again = pickle.loads(pickle.dumps(source))
-    assert again == source
-    assert again.survey().extent == source.survey().extent
 
 
 def test_crop_and_turn(tmp_path):

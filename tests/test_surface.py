@@ -6,14 +6,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.study import Study
+from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
+    Dispersion,
     Emissivity,
     EmissivityStack,
+    Fresnel,
+    HagenRubens,
+    ParabolicOxide,
+    SpectralTable,
     Texture,
     UniformSurface,
+    Wedge,
     chip_fraction,
     shear_band_fraction,
 )
@@ -298,3 +307,27 @@ def test_a_uniform_surface_is_black_but_for_the_void():
 def test_no_kernel_of_the_surface_waits_by_spinning():
     for kernel in (_blend, _look_up):
         assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")
+
+
+def test_a_study_lays_modifiers_over_each_other():
+    metal = {"kind": "hagen-rubens", "resistivity": "6e-7 ohm*m", "coefficient": "0.005 K^-1"}
+    section = {
+        "spectral": metal,
+        "measured_in": "3-5 um",
+        "oxide": {"kind": "parabolic", "initial": "3 nm"},
+        "directional": {"kind": "fresnel", "n": 4.6, "k": 15, "tilt": "10 deg"},
+        "reflections": {"kind": "wedge", "angle": "60 deg"},
+    }
+    surface = surfaces_of(Study(surface=section).surface, 7)["chip 1"]
+    law = HagenRubens(6e-7, 0.005)
+    spectral, oxide, direction, shape = surface.modifiers
+    assert (spectral, oxide) == (Dispersion(law, Band(3e-6, 5e-6)), ParabolicOxide(initial=3e-9))
+    assert direction == Fresnel(n=4.6, k=15.0, tilt=direction.tilt)
+    assert shape == Wedge(angle=shape.angle)
+    assert np.degrees([direction.tilt, shape.angle]) == pytest.approx([10.0, 60.0])
+    assert surfaces_of(Study().surface, 7)["chip 1"] == replace(CHIP_1, seed=7)
+    assert surface.redrawn(2).bare.seed == 9
+    assert Study(surface=metal).surface == law
+    table = {"kind": "spectral", "table": [["3 um", "20 degC", 0.3], ["5 um", "20 degC", 0.2]]}
+    rows = (3e-6, 293.15, 0.3), (5e-6, 293.15, 0.2)
+    assert Study(surface=table).surface == SpectralTable(rows)

@@ -8,10 +8,10 @@ const GRIP = 12; // pixels
 const PIECE = 2 ** 22; // bytes of a file in one message
 
 export function render({ view, model, el }) {
-  const spec = JSON.parse(model.spec), extent = spec.extent;
   const page = document.createElement("div");
   page.className = "app";
   page.innerHTML = model.html;
+  const spec = JSON.parse(page.querySelector("main").dataset.spec), extent = spec.extent;
   const find = (selector) => page.querySelector(selector);
   const each = (selector, kind, act) => {
     for (const one of page.querySelectorAll(selector)) one.addEventListener(kind, () => act(one));

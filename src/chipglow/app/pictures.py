@@ -60,7 +60,7 @@ class Picture:
     data: xr.Dataset  # of a scene that of `error_images`, else ``measured`` and ``flagged``
     panels: dict[str, Panel]
     lines: dict[str, dict[str, Array]]  # ``along``, ``measured`` and ``reference`` by name
-    crossings: dict[str, float | None]  # where lines enter the tool in µm
+    crossings: dict[str, float]  # distances at which lines enter the tool in µm
     quick: bool = False
     camera: Camera | None = None
     exposure: Exposure | None = None
@@ -107,17 +107,15 @@ class SceneModel:
 
     def is_ready(self, state: State) -> bool:
         """Whether the exact picture takes milliseconds."""
-        key = self._exposure_key(state)
-        if key not in self._caches["exposure"]:
-            return False
-        camera, coarse = state.study.camera, self.coarse
-        on_samples = camera.psf_order != "detector" and (
-            camera.psf is not None and camera.psf.kind == "annular-aperture"
-        )
+        key, camera = self._exposure_key(state), state.study.camera
+        kind = camera.psf.kind if camera.psf else ""
         # A quick look at pixels hardly larger than the coarse samples takes half as long.
-        if on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing):
-            return (key, self._camera(state, self.scene), False) in self._caches["errors"]
-        return True
+        spacing = self.coarse.raster.spacing if self.coarse else 0.0
+        on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
+        is_slow = on_samples or camera.pitch < 1.5 * spacing
+        exact = key, self._camera(state, self.scene), False
+        is_known = exact in self._caches["errors"]
+        return key in self._caches["exposure"] and (is_known or not is_slow)
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return images and lines at a state; `check` is called meanwhile and may raise."""
@@ -135,7 +133,7 @@ class SceneModel:
         error = data["case_1"]
         if shown != "total":
             error = parts().get(shown, xr.zeros_like(error))
-        raster, exposure, tool = camera.pixels(scene.raster), images.exposure, scene.tool
+        raster, exposure = camera.pixels(scene.raster), images.exposure
         values = _unflagged(data, error)
         limit = round_limit(values, 99, 5.0)
         panels = {
@@ -150,10 +148,9 @@ class SceneModel:
                 low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
                 limits = min(least, low), max(most, high)
             panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
-        lines, crossings = _lines(state, raster, data, tool)
         return Picture(
-            state, raster, data, panels, lines, crossings, quick, camera, exposure, parts,
-            dict(_absent(state, surface)),
+            state, raster, data, panels, _lines(state, raster, data),
+            _crossings(state, scene.tool), quick, camera, exposure, parts, _absent(state, surface),
         )  # fmt: skip
 
     def numbers(self, picture: Picture) -> dict[str, float]:
@@ -336,8 +333,9 @@ class MeasurementModel:
             "flagged": ~measurement.usable[index],
         }
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
-        panels = {"measured": _measured_panel(data, raster)}
-        return Picture(state, raster, data, panels, *_lines(state, raster, data, measurement.tool))
+        panels, lines = {"measured": _measured_panel(data, raster)}, _lines(state, raster, data)
+        crossings = _crossings(state, measurement.tool)
+        return Picture(state, raster, data, panels, lines, crossings)
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
@@ -379,34 +377,27 @@ def _absent(state: State, surface: Surface) -> Mapping[str, str]:
     return {name: reason for name, reason in reasons.items() if reason}
 
 
-def _lines(
-    state: State, raster: Raster, data: xr.Dataset, tool: Tool | None
-) -> tuple[dict[str, dict[str, Array]], dict[str, float | None]]:
-    """Return temperatures along the lines, and the distances at which these enter the tool."""
-    lines: dict[str, dict[str, Array]] = {}
-    crossings: dict[str, float | None] = dict.fromkeys(LINES)
+def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str, Array]]:
+    lines = {}
     for name in LINES:
         line = state.line(name).line(raster.spacing)
-        along = 1e6 * line.distance
-        lines[name] = {"along": along} | {
+        lines[name] = {"along": 1e6 * line.distance} | {
             key: sample(data[key].values, raster, line.points) - KELVIN
             for key in ("measured", "reference")
             if key in data
         }
-        crossings[name] = (
-            None if tool is None else _zero(along, tool.signed_distance(*line.points.T))
-        )
-    return lines, crossings
+    return lines
 
 
-def _zero(along: Array, values: Array) -> float | None:
-    """Return where values along a line first change their sign; None if they do not."""
-    changes = np.flatnonzero(np.diff(values > 0))
-    if not changes.size:
-        return None
-    pair = slice(changes[0], changes[0] + 2)
-    order = np.argsort(values[pair])
-    return float(np.interp(0.0, values[pair][order], along[pair][order]))
+def _crossings(state: State, tool: Tool | None) -> dict[str, float]:
+    """Return the distances in µm at which lines enter the tool."""
+    found = {}
+    for name in LINES if tool is not None else ():
+        line = state.line(name).line(1e-6)
+        depth = tool.signed_distance(*line.points.T)  # type: ignore[union-attr]
+        if depth.min() < 0 < depth.max():
+            found[name] = float(1e6 * line.distance[np.abs(depth).argmin()])
+    return found
 
 
 def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:

@@ -14,7 +14,7 @@ PAUSE: Final = 0.15
 
 PHASES: Final = 3
 TEXTURES: Final = 5
-"""Draws of "Draw phases and textures": as many as in the paper's study."""
+"""Draws of "Draw phases and textures": nine positions of the pixels and five textures."""
 
 _PAINT_TIMEOUT: Final = 0.5
 """Seconds to wait for the page to paint a picture before the next one is sent."""

@@ -1,6 +1,5 @@
 """The page: a session and its figures as a Panel component, see page.js."""
 
-import json
 import logging
 import re
 from asyncio import AbstractEventLoop, get_running_loop
@@ -8,7 +7,6 @@ from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from threading import RLock
@@ -40,7 +38,6 @@ class Page(JSComponent):  # type: ignore[misc]
     """The page around the figures; it exchanges messages with `View`."""
 
     html = param.String()
-    spec = param.String()
     figures = Children()
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
@@ -94,7 +91,6 @@ class View:
         self._picture: Picture | None = None
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
-            spec=_spec(opened, self.figures, embedded),
             figures=[
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
@@ -329,34 +325,26 @@ def readable(text: str) -> str:
 
 def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> str:
     """Return the page without figures and numbers."""
-    rows = (row for row in opened.controls.rows.values() if row.group)
-    scene = opened.scene if isinstance(opened, SceneModel) else None
+    rows = [row for row in opened.controls.rows.values() if row.group]
+    left, right, bottom, top = figures.extent
+    spec = {
+        "embedded": embedded,
+        "most_uploaded": MOST_UPLOADED,
+        "stops": {row.path: row.stops for row in rows},
+        "images": list(figures.images),
+        "figures": list(figures.all),
+        "extent": figures.extent,
+        "shape": (top - bottom) / (right - left),
+    }
     return _TEMPLATES.get_template("page.html").render(
+        spec=spec,
         name=opened.name,
-        is_scene=scene is not None,
-        has_chip=scene is not None and scene.overview is not None,
-        embedded=embedded,
+        scene=opened.scene if isinstance(opened, SceneModel) else None,
         may_upload=may_upload,
-        groups=[(name, list(of)) for name, of in groupby(rows, lambda row: row.group)],
+        groups={row.group: [one for one in rows if one.group == row.group] for row in rows},
         images={name: one.figure.title.text for name, one in figures.images.items()},
         lines={name: one.figure.title.text for name, one in figures.lines.items()},
         draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
-    )
-
-
-def _spec(opened: Model, figures: Figures, embedded: bool) -> str:
-    """Return what page.js needs beside the page."""
-    left, right, bottom, top = figures.extent
-    return json.dumps(
-        {
-            "embedded": embedded,
-            "most_uploaded": MOST_UPLOADED,
-            "stops": {row.path: row.stops for row in opened.controls.rows.values()},
-            "images": list(figures.images),
-            "figures": list(figures.all),
-            "extent": figures.extent,
-            "shape": (top - bottom) / (right - left),
-        }
     )
 
 

@@ -393,7 +393,7 @@ def example_scene() -> StoredScene:
     Returns
     -------
     StoredScene
-        44 frames, 1 µs apart, of 360 × 440 samples of 1.5 µm: the cut of Heigel and Whitenton
+        44 frames, 1 µs apart, of 520 × 460 samples of 1.5 µm: the cut of Heigel and Whitenton
         (2010) on cells of 20 µm, which is coarse for a shear band. Its numbers are for a first
         look; those to rely on are the full study's.
     """
