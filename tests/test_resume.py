@@ -228,7 +228,7 @@ def test_after_ctrl_c_the_last_state_is_named(cache, monkeypatch):
     assert result.exit_code == 130
     lines = [line for line in result.output.splitlines() if line.startswith("chipglow: ")]
     assert len(lines) == 1
-    assert re.search(r"the state at 2\.50 us is kept in .*: --resume goes on from", lines[0])
+    assert re.search(r"the state at 2\.50 us is kept in .*: --resume continues from", lines[0])
 
 
 def test_the_movie_of_a_cut_that_goes_on_shows_what_is_still_to_come(cache, unbroken, monkeypatch):
