@@ -423,7 +423,7 @@ class Evaluation:
         curves = result.edges[0].curves
         at = int(np.argmin(np.abs(curves["frequency"].values - FREQUENCY)))
         return {
-            "PSF, full width": Found(result.fwhm, factor * result.fwhm_uncertainty),
+            "PSF, full width": Found(result.fwhm, factor * result.edge_uncertainty),
             "MTF at 31 /mm": Found(
                 float(curves["mtf"][at]), factor * float(curves["mtf_uncertainty"][at])
             ),

@@ -160,7 +160,7 @@ def psf(
         opt.value(
             "NAME",
             "Model to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
-            "'annular aperture', 'elliptical gaussian' or radial. Default: the best fit.",
+            "'defocused ring', 'annular aperture' or 'elliptical gaussian'. Default: the best fit.",
         ),
     ] = None,
     out: Annotated[
