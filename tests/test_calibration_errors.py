@@ -1,13 +1,11 @@
 """The calibration's and the tool's errors in what is read of a chip, by drawing them anew."""
 
-import csv
 from dataclasses import replace
 from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
-from measured_band import BAND, RASTER, TOOL, BandImage, measured
-from typer.testing import CliRunner
+from measured_band import BAND, RASTER, TOOL, measured
 
 from chipglow.camera import (
     LinearCalibration,
@@ -15,10 +13,8 @@ from chipglow.camera import (
     SakumaHattori,
     fit_calibration,
 )
-from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
-from chipglow.laboratory.comparison import compare
 from chipglow.scene import PlacedTool
 from chipglow.uncertainty import Estimate
 
@@ -223,39 +219,3 @@ def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     elsewhere = PlacedTool(TOOL, (1e-6, 0.0))
     other = rake_grid(frame, elsewhere, uncertainty=FOUND).frame_estimate[0, 3]
     assert (one - other).standard_uncertainty > one.standard_uncertainty
-
-
-def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_measurement(measured(images(600.0), relative_uncertainty=0.01), tmp_path / "m.nc")
-    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
-    assert result.exit_code == 0, result.output
-    estimate = rake_grid(read_measurement("m.nc")).estimate
-    with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
-        rows = list(csv.DictReader(table))
-    for column in ("calibration_uncertainty_K", "standard_uncertainty_K"):
-        found = [float(row[column] or "nan") for row in rows]
-        expected = estimate.contribution("calibration").ravel()
-        np.testing.assert_allclose(found, expected, atol=1e-3)
-    most = np.nanmax(expected)
-    lines = [line.split() for line in result.output.splitlines()]
-    (line,) = (line for line in lines if line[:1] == ["calibration"])
-    assert float(line[-1]) == pytest.approx(most, rel=0.05)
-    assert "Errors of calibration move all squares together" in result.output
-
-
-# Beside simulations
-
-
-def images(base):
-    return [BandImage(shift=shift, base=base).temperature() for shift in (-6e-6, -3e-6, 0.0, 3e-6)]
-
-
-def test_a_comparison_has_the_calibration_of_its_squares():
-    frames = measured(images(600.0), relative_uncertainty=0.01)
-    result = compare(frames, {"same": measured(images(600.0))}, TOOL, CURVE)
-    assert result.grid is not None and result.band is not None
-    for pair in (result.grid, result.band):
-        part = pair.measured.contribution("calibration")[np.isfinite(pair.measured.values)]
-        assert part.min() > 1.0
-        assert "calibration" in pair.simulated[0].unevaluated

@@ -1,16 +1,14 @@
 """The knife edge: what made a synthetic edge is returned within its stated uncertainty."""
 
 from dataclasses import replace
-from math import cos, degrees, exp, pi, radians, sqrt
+from math import cos, degrees, exp, radians, sqrt
 
 import numpy as np
 import pytest
-from scipy.special import j0
 from synthetic_edge import (
     FWHM_PER_SIGMA,
     PITCH,
     WAVELENGTH,
-    annular_density,
     annular_edge,
     blurred_disc_edge,
     disc_edge,
@@ -26,7 +24,6 @@ from synthetic_edge import (
 )
 
 from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
-from chipglow.camera.optics.convolution import blur
 from chipglow.laboratory.psf import (
     NoEdgeError,
     aperture_image,
@@ -106,18 +103,6 @@ def test_a_model_with_the_sensor_is_the_mean_over_its_square(name, normal):
     response = edge_response(lambda f: model.transfer(values, f, angle), angle, PITCH, 250e-6)
     # Tails of diffraction that wrap around the table are the greatest of the errors.
     np.testing.assert_allclose(response(distance), measured, atol=1e-5)
-
-
-def test_the_annular_transfer_function_is_the_transform_of_the_closed_form():
-    model, values, _ = truth_of("annular")
-    unit = WAVELENGTH / (2 * pi * MIRROR[0])
-    v = np.linspace(1e-6, 3000.0, 300001)
-    light = annular_density(v, MIRROR[1]) * v
-    for frequency in (0.2e5, 0.6e5, 1.1e5):
-        transform = np.trapezoid(light * j0(2 * pi * frequency * unit * v), v)
-        expected = transform * (1 - MIRROR[1] ** 2) / 2
-        found = model.transfer(values, np.array([frequency]), 0.0)
-        assert found[0] == pytest.approx(expected, abs=1e-4)
 
 
 def test_the_signal_in_an_aperture_is_the_encircled_light():
@@ -333,21 +318,6 @@ def test_the_system_holds_the_sensor_once(clean):
         return float(kernel.sum(axis=0) @ x**2) * 1e-12
 
     assert variance(system) - variance(optics) == pytest.approx(PITCH**2 / 12, rel=0.1)
-
-
-def test_the_cameras_own_blur_is_returned():
-    """A fine image of a sharp edge, blurred and integrated as the virtual camera does it."""
-    fine = 1e-6
-    count = 240
-    x = fine * (np.arange(count) - (count - 1) / 2)
-    angle = radians(6.0)
-    distance = x * cos(angle) - x[:, None] * np.sin(angle)
-    sharp = np.clip(distance / fine + 0.5, 0.0, 1.0)
-    blurred = blur(1.0 + sharp, GaussianPSF(9e-6), fine)
-    sensors = blurred.reshape(40, 6, 40, 6).mean(axis=(1, 3))
-    found = knife_edge([image_of(sensors, 0.002)])
-    # The samples of 1 um add their own squares to the width: 0.02 um.
-    assert found.fwhm == pytest.approx(9e-6, abs=0.03e-6 + 3 * found.edge_uncertainty)
 
 
 def bar():

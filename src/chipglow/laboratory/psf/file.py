@@ -118,7 +118,6 @@ def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Vari
         "parameters": ", ".join(fit.model.parameters),
         "fwhm": fit.fwhm,
         "fwhm_uncertainty": fit.fwhm_uncertainty,
-        "aicc": fit.aicc,
         "bic": fit.bic,
         "weight": weight,
         "reduced_chi_squared": fit.reduced_chi_squared,

@@ -158,7 +158,6 @@ class KnifeEdge:
                 "model": fit.model.name,
                 "fwhm_um": 1e6 * fit.fwhm,
                 "fwhm_uncertainty_um": 1e6 * fit.fwhm_uncertainty,
-                "aicc": fit.aicc - self.best.aicc,
                 "bic": fit.bic - self.best.bic,
                 "weight": weight,
                 "reduced_chi_squared": fit.reduced_chi_squared,
