@@ -308,18 +308,6 @@ def test_apertures_that_contradict_the_edge_are_doubtful():
     assert any("contradict each other" in warning for warning in warnings)
 
 
-def test_the_system_holds_the_sensor_once(clean):
-    system, optics = clean.psf("system").kernel(1e-6), clean.psf().kernel(1e-6)
-    assert clean.psf("system").includes == ("footprint",)
-    assert clean.psf().includes == ()
-
-    def variance(kernel):
-        x = np.arange(len(kernel)) - len(kernel) // 2
-        return float(kernel.sum(axis=0) @ x**2) * 1e-12
-
-    assert variance(system) - variance(optics) == pytest.approx(PITCH**2 / 12, rel=0.1)
-
-
 def bar():
     return edge_radiance(GAUSSIAN, 5.0, position=-60e-6) - edge_radiance(
         GAUSSIAN, 5.0, position=50e-6, background=0.0
@@ -423,8 +411,6 @@ def test_models_are_weighed_and_named(clean):
     assert clean.psf(model="gaussian with tail").fwhm == pytest.approx(FWHM, rel=0.1)
     with pytest.raises(ValueError, match="'lorentz' was not fitted, expected one of gaussian"):
         clean.psf(model="lorentz")
-    with pytest.raises(ValueError, match="expected optics or system"):
-        clean.psf("lens")
     assert all(isinstance(fit.model, PSFModel) for fit in clean.fits)
 
 

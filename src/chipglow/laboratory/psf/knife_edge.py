@@ -8,12 +8,11 @@ import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cosh, degrees, exp, hypot, log, sqrt
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
 from scipy.special import chdtri
 
@@ -68,7 +67,6 @@ _NOTHING: Final = 5e-4
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
 _ALIGNED: Final = np.pi / 9
-_SUBSAMPLES: Final = 9
 _SAMPLES_PER_WIDTH: Final = 10
 _NO_WEIGHT: Final = 1e-6
 
@@ -177,14 +175,9 @@ class KnifeEdge:
         known = ", ".join(fit.model.name for fit in self.fits)
         raise ValueError(f"model: {name!r} was not fitted, expected one of {known}")
 
-    def psf(
-        self, part: Literal["optics", "system"] = "optics", model: str | None = None
-    ) -> PointSpreadFunction:
-        """Return the point spread function, for ``Camera(psf=...)``."""
-        if part not in ("optics", "system"):
-            raise ValueError(f"part: {part!r}, expected optics or system")
-        optics = (self.best if model is None else self.fit(model)).psf()
-        return optics if part == "optics" else _with_pixel(optics, self.edges[0].image.footprint)
+    def psf(self, model: str | None = None) -> PointSpreadFunction:
+        """Return the optics' point spread function, for ``Camera(psf=...)``."""
+        return (self.best if model is None else self.fit(model)).psf()
 
 
 def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
@@ -391,15 +384,6 @@ def _left(edge: EdgeResult) -> float:
     """Return the root mean square of the residuals near the edge over the step."""
     near = np.abs(edge.curves["distance"].values) < 2 * edge.line_fwhm
     return float(np.sqrt(np.mean(edge.curves["esf_residual"].values[near] ** 2)))
-
-
-def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
-    """Return the kernel of optics and a square pixel."""
-    spacing = footprint / _SUBSAMPLES
-    kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)
-    # A mean over squares of sum 1 leaves rounding below 0 where there is no light.
-    weights = np.maximum(uniform_filter(kernel, _SUBSAMPLES, mode="constant"), 0)
-    return MeasuredPSF(weights, spacing, includes=("footprint",))
 
 
 def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
