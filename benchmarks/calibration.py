@@ -95,7 +95,7 @@ def main():
             fit = fault.fit(np.random.default_rng(seed))
             uncertainty = fit.calibration.uncertainty(at)
             error = np.abs(fit.calibration.radiance(at) - true)
-            held += error < fit.coverage_factor() * uncertainty
+            held += error < 1.96 * uncertainty
             uncertainties += uncertainty / BAND.slope(BETWEEN)
             warned += bool(fit.calibration.warnings)
         held, mean, warned = held / repeats, uncertainties[1] / repeats, warned / repeats

@@ -89,19 +89,27 @@ class Block:
     def advance(self, steps, cycle=20):
         """Advance, sorting the points every few steps."""
         while steps > 0:
-            spare = np.zeros_like(self.points, POINT)
-            count = sort_by_cell(self.points, self.count, self.grid, FAR, FAR, spare, self.starts)
-            assert count == self.count
-            self.points = spare
-            self.sums[:] = 0.0
+            self.sort()
             now = min(steps, cycle)
-            assert advance_with(self.law)(
-                now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-                self.grid, self.step, self.law, self.damage, self.elastic, self.capacity,
-                self.heat_fractions, self.sums, get_num_threads(),
-            )  # fmt: skip
+            self.step_on(now)
             self.force /= now
             steps -= now
+
+    def sort(self):
+        """Sort the points by cell."""
+        spare = np.zeros_like(self.points, POINT)
+        count = sort_by_cell(self.points, self.count, self.grid, FAR, FAR, spare, self.starts)
+        assert count == self.count
+        self.points = spare
+
+    def step_on(self, steps, threads=None):
+        """Advance points that are sorted."""
+        self.sums[:] = 0.0
+        assert advance_with(self.law)(
+            steps, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
+            self.grid, self.step, self.law, self.damage, self.elastic, self.capacity,
+            self.heat_fractions, self.sums, threads or get_num_threads(),
+        )  # fmt: skip
 
     def conduct(self, duration, steps, conductivity, capacity):
         """Conduct heat for a time, with properties sampled as a `TemperatureTable` does."""

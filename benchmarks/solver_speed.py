@@ -6,8 +6,8 @@ gives the cost). Numbers of threads are timed in turn and have to agree; the bes
 counts.
 """
 
+from copy import deepcopy
 from dataclasses import replace
-from time import perf_counter
 
 import numpy as np
 from common import arguments, timed
@@ -15,14 +15,15 @@ from numba import njit, prange, set_num_threads
 from solver import DENSITY, FAR, Block
 
 from chipglow.cutting import AISI_1045
-from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, advance_with
+from chipglow.cutting.momentum import NODE_VALUES, VELOCITY_VALUES
 from chipglow.cutting.points import POINT, sort_by_cell
 
 STEEL = replace(AISI_1045, young_modulus=205e9, poisson_ratio=0.29, density=DENSITY)
 STEPS = 20
-WARM_UP = 20
 MASS_SCALING = 400.0
 CELL = 10e-6
+# Record in and out; per node velocity in and out, sums in and out by scatter and by update.
+BYTES = 2 * POINT.itemsize + 8 * (2 * VELOCITY_VALUES + 4 * NODE_VALUES) / 4
 COMPARED = ("own_vx", "dxy", "volume", "strain", "damage", "temperature")
 
 
@@ -41,56 +42,21 @@ def sheared_block(side):
     points["temperature"] += 600.0 * band**2
     strength = 360e6 * (1 - 0.42 * band**2) * (1 - 0.5 * band**2)
     points["dxy"] = strength * np.clip(4 * band, -1, 1)
-    block.advance(WARM_UP)
-    points = np.zeros_like(block.points)
-    sort_points(block, points)
-    block.points = points
+    block.advance(STEPS)
     return block
 
 
-def sort_points(block, target):
-    """Sort the points of a block by cell into `target`; return where each cell begins."""
-    starts = np.zeros_like(block.starts)
-    sort_by_cell(block.points, block.count, block.grid, FAR, FAR, target, starts)
-    return starts
-
-
-class Stepper:
-    """The step on a number of threads."""
-
-    # Record in and out; per node velocity in and out, sums in and out by scatter and by update.
-    bytes_per_point = 2 * POINT.itemsize + 8 * (2 * VELOCITY_VALUES + 4 * NODE_VALUES) / 4
-
-    def __init__(self, start, threads):
-        self.start, self.threads = start, threads
-        shape = (start.grid.columns, start.grid.rows)
-        self.points = start.points.copy()
-        self.nodes, self.heat = np.zeros((*shape, NODE_VALUES)), np.zeros(shape)
-        self.sums = np.zeros(SUMS)
-        self.tool = Block((CELL, CELL), CELL).tool
-
-    def reset(self):
-        self.starts = sort_points(self.start, self.points)
-        self.velocity = self.start.velocity.copy()
-        self.nodes[:] = 0.0
-
-    def advance(self, steps):
-        start = self.start
-        set_num_threads(self.threads)
-        begin = perf_counter()
-        advance_with(start.law)(
-            steps, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-            start.grid, start.step, start.law, start.damage, start.elastic, start.capacity,
-            start.heat_fractions, self.sums, self.threads,
-        )  # fmt: skip
-        return perf_counter() - begin
-
-    def result(self):
-        return {name: self.points[name] for name in COMPARED}
+def step_on(start, threads):
+    """Sort a copy of a block, and time the steps on some threads; its points and the seconds."""
+    block = deepcopy(start)
+    block.sort()
+    set_num_threads(threads)
+    seconds = timed(lambda: block.step_on(STEPS, threads))[1]
+    return block.points, seconds
 
 
 @njit(parallel=True, cache=True)
-def copy(source, target):  # type: ignore[no-untyped-def]
+def copy(source, target):
     for k in prange(source.size):
         target[k] = source[k]
 
@@ -102,48 +68,28 @@ def copy_bandwidth(threads):
     return 2 * source.nbytes / min(timed(lambda: copy(source, target))[1] for _ in range(8))
 
 
-def sort_seconds(start):
-    """Return the seconds to sort the points by cell once."""
-    target = np.empty_like(start.points)
-    return min(timed(lambda: sort_points(start, target))[1] for _ in range(3))
-
-
-def check(stepper, ours):
-    """End the program if a number of threads computes something else than `ours`."""
-    result = stepper.result()
-    wrong = [field for field in COMPARED if not np.array_equal(result[field], ours[field])]
-    if wrong:
-        raise SystemExit(f"{stepper.threads} threads differ in {', '.join(wrong)}")
-
-
 def measure(side, threads, rounds, bandwidth):
     """Time one number of points and print its rows."""
     start = sheared_block(side)
     points, plastic = start.points.size, np.mean(start.points["increment"] > 0)
     failing = np.mean(start.points["damage"] >= 1)
-    fraction = sort_seconds(start) / STEPS / points
+    target = np.zeros_like(start.points)
+    order = start.points, points, start.grid, FAR, FAR, target, start.starts
+    sorting = min(timed(lambda: sort_by_cell(*order))[1] for _ in range(3)) / STEPS / points
     print(f"\n{points} points, {plastic:.0%} plastic, {failing:.0%} failing; ", end="")
-    print(f"sort {fraction * 1e9:.1f} ns a point-step")
-    steppers = [Stepper(start, count) for count in threads]
-    seconds = {stepper: [] for stepper in steppers}
-    for stepper in steppers:
-        stepper.reset()
-        stepper.advance(2)
-    for _ in range(rounds):
-        for stepper in steppers:
-            stepper.reset()
-            seconds[stepper].append(stepper.advance(STEPS))
-    ours = steppers[0].result()
-    for stepper in steppers[1:]:
-        check(stepper, ours)
+    print(f"sort {sorting * 1e9:.1f} ns a point-step")
+    seconds = {count: [] for count in threads}
+    for _ in range(rounds + 1):  # the first may compile
+        results = {count: step_on(start, count) for count in threads}
+        for count, (found, taken) in results.items():
+            seconds[count].append(taken)
+            for name in COMPARED:
+                np.testing.assert_array_equal(found[name], results[threads[0]][0][name])
     print(f"{'':12}{'threads':>8}{'M/s':>8}{'M/s/core':>10}{'ns':>8}{'bound M/s':>11}")
-    rates = {stepper: STEPS * points / min(seconds[stepper]) / 1e6 for stepper in steppers}
-    for stepper, rate in rates.items():
-        count = stepper.threads
-        bound = bandwidth[count] / stepper.bytes_per_point / 1e6
-        print(
-            f"{'chipglow':12}{count:8}{rate:8.2f}{rate / count:10.2f}{1e3 / rate:8.1f}{bound:11.0f}"
-        )
+    for count, taken in seconds.items():
+        rate, bound = STEPS * points / min(taken[1:]) / 1e6, bandwidth[count] / BYTES / 1e6
+        times = f"{rate:8.2f}{rate / count:10.2f}{1e3 / rate:8.1f}"
+        print(f"{'chipglow':12}{count:8}{times}{bound:11.0f}")
 
 
 def main():

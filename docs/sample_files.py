@@ -91,7 +91,8 @@ def a_scene(folder: Path) -> None:
 
 def a_chip(folder: Path) -> None:
     """Write four frames of a chip in closed form with three sets of emissivities."""
-    scene, camera = late(AnalyticChip()), Camera(integration_time=5e-6)
+    scene = late(AnalyticChip())
+    camera = Camera(psf=AnnularAperturePSF(), integration_time=5e-6, lower_limit=573.15)
     starts = FIRST + np.array([5e-6, 15e-6, 25e-6, 35e-6])
     for name, surface in (("chip 1", chipglow.CHIP_1), ("chip 2", chipglow.CHIP_2)):
         data = camera.measure(scene, surface, starts).data.assign_attrs(surface=name)

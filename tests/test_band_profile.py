@@ -23,7 +23,6 @@ from chipglow.laboratory.chip import (
     read_curve,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
-from chipglow.scene import PlacedTool
 from chipglow.uncertainty import from_xarray
 
 PITCH = RASTER.spacing
@@ -269,7 +268,7 @@ def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"tool": PlacedTool(TOOL, (1.0, 0.0))}, r"^tool: its edge at .* outside the image"),
+        ({"tool": TOOL.at((1.0, 0.0))}, r"^tool: its edge at .* outside the image"),
         ({"width": -1e-6}, "width is -1e-06 m, expected 0 m or more"),
         ({"position": np.nan}, "position is nan m"),
         ({"frames": [3]}, "frame 3, expected 0 to 0"),
@@ -352,9 +351,7 @@ def test_the_netcdf_file_holds_si_units(file, tmp_path):
     [
         (("--at", "3 s"), "--at: 3000000 us is not in the measurement, expected 0 us to 10 us"),
         (("--reference", "1 ms"), "--reference: 1000 us is not in the measurement, expected"),
-        (("--width", "-3 um"), "--width: -3 um is not over 0"),
         (("--curve", "none.csv"), "none.csv: No such file"),
-        (("--tool", "none.yaml"), "none.yaml: No such file"),
     ],
 )
 def test_what_the_command_cannot_do_is_one_line(file, tmp_path, options, message):
@@ -365,21 +362,10 @@ def test_what_the_command_cannot_do_is_one_line(file, tmp_path, options, message
     assert not list(tmp_path.glob("band.*"))
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("x,y\n1,2\n", "line 1: 'x' has no unit, expected one such as x_um"),
-        ("x_um,y_um\n1,2\n", "1 points, expected 2 or more"),
-        ("x_um,y_um\n1,2\n3\n", "line 3: '3', expected 2 numbers"),
-        ("x_um,y_um\n1,2\nnan,3\n", "line 3: 'nan,3', expected 2 numbers"),
-        ("", "expected a first line such as x_um,y_um"),
-    ],
-)
-def test_a_file_that_is_no_curve_is_one_error(tmp_path, text, message):
-    path = tmp_path / "curve.csv"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=message):
-        read_curve(path)
+def test_a_curve_of_one_point_is_one_error(tmp_path):
+    (tmp_path / "curve.csv").write_text("x_um,y_um\n1,2\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="1 points, expected 2 or more"):
+        read_curve(tmp_path / "curve.csv")
 
 
 @pytest.mark.parametrize("depth", [5e-6, 10e-6, 20e-6])

@@ -8,8 +8,6 @@ import pytest
 from chipglow.camera import (
     MODELS,
     Blackbody,
-    FactoryCalibration,
-    PlanckConversion,
     fit_calibration,
 )
 from chipglow.radiometry import Band
@@ -92,7 +90,7 @@ def test_the_interval_covers_as_often_as_it_says(model, case):
         found = fit(kelvins, counts, BAND, **({} if case == "scatter" else said))
         error = found.calibration.radiance(signal) - BAND.radiance(BETWEEN)
         scores.append(error / found.calibration.uncertainty(signal))
-        covered += np.abs(scores[-1]) < found.coverage_factor()
+        covered += np.abs(scores[-1]) < 1.96
     # Binomial: 0.95 of 200 is 190 with a standard deviation of 3.1.
     assert (covered >= 0.95 * repeats - 10).all()
     if case != "scatter":
@@ -107,7 +105,7 @@ def held(fault, repeats=60):
     for seed in range(repeats):
         fit = fault(np.random.default_rng(seed))
         error = np.abs(fit.calibration.radiance(signal) - truth)
-        within += error < fit.coverage_factor() * fit.calibration.uncertainty(signal)
+        within += error < 1.96 * fit.calibration.uncertainty(signal)
         said += bool(fit.calibration.warnings)
     return within.min() / repeats, said / repeats
 
@@ -195,27 +193,6 @@ def test_the_temperature_uncertainty_counts_where_the_counts_are_steep():
     assert light.probability > 0.01
 
 
-@pytest.mark.parametrize("fitted", FITS.values())
-def test_errors_at_two_radiances_are_of_one_kind(fitted):
-    """Their covariance is that of fits to blackbodies which are as far off as they are said."""
-    generator = np.random.default_rng(2)
-    truth = counts_of("linear", KELVINS)
-    counts = counts_of("linear", BETWEEN)
-    found = []
-    for _ in range(400):
-        wrong = generator.normal(0.0, 0.5) + generator.normal(0.0, 0.3, KELVINS.size)
-        fit = fitted(KELVINS - wrong, truth, BAND, 0.01, 0.3, 0.5)
-        found.append(fit.calibration.radiance(counts))
-    calibration = fitted(KELVINS, truth, BAND, 0.01, 0.3, 0.5).calibration
-    stated = calibration.errors.estimate(BAND.radiance(BETWEEN)).covariance()
-    scale = np.sqrt(np.diag(stated))
-    np.testing.assert_allclose(scale, calibration.uncertainty(counts), rtol=1e-3)
-    # Correlations of 400 repeats are known to 0.05 or better, deviations to 4 %: three times that.
-    np.testing.assert_allclose(np.corrcoef(np.transpose(found)), stated / scale / scale[:, None],
-                               atol=0.15)  # fmt: skip
-    np.testing.assert_allclose(np.std(found, axis=0), scale, rtol=0.12)
-
-
 def test_a_wrong_band_shows_in_the_residuals_and_the_criterion():
     """Counts of another band: the straight line fails, Sakuma-Hattori finds its wavelength."""
     other = Band(3.0e-6, 3.6e-6)
@@ -235,13 +212,3 @@ def test_counts_without_radiance_have_none():
     line = fit_linear(KELVINS, counts_of("linear", KELVINS), BAND).calibration
     assert np.isnan(line.temperature([OFFSET - 1.0, np.nan])).all()
     assert np.isnan(SAKUMA_HATTORI.calibration.radiance([-1e9, np.nan])).all()
-
-
-def test_the_makers_conversion_is_of_unknown_uncertainty():
-    conversion = PlanckConversion(r1=1e5, r2=1.0, b=3000.0, f=1.0, o=0.0)
-    calibration = FactoryCalibration(band=BAND, conversion=conversion)
-    counts = np.array([3000.0, 6000.0])
-    kelvins = 3000.0 / np.log(1e5 / counts + 1.0)
-    np.testing.assert_allclose(BAND.temperature(calibration.radiance(counts)), kelvins, rtol=1e-9)
-    assert calibration.errors is None
-    assert "not known" in calibration.description

@@ -1,11 +1,13 @@
 """The calibration's and the tool's errors in what is read of a chip, by drawing them anew."""
 
+import csv
 from dataclasses import replace
 from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
-from measured_band import BAND, RASTER, TOOL, measured
+from measured_band import BAND, RASTER, TOOL, BandImage, measured
+from typer.testing import CliRunner
 
 from chipglow.camera import (
     LinearCalibration,
@@ -13,9 +15,9 @@ from chipglow.camera import (
     SakumaHattori,
     fit_calibration,
 )
+from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
-from chipglow.scene import PlacedTool
 from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -216,6 +218,26 @@ def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
     one = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
     same = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
     assert (one - same).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
-    elsewhere = PlacedTool(TOOL, (1e-6, 0.0))
+    elsewhere = TOOL.at((1e-6, 0.0))
     other = rake_grid(frame, elsewhere, uncertainty=FOUND).frame_estimate[0, 3]
     assert (one - other).standard_uncertainty > one.standard_uncertainty
+
+
+def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    images = [BandImage(shift=shift).temperature() for shift in (-3e-6, 0.0)]
+    write_measurement(measured(images, relative_uncertainty=0.01), tmp_path / "m.nc")
+    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
+    assert result.exit_code == 0, result.output
+    estimate = rake_grid(read_measurement("m.nc")).estimate
+    with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    for column in ("calibration_uncertainty_K", "standard_uncertainty_K"):
+        found = [float(row[column] or "nan") for row in rows]
+        expected = estimate.contribution("calibration").ravel()
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    most = np.nanmax(expected)
+    lines = [line.split() for line in result.output.splitlines()]
+    (line,) = (line for line in lines if line[:1] == ["calibration"])
+    assert float(line[-1]) == pytest.approx(most, rel=0.05)
+    assert "Errors of calibration move all squares together" in result.output

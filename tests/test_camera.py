@@ -16,7 +16,6 @@ from chipglow.camera import (
     CalibrationErrors,
     Camera,
     ChipglowWarning,
-    Exposure,
     Flag,
     GaussianPSF,
     MeasuredPSF,
@@ -552,8 +551,6 @@ def test_exposures_of_different_grids_are_refused():
         Camera().form_measurement([one, other])
     with pytest.raises(ValueError, match="one or more exposures"):
         Camera().form_measurement([])
-    with pytest.raises(ValueError, match="mean_radiance has shape"):
-        Exposure(**{**vars(one), "mean_radiance": np.zeros((2, 2))})
 
 
 def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():

@@ -322,14 +322,6 @@ def write_npy(path):
     np.save(path, PICTURES)
 
 
-def write_npz(path):
-    np.savez(path, frames=PICTURES, other=np.zeros(3))
-
-
-def write_tiff(path):
-    tifffile.imwrite(path, PICTURES, photometric="minisblack")
-
-
 def write_tiffs(path):
     for number, image in enumerate(PICTURES):
         tifffile.imwrite(str(path).replace("*", str(number)), image)
@@ -345,25 +337,11 @@ def write_hdf5(path):
         file["run/dark"] = PICTURES[:1]
 
 
-def write_netcdf(path):
-    xr.Dataset({"counts": (("time", "y", "x"), PICTURES)}).to_netcdf(path, engine="h5netcdf")
-
-
-def write_zarr(path):
-    zarr = pytest.importorskip("zarr")
-    array = zarr.create_array(path, shape=PICTURES.shape, dtype="u2", chunks=(2, 9, 9))
-    array[:] = PICTURES
-
-
 STACKS = [
     ("a.npy", write_npy, {}),
-    ("a.npz", write_npz, {}),
-    ("a.tif", write_tiff, {}),
     ("a_*.tif", write_tiffs, {}),
     ("a.mat", write_mat, {"axes": ("y", "x", "time")}),
     ("a.h5", write_hdf5, {"dataset": "frames"}),
-    ("a.nc", write_netcdf, {}),
-    ("a.zarr", write_zarr, {}),
 ]
 
 

@@ -1,5 +1,6 @@
 import re
 import resource
+import shlex
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ from undrawn import leave_undrawn
 
 from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
+from chipglow.cli.app import EXAMPLES
 from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import atomic_folder, open_scene, read_measurement, write_scene
 from chipglow.io.digest import is_intact
@@ -428,3 +430,20 @@ def test_a_run_that_is_ended_from_outside_leaves_nothing(folder, tmp_path):
     assert "chipglow: interrupted, nothing was written" in errors
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
     assert list((tmp_path / "cache").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_help_of_a_command_ends_with_an_example_that_is_understood(name, tmp_path, monkeypatch):
+    command = typer.main.get_command(app).commands[name]
+    assert command.epilog == f"Example: chipglow {name} {EXAMPLES[name]}"
+    arguments = shlex.split(EXAMPLES[name])
+    monkeypatch.chdir(tmp_path)
+    for word in arguments:
+        if Path(word).suffix and not Path(word).exists() and "=" not in word:
+            Path(word).touch()
+    try:
+        command.make_context(name, arguments)
+    except typer.BadParameter as error:
+        pytest.fail(error.format_message())
+    except ValueError as error:  # an empty file, but not a wrong option
+        assert "option" not in str(error)

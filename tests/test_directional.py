@@ -8,8 +8,6 @@ from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from test_reflections import RASTER, a_scene, apparent
 
-from chipglow.study import Study
-from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import (
     Fresnel,
     UniformSurface,
@@ -101,15 +99,3 @@ def test_the_steep_side_is_seen_at_its_angle():
     # Kirchhoff: where more is emitted less is reflected, so the gain is under the law's own.
     assert 1.0 < gain.max() < ratio
     assert not changed[:, RASTER.x < -sqrt(0.5) * 60e-6 - RASTER.spacing].any()
-
-
-def test_a_study_switches_it_on():
-    section = {
-        "directional": {"kind": "fresnel", "n": 4.6, "k": 15, "tilt": "10 deg"},
-        "reflections": {"kind": "wedge"},
-    }
-    surface = surfaces_of(Study(surface=section).surface, 7)["chip 1"]
-    assert surface.modifiers[0] == Fresnel(n=4.6, k=15.0, tilt=radians(10.0))
-    assert Study().surface.directional is None
-    with pytest.raises(ValueError, match=r"tilt[\s\S]*expected 0 deg to 85 deg"):
-        Study(surface={"directional": {"kind": "fresnel", "n": 4.6, "k": 15, "tilt": "89 deg"}})

@@ -222,17 +222,8 @@ def test_the_command_registers_by_dots(tmp_path, monkeypatch):
     measured = Measurement.from_radiance(radiance, Band(3.8e-6, 5.1e-6), times, RASTER)
     write_measurement(measured, "infrared.nc")
     Image.fromarray(SMALL.visible).save("visible.png")
-    arguments = [
-        "infrared.nc",
-        "visible.png",
-        "--method",
-        "dots",
-        "--out",
-        "map.yaml",
-        "--overlay",
-        "over.png",
-    ]
-    result = CliRunner().invoke(app, ["register", *arguments], env={"COLUMNS": "120"})
+    command = "register infrared.nc visible.png --method dots --out map.yaml --overlay over.png"
+    result = CliRunner().invoke(app, command.split(), env={"COLUMNS": "120"})
     output = " ".join(result.output.split())
     assert result.exit_code == 0, output
     assert "Infrared: 19 bright dots with a radius of" in output

@@ -424,22 +424,15 @@ def test_the_command_fits_over_the_temperature(two):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["a.nc", "--reference", "10degC"], "10 °C must be over what is reflected,"),
         (
             ["a.nc", "small.nc", *AT_391, *AT_500],
             "small.nc: has other pixels, or another band, than a.nc, expected",
         ),
-        (
-            ["a.nc", *AT_391, "--regions", "outside.yaml"],
-            "region a: reaches over columns 0 to 400, expected within the image's 0 to 40",
-        ),
         (["a.nc", *AT_391, *AT_500], "--reference: 2 temperatures for 1 images"),
-        (["none.nc", *AT_391], "none.nc: there is no such file"),
         (["a.nc", *AT_391, "--set", "band=1"], "--set"),
     ],
 )
 def test_bad_input_is_one_line(folder, arguments, message):
-    (folder / "outside.yaml").write_text("regions: {a: {rectangle: [[0, 0], [400, 3]]}}")
     write_measurement(SMALL, folder / "small.nc")
     result = command(*arguments, "--out", "never.nc")
     assert result.exit_code == 2

@@ -15,7 +15,7 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from PIL import Image
 from pointing import POINTING, point_elsewhere
-from refusals import PNG, refused_on
+from refusals import refused_on
 
 from chipglow.io.sources import Placement, Units
 from chipglow.io.sources.conventions import SI_UNITS
@@ -63,21 +63,6 @@ def a_source(files, **changed):
     return GridSource(files=files, **{**given, **changed})
 
 
-def npy(folder, values):
-    np.save(folder / "temperature.npy", values)
-    return folder / "temperature.npy", {}
-
-
-def npz(folder, values):
-    np.savez(folder / "all.npz", temperature=values, other=np.zeros(3))
-    return folder / "all.npz", {}
-
-
-def npz_packed(folder, values):
-    np.savez_compressed(folder / "all.npz", temperature=values)
-    return folder / "all.npz", {}
-
-
 def npz_fortran(folder, values):
     np.savez(folder / "all.npz", T=np.asfortranarray(values))
     return folder / "all.npz", {}
@@ -101,30 +86,8 @@ def netcdf(folder, values, **options):
     return folder / "all.nc", {"spacing": None, "interval": None}
 
 
-def netcdf3(folder, values):
-    return netcdf(folder, values, engine="scipy", format="NETCDF3_64BIT")
-
-
 def netcdf4(folder, values):
     return netcdf(folder, values, engine="h5netcdf")
-
-
-def zarr2(folder, values, version=2):
-    zarr = pytest.importorskip("zarr")
-    group = zarr.open_group(folder / "all.zarr", mode="w", zarr_format=version)
-    array = group.create_array("temperature", shape=values.shape, chunks=(2, 6, 7), dtype="f4")
-    array[:] = values
-    return folder / "all.zarr", {}
-
-
-def zarr3(folder, values):
-    return zarr2(folder, values, 3)
-
-
-def matlab5(folder, values):
-    stack = {"T": values.transpose(1, 2, 0).astype(float), "text": "not a field"}
-    scipy.io.savemat(folder / "all.mat", stack, do_compression=True)
-    return folder / "all.mat", {"axes": ("y", "x", "time")}
 
 
 def matlab73(folder, values):
@@ -137,12 +100,6 @@ def matlab73(folder, values):
 def tiff(folder, values):
     tifffile = pytest.importorskip("tifffile")
     tifffile.imwrite(folder / "T.tif", values, photometric="minisblack")
-    return folder / "T.tif", {}
-
-
-def tiff_packed(folder, values):
-    tifffile = pytest.importorskip("tifffile")
-    tifffile.imwrite(folder / "T.tif", values, photometric="minisblack", compression="zlib")
     return folder / "T.tif", {}
 
 
@@ -167,10 +124,8 @@ def csv_semicolons(folder, values):
     return folder / "T_*.csv", {}
 
 
-FORMATS = [
-    npy, npz, npz_packed, npz_fortran, hdf5, netcdf3, netcdf4, zarr2, zarr3, matlab5, matlab73,
-    tiff, tiff_packed, tiff_of_libtiff, csv, csv_semicolons,
-]  # fmt: skip
+FORMATS = [npz_fortran, hdf5, netcdf4, matlab73, tiff, tiff_of_libtiff, csv, csv_semicolons]
+"""Those of test_import_formats.py are further ones."""
 
 
 @pytest.mark.parametrize("write", FORMATS, ids=lambda write: write.__name__)
@@ -435,24 +390,6 @@ def test_only_a_block_of_frames_is_in_memory(tmp_path):
 
 
 refused = partial(refused_on, FIT, 50e6)
-
-
-@pytest.mark.parametrize("content", [b"", PNG, b"\x93NUMPY", b"PK\x03\x04" + bytes(50), b"II*\0"])
-@pytest.mark.parametrize("suffix", ["npy", "npz", "h5", "nc", "mat", "tif", "csv", "zip"])
-def test_mislabelled_and_empty_files(tmp_path, suffix, content):
-    path = tmp_path / f"T.{suffix}"
-    path.write_bytes(content)
-    refused(a_source(str(path)), f"T.{suffix}")
-
-
-@pytest.mark.parametrize("write", FORMATS, ids=lambda write: write.__name__)
-@pytest.mark.parametrize("fraction", [0.02, 0.3, 0.9])
-def test_truncated_files(tmp_path, write, fraction):
-    path, options = write(tmp_path, a_stack())
-    for file in [file for file in tmp_path.rglob("*") if file.is_file()]:
-        content = file.read_bytes()
-        file.write_bytes(content[: int(fraction * len(content))])
-    refused(a_source(str(path), **options))
 
 
 def test_missing_files(tmp_path):

@@ -1,6 +1,5 @@
 """Movies of fields: known values drawn, encoded and read back, and what is refused."""
 
-import pickle
 import struct
 from importlib.util import module_from_spec, spec_from_file_location
 from itertools import pairwise
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings, strategies as st
+from hypothesis import given, settings, strategies as st
 from matplotlib import colormaps
 from movies import (
     CODECS,
@@ -131,13 +130,6 @@ def test_a_map_that_returns_to_a_colour_is_refused(name):
 def test_an_unknown_map_is_refused():
     with pytest.raises(SourceError, match="jett: unknown colour map"):
         ColourScale.named("jett", ENDS)
-
-
-def test_bands_have_the_end_colours_of_the_map():
-    scale = ColourScale.named("rainbow", ENDS, 10)
-    assert scale.colours[0] == pytest.approx([0, 0, 1], abs=1e-9)
-    assert scale.colours[-1] == pytest.approx([1, 0, 0], abs=1e-9)
-    assert scale.values[0] == pytest.approx(ENDS[0] + (ENDS[1] - ENDS[0]) / 20)
 
 
 def test_a_scale_may_descend():
@@ -282,13 +274,6 @@ def test_some_pictures_are_those_of_the_whole_movie(tmp_path, codec):
     assert index.count == len(whole) == 14
     some = list(pictures(path, index, (0, 7, 13)))
     assert all((one == whole[number]).all() for one, number in zip(some, (0, 7, 13), strict=True))
-
-
-def test_a_source_can_be_handed_to_another_process(tmp_path):
-    source = a_source(a_movie(tmp_path / "a.avi"))
-    again = pickle.loads(pickle.dumps(source))
-    assert again == source
-    assert again.survey().extent == source.survey().extent
 
 
 def test_crop_and_turn(tmp_path):
@@ -528,26 +513,6 @@ def fails(path):
     return message
 
 
-@pytest.mark.parametrize(
-    "codec",
-    [RAW, CODECS[1], CODECS[2], H264, Codec("GIF", ".gif", "gif", "rgb8")],
-    ids=lambda codec: codec.name,
-)
-@pytest.mark.parametrize("fraction", [0.02, 0.5, 0.9])
-def test_a_truncated_movie_is_refused(tmp_path, codec, fraction):
-    path = a_movie(tmp_path / f"a{codec.suffix}", count=8, codec=codec)
-    data = path.read_bytes()
-    path.write_bytes(data[: int(fraction * len(data))])
-    fails(path)
-
-
-@pytest.mark.parametrize("content", [b"", b"time,temperature\n0,293\n" * 50, bytes(5000)])
-def test_what_is_no_movie_is_refused(tmp_path, content):
-    path = tmp_path / "a.avi"
-    path.write_bytes(content)
-    fails(path)
-
-
 def test_a_movie_of_another_name_is_read(tmp_path):
     path = a_movie(tmp_path / "a.mp4", codec=H264).rename(tmp_path / "a.avi")
     assert "h264" in a_source(path).survey().kind
@@ -578,28 +543,6 @@ def test_a_picture_without_a_colour_of_the_scale_is_refused(tmp_path):
     source = a_source(path, background=())
     with pytest.raises(SourceError, match="picture 1 has no colour of the scale"):
         list(source.frames(Raster(0.0, 1e-4, PIXEL, 10, 10)))
-
-
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.sampled_from([".avi", ".mp4", ".mkv", ".gif"]), st.integers(0, 2**32 - 1))
-@example(".avi", 0)
-def test_a_damaged_movie_is_read_or_refused(tmp_path, suffix, seed):
-    codecs = {".avi": CODECS[2], ".mp4": H264, ".mkv": CODECS[1]}
-    whole = tmp_path / f"whole{suffix}"
-    if not whole.exists():
-        codec = codecs.get(suffix, Codec("GIF", ".gif", "gif", "rgb8"))
-        a_movie(whole, codec=codec, shape=(24, 32))
-    data = np.frombuffer(whole.read_bytes(), np.uint8).copy()
-    random = np.random.default_rng(seed)
-    places = random.integers(0, len(data), random.integers(1, 20))
-    data[places] = random.integers(0, 256, len(places))
-    path = tmp_path / f"damaged{seed}{suffix}"
-    data.tofile(path)
-    try:
-        for frame in a_source(path).frames(Raster(0.0, 1e-4, PIXEL, 10, 10)):
-            assert frame.material.shape == (10, 10)
-    except SourceError as error:
-        assert "\n" not in str(error)
 
 
 def test_the_maps_of_matplotlib_are_told_from_ours():

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from solver import STEEL, UNBROKEN, Block
 
-from chipglow.cutting import AISI_1045, MaterialError, NonlocalViscosity, stress
+from chipglow.cutting import AISI_1045, NonlocalViscosity, stress
 from chipglow.cutting.damage import Damage
-from chipglow.cutting.library import FOLDER, read_material
 from chipglow.cutting.mean_rate import average_rates
 
 LENGTH = 20e-6
@@ -150,19 +149,3 @@ def test_a_failing_layer_is_as_thick_as_the_band_if_it_has_a_width():
     assert local.failing_layer(10e-6) == pytest.approx(20e-6)
     with_length = replace(AISI_1045, nonlocal_viscosity=NonlocalViscosity(1e3, 30e-6))
     assert with_length.failing_layer(10e-6) == with_length.failing_layer(5e-6) == 60e-6
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{viscosity: 3, length: 20 um, source: mine}", r"nonlocal_viscosity\.viscosity: .*kPa s"),
-        ("{viscosity: 3 kPa s, source: mine}", r"nonlocal_viscosity\.length: is missing"),
-        ("{viscosity: 0 Pa s, length: 20 um, source: mine}", "viscosity.*over 0"),
-    ],
-)
-def test_a_wrong_one_in_a_materials_file_is_refused(tmp_path, text, message):
-    given = (FOLDER / "workpieces" / "al-7075-t6.yaml").read_text(encoding="utf-8")
-    path = tmp_path / "own.yaml"
-    path.write_text(f"{given}\nnonlocal_viscosity: {text}\n", encoding="utf-8")
-    with pytest.raises(MaterialError, match=message):
-        read_material(path)

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
+import chipglow
 from chipglow.camera import Camera, Flag, Measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene, ToolGeometry
+from chipglow.study import Study
 from chipglow.surface import UniformSurface
+from chipglow.uncertainty import Estimate
 
 RASTER = Raster(-30e-6, 20e-6, 2e-6, 25, 40)
 TOOL = ToolGeometry()
@@ -64,6 +67,22 @@ def test_a_measurement_in_a_line():
         "<Measurement: 1 frame of 8 x 13 pixels of 6 µm; at 0 µs; no temperature; with tool>"
     )
     assert cold.notes.warnings == []
+
+
+def test_a_notebook_shows_the_data_the_budget_and_the_study():
+    assert "271 °C to 349 °C" in scene()._repr_html_() and "plastic_strain" in scene()._repr_html_()
+    assert "2 warnings" in measurement()._repr_html_()
+    shown = Estimate(np.array(0.42)).with_component("thermometer", 0.01)._repr_html_()
+    assert "0.42" in shown and "thermometer" in shown and "0.01" in shown
+    study = Study(camera={"pitch": "5 um"})._repr_html_()
+    assert "pitch: 5 um" in study and "<details>" in study
+
+
+def test_the_names_of_chipglow_are_not_its_packages():
+    names = dir(chipglow)
+    assert {"Scene", "Camera", "Study", "analyse"} <= set(names)
+    assert not {"analysis", "camera", "io", "laboratory"} & set(names)
+    assert chipglow.camera.Camera is Camera
 
 
 def test_degrees_celsius_of_a_frame():

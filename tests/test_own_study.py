@@ -267,6 +267,10 @@ def test_what_the_analysis_takes_from_the_paper_is_said():
     assert "of analysis: rake_chip chip 2, band_chip chip 1, reference maximum." in told
     assert "PSF widths from 1.38 um to 6.89 um" in told
     assert Study().plan == Study().analysis
+    at_a_point = Study(
+        camera={"pitch": "5 um"}, analysis={"points": {"here": ("0 um", "0 um")}, "exposures": 1}
+    )
+    assert "of analysis: reference maximum." in list(left_to_the_paper(at_a_point))[-1]
     even = Study(
         surface={"kind": "uniform", "emissivity": 0.5}, analysis={"psf_widths": ["8 um", "9 um"]}
     )

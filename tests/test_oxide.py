@@ -5,12 +5,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from chipglow.scene import Raster, Scene
-from chipglow.study import Study
-from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import (
     ParabolicOxide,
     UniformSurface,
-    Wedge,
 )
 
 RASTER = Raster(0.0, 60e-6, 1e-6, 60, 80)
@@ -123,13 +120,3 @@ def test_a_scene_without_material_coordinates_is_refused():
     made = Scene.from_fields(RASTER, [0.0], {"temperature": np.full((1, *RASTER.shape), 500.0)})
     with pytest.raises(ValueError, match="oxide: the scene has no material coordinates"):
         SURFACE.on(made)
-
-
-def test_a_study_switches_it_on():
-    section = {"oxide": {"kind": "parabolic", "initial": "3 nm"}, "reflections": {"kind": "wedge"}}
-    surface = surfaces_of(Study(surface=section).surface, 7)["chip 1"]
-    assert surface.modifiers == (ParabolicOxide(initial=3e-9), Wedge())
-    assert surface.redrawn(2).bare.seed == 9
-    assert Study().surface.oxide is None
-    with pytest.raises(ValueError, match="expected an activation energy such as"):
-        Study(surface={"oxide": {"kind": "parabolic", "activation_energy": "0 kJ/mol"}})

@@ -212,7 +212,10 @@ def test_a_gif_is_read_back_as_it_was_written(tmp_path):
     with movie_writer(tmp_path / "a.GIF", (24, 32), PALETTE) as append:
         for picture in PICTURES:
             append(picture)
-    for found, expected in zip(read_gif(tmp_path / "a.GIF"), PICTURES, strict=True):
+    # Two pictures that are the same are one of twice the duration.
+    for found, expected in zip(
+        read_gif(tmp_path / "a.GIF"), PICTURES[:2] + PICTURES[3:], strict=True
+    ):
         np.testing.assert_array_equal(found, expected)
     with Image.open(tmp_path / "a.GIF") as image:
         assert image.info["duration"] == 50

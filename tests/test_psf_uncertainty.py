@@ -51,26 +51,6 @@ def test_the_fit_s_part_is_that_of_a_wider_and_a_narrower_gaussian(gaussian):
     assert psf.estimate.sum().standard_uncertainty == pytest.approx(0.0, abs=1e-12)
 
 
-def blurred(psf, deviation):
-    """Light of a point behind a Gaussian hole, whatever the squares, as an estimate."""
-    half = len(psf.weights) // 2
-    x = np.exp(-0.5 * ((np.arange(-half, half + 1) * psf.spacing) / deviation) ** 2)
-    return psf.estimate.linear(np.outer(x, x).reshape(1, -1))[0]
-
-
-@pytest.mark.slow
-def test_kernels_of_repeats_differ_as_is_said():
-    """Light behind two Gaussian holes, of 24 images of one edge with other noise."""
-    holes, edge = (3e-6, 8e-6), gaussian_edge(FWHM)
-    kernels = [psf_kernel(knife_edge([seen(edge, seed=seed)])) for seed in range(24)]
-    light = [[blurred(psf, hole) for hole in holes] for psf in kernels]
-    spread = np.std([[one.values for one in of] for of in light], axis=0, ddof=1)
-    stated = [[one.standard_uncertainty for one in of] for of in light]
-    # A standard deviation of 24 is good to 15 %: three times that, and what the choice of the
-    # model adds. A statement of twice or a third of the scatter fails with a probability of 0.99.
-    np.testing.assert_allclose(np.sqrt(np.mean(np.square(stated), axis=0)), spread, rtol=0.5)
-
-
 def test_the_file_keeps_the_components(gaussian, tmp_path):
     psf = psf_kernel(gaussian)
     write_psf(gaussian, tmp_path / "psf.nc", psf)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from chipglow.radiometry import Band, ObjectParameters, TabulatedResponse
-from chipglow.radiometry.planck import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
+from chipglow.radiometry.band import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
 
 REFERENCE = Path(__file__).parent / "reference" / "inband_radiance.csv"
 MID_WAVE = Band(3.8e-6, 5.1e-6)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.spatial import Delaunay
 
-from chipglow.io.sources.triangles import NOTHING, rasterise, triangulate
+from chipglow.io.sources.triangles import NOTHING, rasterise, split_quads
 from chipglow.scene import Raster
 
 RASTER = Raster(left=-2.0, top=7.0, spacing=0.25, rows=32, columns=40)
@@ -140,60 +140,9 @@ def test_nodes_that_do_not_exist_are_refused(arguments, said):
         rasterise(RASTER, *arguments)
 
 
-REFERENCE = {
-    "triangle6": [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
-    "quad8": [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)],
-}
-REFERENCE["quad9"] = [*REFERENCE["quad8"], (0.5, 0.5)]
-
-
-def patch(shape, count):
-    """A square of count by count elements that share their nodes, as points and elements."""
-    corners = np.stack(np.meshgrid(np.arange(count), np.arange(count)), -1).reshape(-1, 1, 2)
-    inside = np.array(REFERENCE[shape])
-    if shape == "triangle6":
-        inside = np.concatenate((inside, 1.0 - inside))
-    every = ((corners + inside) / count).reshape(-1, 2)
-    points, number = np.unique(np.round(every, 12), axis=0, return_inverse=True)
-    return points, number.reshape(-1, len(REFERENCE[shape]))
-
-
-@pytest.mark.parametrize("shape", REFERENCE)
-def test_quadratic_elements_converge_with_the_square_and_keep_the_stated_error(shape):
-    raster = Raster(left=0.0, top=1.0, spacing=0.01, rows=100, columns=100)
-    x = np.broadcast_to(raster.x, raster.shape)
-    errors = []
-    for count in (1, 2, 4):
-        points, elements = patch(shape, count)
-        # Bent along x only, so each element's own field is the parabola itself.
-        pieces = triangulate(shape, points, points[:, :1] ** 2, elements)
-        sampled = rasterise(raster, pieces.points, pieces.triangles, pieces.values)
-        assert (sampled.element != NOTHING).all()
-        errors.append(np.abs(sampled.fields[0] - x**2).max())
-    # f'' is 2: 2 / 128 for an edge of 1; samples miss the worst place by a little.
-    assert 0.8 * 2 / 128 < errors[0] <= 2 / 128 + 1e-6
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
-    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.2)
-
-
-@pytest.mark.parametrize("shape", REFERENCE)
-def test_curved_elements_meet_without_a_gap(shape):
-    points, elements = patch(shape, 3)
-    bent = points + 0.02 * np.sin(7.0 * points[:, ::-1])
-    edge = ((points == 0) | (points == 1)).any(axis=1)
-    bent[edge] = points[edge]
-    pieces = triangulate(shape, bent * 4.0, np.empty((len(points), 0)), elements)
-    counts = coverings(pieces.points, pieces.triangles)
-    inside = (X > 0) & (X < 4) & (Y > 0) & (Y < 4)
-    assert (counts[inside] == 1).all()
-    assert (counts[~inside] == 0).all()
-    assert np.bincount(pieces.element).min() == np.bincount(pieces.element).max()
-
-
 def test_a_quad_is_split_where_it_is_shorter():
     # An arrow's head: the long diagonal runs outside.
     points = np.array([(0.0, 0.0), (4.0, 2.0), (0.0, 4.0), (1.0, 2.0)])
-    pieces = triangulate("quad", points, linear(points)[:, None], np.array([(0, 1, 2, 3)]))
-    counts = coverings(pieces.points, pieces.triangles)
+    counts = coverings(points, split_quads(points, np.array([(0, 1, 2, 3)])))
     assert counts.max() == 1
     assert counts.sum() * RASTER.spacing**2 == pytest.approx(6.0, rel=0.05)

@@ -47,7 +47,6 @@ from chipglow.surface import (
     CHIP_2,
     Dispersion,
     HagenRubens,
-    ParabolicOxide,
     SpectralTable,
     UniformSurface,
 )
@@ -201,21 +200,6 @@ def test_the_odds_of_emission_follow_the_law():
         np.testing.assert_allclose(found, expected, rtol=1e-3)
         same = emissivity(UniformSurface(bare).modified(Dispersion(grey, **known)), seen)
         np.testing.assert_allclose(same, bare, rtol=1e-6)
-
-
-def test_a_study_puts_the_law_under_the_oxide():
-    surfaces = Study(
-        surface={
-            "spectral": {"kind": "hagen-rubens", "resistivity": "6e-7 ohm*m"},
-            "measured_in": "3-5 um",
-            "oxide": {"kind": "parabolic"},
-        }
-    ).surface.build(1)
-    expected = Dispersion(METAL, Band(3e-6, 5e-6)), ParabolicOxide()
-    assert surfaces["chip 1"].modifiers == expected
-    for dispersive in (METAL, UniformSurface(0.4).modified(expected[0])):
-        with pytest.raises(ValueError, match="no band is given"):
-            dispersive.on(sloping())
 
 
 # --- the camera of two bands

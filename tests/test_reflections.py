@@ -10,7 +10,6 @@ from hypothesis import given, settings, strategies as st
 from chipglow.camera import Camera, View, expose
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry
-from chipglow.study import Study
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
@@ -369,15 +368,3 @@ def test_several_surfaces_are_seen_as_each_alone():
 
 
 # ---- in a study
-
-
-def test_a_study_switches_it_on():
-    off = Study().surface.build(2010)
-    section = {"kind": "features", "reflections": {"kind": "wedge", "angle": "60 deg"}}
-    on = Study(**{"surface": section}).surface.build(2010)
-    assert off == {"chip 1": CHIP_1, "chip 2": CHIP_2}
-    for name, bare in off.items():
-        assert on[name].bare == bare
-        (shape,) = on[name].modifiers
-        assert shape.angle == pytest.approx(np.radians(60))
-        assert replace(shape, angle=Wedge().angle) == Wedge()

@@ -22,7 +22,6 @@ from chipglow.laboratory.registration import (
     fit_images,
     fit_points,
     load_registration,
-    read_pictures,
     read_points,
     simultaneous_frames,
     write_registration,
@@ -474,14 +473,6 @@ def test_options_that_cannot_be_are_refused(folder, arguments, expected):
     code, output = register("infrared.nc", "visible.png", *arguments)
     assert (code, output.count("chipglow: ")) == (2, 1)
     assert expected in output
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
-def test_pictures_keep_their_values(tmp_path, dtype):
-    values = np.arange(60, dtype=dtype).reshape(6, 10) * (1000 if dtype == np.uint16 else 1)
-    Image.fromarray(values).save(tmp_path / "a.tiff")
-    found = read_pictures(tmp_path / "a.tiff")
-    assert (found.signal[0] == values).all()
 
 
 def test_points_are_the_middles_of_sensors(tmp_path):

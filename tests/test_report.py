@@ -15,12 +15,14 @@ import xarray as xr
 from PIL import Image
 
 from chipglow.analysis import Distribution, one_draw, with_errors
+from chipglow.io import open_scene
 from chipglow.report import Row, result_rows, results_frame, write_report
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
+from chipglow.scene import SceneError
 from chipglow.study import Study
 
 TITLE = "My <i>own</i> study"
@@ -358,6 +360,12 @@ def test_arrays_and_study_are_as_written(folder, result, facts):
     assert (folder / "study.yaml").read_text(encoding="utf-8") == STUDY
 
 
+@pytest.mark.parametrize("name", ["", "results.nc"])
+def test_results_in_the_place_of_a_scene_are_named_with_what_to_do_next(folder, name):
+    with pytest.raises(SceneError, match=r"results of an analysis.*chipglow cut study\.yaml"):
+        open_scene(folder / name)
+
+
 def test_the_comparison_holds_what_the_paper_states(result):
     rows = {row.key: row for row in result_rows(result, PAPERS)}
     paper = {key: row.paper for key, row in rows.items() if row.paper is not None}
@@ -464,22 +472,3 @@ def test_a_part_that_fails_is_shown_beside_the_others(result, undrawn, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert summary["failed"] == failed
     assert summary["results"]["rake_error_degC"] < 0
-
-
-def test_the_papers_emissivities_come_back_from_heated_objects(result):
-    """Within what the procedure states, and what the camera's blur is known to do."""
-    found = {row.feature: row for heated in result.cut.heated for row in heated.rows}
-    assert set(found) == set(TABLE_1)
-    for feature, paper in TABLE_1.items():
-        row = found[feature]
-        assert row.true == paper
-        # Few grains of 20 um in a region: the mean of the textures scatters by the deviation over
-        # the root of some ten grains. Narrow bands are drawn toward the bodies by up to 0.06.
-        spread = 3 * paper.standard_deviation / np.sqrt(10 * row.means.size)
-        drawn = 0.06 if "shear band" in feature else 0.02
-        assert row.means.mean() == pytest.approx(paper.mean, abs=spread + drawn)
-        if "shear band" not in feature:  # whose region holds the slope to the bodies too
-            assert (row.deviations < paper.standard_deviation).all()
-    for chip in ("chip 1", "chip 2"):
-        body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
-        assert band.mean > body.mean + 2 * band.estimate.standard_uncertainty

@@ -7,7 +7,6 @@ import pytest
 
 from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF
 from chipglow.scene import Raster, Scene
-from chipglow.study import Study
 from chipglow.surface import UniformSurface
 
 PITCH, STEP = 6e-6, 0.5e-6
@@ -105,8 +104,3 @@ def test_what_is_too_short_is_one_error(moving):
     for wrong in (0.0, -1e-6, 0.01, np.nan):
         with pytest.raises(ValueError, match=r"line_time: .*, expected"):
             camera(line_time=wrong)
-
-
-def test_a_study_chooses_it():
-    assert Study(camera={"line_time": "2 us"}).camera.build().line_time == pytest.approx(2e-6)
-    assert Study().camera.build().line_time is None

@@ -7,9 +7,8 @@ from scipy.integrate import quad
 
 from chipglow.camera import Camera
 from chipglow.radiometry import Band
-from chipglow.radiometry.planck import spectral_radiance
+from chipglow.radiometry.band import spectral_radiance
 from chipglow.scene import Raster, Scene
-from chipglow.study import Study
 from chipglow.surface import HagenRubens, SpectralTable
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -85,21 +84,3 @@ def test_resistivity_grows_with_temperature():
 def test_without_a_camera_there_is_no_band():
     with pytest.raises(ValueError, match="spectral: no band"):
         TABLE.on(scene(500.0))
-
-
-@pytest.mark.parametrize(
-    ("section", "expected"),
-    [
-        (
-            {"kind": "spectral", "table": [["3 um", "20 degC", 0.3], ["5 um", "20 degC", 0.2]]},
-            SpectralTable(((3e-6, 293.15, 0.3), (5e-6, 293.15, 0.2))),
-        ),
-        (
-            {"kind": "hagen-rubens", "resistivity": "1.7e-7 ohm*m", "coefficient": "0.005 K^-1"},
-            HagenRubens(1.7e-7, 0.005),
-        ),
-    ],
-)
-def test_a_study_chooses_them(section, expected):
-    study = Study(**{"surface": section})
-    assert study.surface == expected

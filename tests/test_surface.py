@@ -6,14 +6,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.study import Study
+from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
+    Dispersion,
     Emissivity,
     EmissivityStack,
+    Fresnel,
+    HagenRubens,
+    ParabolicOxide,
+    SpectralTable,
     Texture,
     UniformSurface,
+    Wedge,
     chip_fraction,
     shear_band_fraction,
 )
@@ -72,15 +81,21 @@ def test_enlarging_is_bicubic(u, v):
     assert map_.at(u, v) == pytest.approx(expected, abs=3e-7)
 
 
+def samples(map_):
+    """Values at even steps over one period, ten to a node: good to 1e-4 of their scatter."""
+    position = np.arange(10 * MAP_SIZE) * map_.grain / 10
+    return map_.at(position[None, :], position[:, None]).astype(np.float64)
+
+
 def test_restoring_gives_the_deviation_asked_for():
     # The sampled standard deviation is good to 1e-4 of itself.
-    assert texture(0.42, 0.07).standard_deviation == pytest.approx(0.07, rel=1e-4)
+    assert samples(texture(0.42, 0.07)).std() == pytest.approx(0.07, rel=1e-4)
 
 
 def test_without_restoring_enlarging_takes_a_fifth():
     # Over many maps the variance falls by the square of ∫k², which for the cubics is 57/70.
     # 16384 deviates: 0.55 % standard deviation of a standard deviation; four of it.
-    found = texture(0.5, 0.05, restore=False).standard_deviation
+    found = samples(texture(0.5, 0.05, restore=False)).std()
     assert found == pytest.approx(0.05 * 57 / 70, rel=0.022)
 
 
@@ -91,7 +106,7 @@ def test_without_restoring_enlarging_takes_a_fifth():
 def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, standard_deviation):
     """Cut off at 0, mean and standard deviation of the first would be 0.057 and 0.033."""
     maps = [texture(mean, standard_deviation, seed=seed) for seed in range(12)]
-    values = np.concatenate([map_._samples.ravel() for map_ in maps])
+    values = np.concatenate([samples(map_).ravel() for map_ in maps])
     assert not Emissivity(mean, standard_deviation).is_normal
     assert values.min() >= 0.0
     assert values.max() <= 1.0
@@ -161,8 +176,7 @@ def test_shares_of_the_blends():
 
 def greatest_slope(map_):
     """Greatest change of a map along a node's width, from differences over a tenth of it."""
-    position = np.arange(10 * MAP_SIZE) * map_.grain / 10
-    values = map_.at(position[None, :], position[:, None]).astype(np.float64)
+    values = samples(map_)
     return 10 * max(np.abs(np.diff(values, axis=axis)).max() for axis in (0, 1))
 
 
@@ -293,3 +307,27 @@ def test_a_uniform_surface_is_black_but_for_the_void():
 def test_no_kernel_of_the_surface_waits_by_spinning():
     for kernel in (_blend, _look_up):
         assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")
+
+
+def test_a_study_lays_modifiers_over_each_other():
+    metal = {"kind": "hagen-rubens", "resistivity": "6e-7 ohm*m", "coefficient": "0.005 K^-1"}
+    section = {
+        "spectral": metal,
+        "measured_in": "3-5 um",
+        "oxide": {"kind": "parabolic", "initial": "3 nm"},
+        "directional": {"kind": "fresnel", "n": 4.6, "k": 15, "tilt": "10 deg"},
+        "reflections": {"kind": "wedge", "angle": "60 deg"},
+    }
+    surface = surfaces_of(Study(surface=section).surface, 7)["chip 1"]
+    law = HagenRubens(6e-7, 0.005)
+    spectral, oxide, direction, shape = surface.modifiers
+    assert (spectral, oxide) == (Dispersion(law, Band(3e-6, 5e-6)), ParabolicOxide(initial=3e-9))
+    assert direction == Fresnel(n=4.6, k=15.0, tilt=direction.tilt)
+    assert shape == Wedge(angle=shape.angle)
+    assert np.degrees([direction.tilt, shape.angle]) == pytest.approx([10.0, 60.0])
+    assert surfaces_of(Study().surface, 7)["chip 1"] == replace(CHIP_1, seed=7)
+    assert surface.redrawn(2).bare.seed == 9
+    assert Study(surface=metal).surface == law
+    table = {"kind": "spectral", "table": [["3 um", "20 degC", 0.3], ["5 um", "20 degC", 0.2]]}
+    rows = (3e-6, 293.15, 0.3), (5e-6, 293.15, 0.2)
+    assert Study(surface=table).surface == SpectralTable(rows)

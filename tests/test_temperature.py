@@ -454,8 +454,6 @@ def test_the_command_takes_the_line_of_several_temperatures(folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--emissivity", "none.nc"], "none.nc: there is no such file"),
-        (["--emissivity", "1.5"], "emissivity: is 1.5, expected over 0 to 1"),
         (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "expected none with a file"),
         (["--emissivity", "e.nc"], "is known of other, expected one of the regions"),
         (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),

@@ -282,7 +282,6 @@ def tool(**changed):
         (lambda: tool(rake_angle=radians(80.0)), "rake_angle: 80 deg, expected over -60 deg"),
         (lambda: tool(clearance_angle=0.0), "clearance_angle: 0 rad, expected over 0 rad, under"),
         (lambda: ToolGeometry(radians(50.0), radians(40.0)), "wedge of less than 5"),
-        (lambda: tool(edge_radius=-1e-6), "edge_radius: -1e-06 m, expected over 0 m"),
         (lambda: tool(chamfer=Chamfer(10e-6, 0.35)), "chamfer width: expected over 17.* got 10 um"),
         (lambda: tool(chamfer=Chamfer(1e-4, 1.5)), "chamfer angle: expected under 83 degrees"),
         (
@@ -290,9 +289,7 @@ def tool(**changed):
             "chamfer and hone: expected one or the other, got both",
         ),
         (lambda: Chamfer(0.0, 0.3), "Chamfer.width: 0 m, expected over 0 m"),
-        (lambda: Chamfer(np.nan, 0.3), "Chamfer.width: nan m, expected over 0 m"),
         (lambda: Chamfer(1e-4, -0.1), "Chamfer.angle: -0.1 rad, expected over 0 rad, under 1.57"),
-        (lambda: Hone(1e-5, -1e-5), "Hone.clearance: -1e-05 m, expected over 0 m"),
         (lambda: Hone(1e-4, 1e-6), "form factor rake / clearance is 100, expected 0.1 to 10"),
         (
             lambda: ToolOutline(((0.0, 400e-6), (0.0, 10e-6), (400e-6, 50e-6))),
@@ -330,10 +327,8 @@ def test_an_outline_is_read_in_any_unit_of_length_and_from_any_origin(content, t
         ("x,y\n" + GOOD, "line 1: 'x' has no unit, expected one such as x_um"),
         (GOOD, "line 1: unknown column '0', expected x_um, y_um"),
         ("x_um,y_um\n0,500\n0,ten\n", "line 3: '0,ten', expected 2 numbers"),
-        ("x_um,y_um\n0,500\n0;20\n", "line 3: '0;20', expected 2 numbers"),
         ("x_um,y_um\n0,500\n\n600,60\n", "line 4: 2 points, expected 3 to 1000"),
         ("x_um,y_um\n0,500\n20,0\n", "line 3: 2 points, expected 3 to 1000"),
-        ("x_um,y_um\n", "there is no number in it"),
         ("x_um,y_um\n0,500\n0,nan\n600,60\n", "line 3: '0,nan', expected 2 numbers"),
         ("x_um,y_um\n0,500\n0,20\n0,20\n600,60\n", "line 4: the same point as the one before"),
         ("x_um,y_um\n0,500\n0,20\n0,90\n600,95\n", "line 3: the line turns back"),

@@ -15,7 +15,7 @@ from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, find_tool, rake_grid
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
-from chipglow.scene import PlacedTool, ToolGeometry
+from chipglow.scene import ToolGeometry
 from chipglow.surface import CHIP_2
 from chipglow.uncertainty import Estimate, from_xarray
 
@@ -43,7 +43,7 @@ def moved(tool, uncertainty, along, across, angle):
     way = along * uncertainty.along * np.array(tool.rake_direction)
     way = way + across * uncertainty.across * np.array(tool.rake_normal)
     tip = tool.rake_point(uncertainty.pivot) + way - turned.rake_point(uncertainty.pivot)
-    return PlacedTool(turned, (float(tip[0]), float(tip[1])))
+    return turned.at((float(tip[0]), float(tip[1])))
 
 
 @settings(max_examples=40)
@@ -65,7 +65,7 @@ def test_displacements_are_those_of_a_tool_that_is_moved_and_turned(kind, angle,
 
 
 def test_the_tool_of_the_measurement_is_taken_if_none_is_given():
-    other = PlacedTool(TOOL, (20e-6, 0.0))
+    other = TOOL.at((20e-6, 0.0))
     told = linear(1).with_tool(other)
     assert rake_grid(told).tool == other
     assert rake_grid(told, TOOL).tool == TOOL
@@ -222,7 +222,7 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
             assert "Assumed: The clearance angle is 7 deg, the edge radius 20 um." in assumed
         with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
             written = from_xarray(data.load(), "mean")
-        tool = tool or PlacedTool(ToolGeometry(radians(-7.0)), (0.0, 0.0))
+        tool = tool or ToolGeometry(radians(-7.0)).at((0.0, 0.0))
         grid = rake_grid(measurement, tool, uncertainty=uncertainty)
         np.testing.assert_array_equal(written.values, grid.mean)
         np.testing.assert_array_equal(

@@ -120,42 +120,18 @@ def bent(cells=(10e-6, 5e-6)):
         right.set(xlabel="height / µm", ylabel="stress across the plane / MPa")
         right.legend()
 
+    shared = "{} % if the points of a cell shared one volume"
     checks = (
-        Check(
-            "curvature, cell 10 µm",
-            "(1 + ν) α dT/dy",
-            expected,
-            curvature(blocks[0]),
-            0.03,
-            "eight cells in the height",
-            unit="1/m",
+        *(
+            Check(f"curvature, cell {cell} µm", "(1 + ν) α dT/dy", expected, curvature(block),
+                  tolerance, f"{count} cells in the height", "1/m")
+            for block, cell, tolerance, count in (
+                (blocks[0], 10, 0.03, "eight"), (blocks[1], 5, 0.015, "sixteen")
+            )
         ),
-        Check(
-            "curvature, cell 5 µm",
-            "(1 + ν) α dT/dy",
-            expected,
-            curvature(blocks[1]),
-            0.015,
-            "sixteen cells in the height",
-            unit="1/m",
-        ),
-        Check(
-            "stress in the plane, cell 10 µm, fraction of that across",
-            "none",
-            0.0,
-            stress_in_plane(blocks[0]) / ACROSS,
-            0.03,
-            "8 % if the points of a cell shared one volume",
-            absolute=True,
-        ),
-        Check(
-            "mean stress from point to point, cell 10 µm, likewise",
-            "linear over the height",
-            0.0,
-            unevenness(blocks[0]) / ACROSS,
-            0.01,
-            "7 % if the points of a cell shared one volume",
-            absolute=True,
-        ),
-    )
+        Check("stress in the plane, cell 10 µm, fraction of that across", "none", 0.0,
+              stress_in_plane(blocks[0]) / ACROSS, 0.03, shared.format(8), absolute=True),
+        Check("mean stress from point to point, cell 10 µm, likewise", "linear over the height",
+              0.0, unevenness(blocks[0]) / ACROSS, 0.01, shared.format(7), absolute=True),
+    )  # fmt: skip
     return Case("expansion", "A block warmed on one side", checks, draw)

@@ -43,40 +43,18 @@ def momentum():
         axes.set(xlabel="step", ylabel="relative change")
         axes.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
-    return Case(
-        "momentum",
-        "A free, spinning block",
-        (
-            Check(
-                "largest change of momentum",
-                "conservation",
-                0.0,
-                float(np.abs(changes[:, :2]).max()),
-                1e-12,
-                "rounding: 10⁻¹⁶ a sum, 600 steps",
-                absolute=True,
-            ),
-            Check(
-                "largest change of angular momentum",
-                "conservation",
-                0.0,
-                float(np.abs(changes[:, 2]).max()),
-                1e-5,
-                "points move with the grid's velocity and carry their own: second order",
-                absolute=True,
-            ),
-            Check(
-                "the same with the grid's velocity (APIC)",
-                "conservation",
-                0.0,
-                float(np.abs(of_the_grid).max()),
-                1e-12,
-                "rounding: 10⁻¹⁶ a sum, 600 steps",
-                absolute=True,
-            ),
-        ),
-        draw,
+    rounding = "rounding: 10⁻¹⁶ a sum, 600 steps"
+    second_order = "points move with the grid's velocity and carry their own: second order"
+    rows = (
+        ("largest change of momentum", changes[:, :2], 1e-12, rounding),
+        ("largest change of angular momentum", changes[:, 2], 1e-5, second_order),
+        ("the same with the grid's velocity (APIC)", of_the_grid, 1e-12, rounding),
     )
+    checks = tuple(
+        Check(what, "conservation", 0.0, float(np.abs(change).max()), *told, absolute=True)
+        for what, change, *told in rows
+    )
+    return Case("momentum", "A free, spinning block", checks, draw)
 
 
 def pulse(kind, cell):

@@ -32,7 +32,7 @@ def main() -> None:
 
 
 def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:
-    lines = ["| error | paper / °C | here / °C | range / °C | PSF, paper / % | PSF, here / % |"]
+    lines = ["| error | paper / °C | here / °C | one frame / °C | PSF, paper / % | PSF, here / % |"]
     lines.append("|---|---|---|---|---|---|")
     for key, name in NAMES.items():
         fraction = key.replace("_error_degC", "_psf_fraction_percent")
@@ -41,7 +41,7 @@ def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:
             name,
             _paper(summary, key),
             _spread(error),
-            f"{_number(error['lowest'])} to {_number(error['highest'])}",
+            f"{_number(error['interval_low'])} to {_number(error['interval_high'])}",
             _paper(summary, fraction),
             _spread(portion),
         )
@@ -71,7 +71,7 @@ def _paper(summary: dict[str, dict[str, float]], key: str) -> str:
 
 
 def _spread(values: dict[str, float]) -> str:
-    return f"{_number(values['mean'])} ± {values['standard_deviation']:.0f}"
+    return f"{_number(values['mean'])} ± {values['expanded_uncertainty']:.0f}"
 
 
 def _number(value: float) -> str:

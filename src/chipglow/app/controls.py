@@ -292,7 +292,8 @@ class Controls:
         except ValueError as error:
             message = str(error)
             for path in texts:
-                message = message.removeprefix(f"{self.rows[path].setting}: ")
+                whole, _, number = (setting := self.rows[path].setting).rpartition(".")
+                message = message.removeprefix(f"{whole if number.isdigit() else setting}: ")
             labels = ", ".join(self.rows[path].label for path in texts)
             raise ValueError(f"{labels}: {message}") from None
         initial = self.values(self.initial)

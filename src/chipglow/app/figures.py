@@ -141,9 +141,10 @@ class Line:
         one.min_border_left = _BORDER + 6
         one.title.text_font_size = "12px"
 
-    def show(self, limit: float | None, crossing: float | None) -> None:
+    def show(self, limit: float | None, highest: float, crossing: float | None) -> None:
         """Mark the range limit and where the line enters the tool, and remove the draws."""
-        self.under_range.update(top=limit, visible=limit is not None)
+        top = None if limit is None or limit > highest else limit
+        self.under_range.update(top=top, visible=limit is not None)
         self.face.update(location=crossing or 0.0, visible=crossing is not None)
         self.face_label.update(x=crossing or 0.0, visible=crossing is not None)
         if len(self.band.data["along"]):
@@ -180,7 +181,8 @@ class Figures:
         for name, panel in picture.panels.items():
             self.images[name].show(panel)
         for name, line in self.lines.items():
-            line.show(picture.lower_limit, picture.crossings[name])
+            highest = np.nanmax([*picture.lines[name]["measured"], -np.inf])
+            line.show(picture.lower_limit, float(highest), picture.crossings.get(name))
 
     def show_drawn(self, picture: Picture, drawn: Drawn) -> None:
         for name, line in self.lines.items():

@@ -22,7 +22,7 @@ _COLOURED: Final = (
 
 def study_file(model: SceneModel, state: State) -> bytes:
     """Return the study of a state as YAML; it names the open scene unless that is its cut."""
-    shown, scene = state.study, model.opened.file
+    shown, scene = state.study, model.file
     given = {name: getattr(shown, name) for name in Study.declared().keys() & shown.given}
     study = unchecked(Study(), **given, scene=scene)
     start = model.controls.values(state)["start"]
@@ -36,8 +36,8 @@ def measurement_file(picture: Picture, model: SceneModel) -> bytes:
     """Return the measurement as NetCDF, with reference and error of every pixel."""
     assert picture.camera and picture.exposure
     measurement = picture.camera.form_measurement(picture.exposure)
-    if model.opened.scene.tool is not None:
-        measurement = measurement.with_tool(model.opened.scene.tool)
+    if model.scene.tool is not None:
+        measurement = measurement.with_tool(model.scene.tool)
     place, units = ("time", "y", "x"), {"units": "K"}
     data = measurement.data.assign(
         reference_temperature=(place, picture.data["reference"].values[None], units),

@@ -1,8 +1,7 @@
 """What the app opens: a scene, a folder of results, a measurement, or the bundled scene."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from math import ceil, sqrt
+from dataclasses import replace
 from pathlib import Path
 from secrets import token_urlsafe
 from tempfile import TemporaryDirectory
@@ -14,6 +13,7 @@ from chipglow.analysis import spread_starts
 from chipglow.analysis.cut import lacking
 from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
+from chipglow.app.pictures import MeasurementModel, Model, SceneModel, with_samples
 from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
 from chipglow.laboratory.chip import Instant, Segment
@@ -34,57 +34,34 @@ _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
 
 
-@dataclass(frozen=True, eq=False)
-class OpenedScene:
-    """A scene and the controls of its study; `coarse` has fewer samples for a quick look."""
-
-    name: str
-    scene: Scene
-    coarse: Scene | None
-    controls: Controls
-    file: str | None
-    """The scene as a saved study names it; None for the study's cut."""
-
-    @classmethod
-    def of(cls, scene: Scene, study: Study, name: str, file: str | None) -> "OpenedScene":
-        """Open a scene at its developed shear band, else in its middle; a ValueError if short."""
-        if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            study = unchecked(study, surface=UniformSurface(0.5))
-        duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
-        starts = spread_starts(scene, duration, 3)
-        start, places = starts[len(starts) // 2], _through(scene.raster)
-        coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
-        if segment := _developed(coarse, duration, study.analysis.exposures):
-            start, places = segment.start, _across(segment)
-        shown = shown_study(_with_places(study, *places), rounded(start))
-        controls = Controls.of_scene(shown, scene, duration)
-        return cls(name, scene, None if coarse is scene else coarse, controls, file)
+def scene_model(scene: Scene, study: Study, name: str, file: str | None) -> SceneModel:
+    """Open a scene at its developed shear band, else in its middle; a ValueError if too short."""
+    if "plastic_strain" not in scene.fields and study.surface == Study().surface:
+        study = unchecked(study, surface=UniformSurface(0.5))
+    duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
+    starts = spread_starts(scene, duration, 3)
+    start, places = starts[len(starts) // 2], _through(scene.raster)
+    coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
+    if segment := _developed(coarse, duration, study.analysis.exposures):
+        start, places = segment.start, _across(segment)
+    shown = shown_study(_with_places(study, scene.raster, *places), rounded(start))
+    controls = Controls.of_scene(shown, scene, duration)
+    return SceneModel(name, scene, None if coarse is scene else coarse, controls, file)
 
 
-@dataclass(frozen=True, eq=False)
-class OpenedMeasurement:
-    """A measurement and its controls."""
-
-    name: str
-    measurement: Measurement
-    controls: Controls
-
-    @classmethod
-    def of(cls, measurement: Measurement, name: str) -> "OpenedMeasurement":
-        """Open a measurement with cursor and lines through the hottest pixel of its first frame."""
-        first = np.asarray(measurement.data["radiance_temperature"][0].values, np.float64)
-        usable = np.where(measurement.usable[0], first, -np.inf)
-        raster = measurement.raster
-        row, column = np.unravel_index(int(np.argmax(usable)), usable.shape)
-        hottest = (raster.x[column], raster.y[row]) if np.isfinite(usable).any() else None
-        study = _with_places(Study(), *_through(raster, hottest))
-        return cls(name, measurement, Controls.of_measurement(study, measurement.times, raster))
+def measurement_model(measurement: Measurement, name: str) -> MeasurementModel:
+    """Open a measurement with cursor and lines through the hottest pixel of its first frame."""
+    first = np.asarray(measurement.data["radiance_temperature"][0].values, np.float64)
+    usable = np.where(measurement.usable[0], first, -np.inf)
+    raster = measurement.raster
+    row, column = np.unravel_index(int(np.argmax(usable)), usable.shape)
+    hottest = (raster.x[column], raster.y[row]) if np.isfinite(usable).any() else None
+    study = _with_places(Study(), raster, *_through(raster, hottest))
+    controls = Controls.of_measurement(study, measurement.times, raster)
+    return MeasurementModel(name, measurement, controls)
 
 
-Opened: TypeAlias = OpenedScene | OpenedMeasurement
-
-
-def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
+def open_any(path: str | Path | None, study: Study | None = None) -> Model:
     """Open a scene, a measurement or a folder of results; without a path the bundled scene."""
     if path is None:
         return open_scene_object(example_scene(), study, "bundled scene")
@@ -92,25 +69,25 @@ def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
     if path.is_dir():
         return _results(path)
     if is_measurement(path):
-        return OpenedMeasurement.of(read_measurement(path), path.name)
+        return measurement_model(read_measurement(path), path.name)
     return open_scene_object(open_scene(path), study, path.name)
 
 
-def open_scene_object(scene: Scene, study: Study | None, name: str) -> OpenedScene:
+def open_scene_object(scene: Scene, study: Study | None, name: str) -> SceneModel:
     """Open a scene; a study of one that is no file names ``scene.nc`` beside it."""
     file = str(scene.path.resolve()) if isinstance(scene, StoredScene) else "scene.nc"
-    return OpenedScene.of(scene, study or Study(), name, file)
+    return scene_model(scene, study or Study(), name, file)
 
 
 class OpenFiles:
     """What the command opened, and what was uploaded since: the key of an upload is its name."""
 
-    def __init__(self, first: Opened) -> None:
+    def __init__(self, first: Model) -> None:
         self._folder = TemporaryDirectory(prefix="chipglow-app-")
         self.folder = Path(self._folder.name)
         self._opened = {"": first}
 
-    def find(self, key: str) -> Opened | None:
+    def find(self, key: str) -> Model | None:
         """Return an upload by its key, the first file without one; None if it is not open."""
         return self._opened.get(key)
 
@@ -130,26 +107,18 @@ class OpenFiles:
         self._folder.cleanup()
 
 
-def open_uploaded(path: Path, name: str) -> Opened:
+def open_uploaded(path: Path, name: str) -> Model:
     """Open an uploaded file by the name that its owner gave it."""
     try:
         opened = open_any(path)
     except (ValueError, OSError) as error:
         raise ValueError(str(error).replace(str(path), name)) from None
-    if isinstance(opened, OpenedScene):
+    if isinstance(opened, SceneModel):
         return replace(opened, name=name, file=name)
     return replace(opened, name=name)
 
 
-def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
-    """Return a spline scene with at most `count` samples a frame; others as they are."""
-    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / count))
-    if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
-        return scene
-    return scene.coarser(step, step if fewer_frames else 1)
-
-
-def _results(folder: Path) -> OpenedScene:
+def _results(folder: Path) -> SceneModel:
     file = folder / "study.yaml"
     if not file.is_file():
         raise FileNotFoundError(f"{folder}: holds no study.yaml, expected a folder of results")
@@ -160,17 +129,22 @@ def _results(folder: Path) -> OpenedScene:
             f"chipglow run {file} --out {folder} was done on this machine, or a scene's file"
         )
     scene = open_scene(study.scene or cut(study))
-    return OpenedScene.of(scene, study, folder.name, study.scene)
+    return scene_model(scene, study, folder.name, study.scene)
 
 
-def _with_places(study: Study, cursor: _Points, *lines: _Points) -> Study:
-    """Return a study with these points and lines, rounded to a tenth of a micrometre."""
-    (point,), *ends = (
-        tuple((round(float(x), 7), round(float(y), 7)) for x, y in points)
-        for points in (cursor, *lines)
+def _with_places(study: Study, raster: Raster, *places: _Points) -> Study:
+    """Return a study with a cursor and lines within the image, to a tenth of a micrometre."""
+    left, right, bottom, top = raster.extent
+    (cursor,), *lines = (
+        np.round(np.clip(list(points), (left, bottom), (right, top)), 7).tolist()
+        for points in places
     )
-    places = {"points": {CURSOR: point}, "lines": dict(zip(LINES.values(), ends, strict=True))}
-    return unchecked(study, analysis=unchecked(study.analysis, **places))
+    corners = (tuple(map(tuple, line)) for line in lines)
+    plan = {
+        "points": {CURSOR: tuple(cursor)},
+        "lines": dict(zip(LINES.values(), corners, strict=True)),
+    }
+    return unchecked(study, analysis=unchecked(study.analysis, **plan))
 
 
 def _developed(scene: Scene, duration: float, count: int) -> Segment | None:
@@ -200,5 +174,4 @@ def _through(raster: Raster, place: tuple[float, float] | None = None) -> list[_
     left, right, bottom, top = raster.extent
     x, y = place or ((left + right) / 2, (bottom + top) / 2)
     across, up = 0.4 * (right - left), 0.4 * (top - bottom)
-    along_x = [(max(x - across, left), y), (min(x + across, right), y)]
-    return [[(x, y)], along_x, [(x, max(y - up, bottom)), (x, min(y + up, top))]]
+    return [[(x, y)], [(x - across, y), (x + across, y)], [(x, y - up), (x, y + up)]]

@@ -8,10 +8,10 @@ const GRIP = 12; // pixels
 const PIECE = 2 ** 22; // bytes of a file in one message
 
 export function render({ view, model, el }) {
-  const spec = JSON.parse(model.spec), extent = spec.extent;
   const page = document.createElement("div");
   page.className = "app";
   page.innerHTML = model.html;
+  const spec = JSON.parse(page.querySelector("main").dataset.spec), extent = spec.extent;
   const find = (selector) => page.querySelector(selector);
   const each = (selector, kind, act) => {
     for (const one of page.querySelectorAll(selector)) one.addEventListener(kind, () => act(one));
@@ -222,7 +222,9 @@ export function render({ view, model, el }) {
   }
 
   // One picture of all figures as they are: images in a row, lines below.
-  function saveSheet(name) {
+  let quick = true;
+  each("#sheet", "click", () => {
+    if (quick) return showStatus({ text: "The exact picture is not finished: save it when it is.", kind: "error" });
     const lines = spec.figures.filter((one) => !spec.images.includes(one));
     const rows = [spec.images, lines].map((row) => row.map((one) => plotOf(one).export("png").canvas));
     const sum = (row) => row.reduce((width, one) => width + one.width, 0);
@@ -233,13 +235,14 @@ export function render({ view, model, el }) {
     context.fillStyle = getComputedStyle(page).backgroundColor;
     context.fillRect(0, 0, sheet.width, sheet.height);
     rows.forEach((row, i) => row.forEach((one, j) => context.drawImage(one, sum(row.slice(0, j)), i * tall[0])));
-    saveDownload({ name, url: sheet.toDataURL() });
-    showStatus({ text: `${name} is saved.`, kind: "" });
-  }
+    saveDownload({ name: "chipglow.png", url: sheet.toDataURL() });
+    showStatus({ text: "chipglow.png is saved.", kind: "" });
+  });
 
   // A picture counts as painted when the browser had time for it: then come the curves along its
   // lines, and the next picture.
-  function showPicture({ number, lines, absent }) {
+  function showPicture({ number, lines, absent, ...picture }) {
+    quick = picture.quick;
     find(".numbers").classList.add("old"); // until those of this picture come
     for (const option of controls.get("error_image")?.field.options ?? []) {
       const reason = absent[option.value];
@@ -340,7 +343,7 @@ export function render({ view, model, el }) {
     });
   }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture,
-    sheet: saveSheet, chip: (url) => { find(".chip img").src = url; }, more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
+    chip: (url) => { find(".chip img").src = url; }, more: () => sendMore(), open: (key) => { location.search = `?open=${key}`; } };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   find(".images").addEventListener("pointerdown", grip);
   const watcher = new ResizeObserver(refit);

@@ -1,9 +1,10 @@
 """Images, lines and numbers at a state of the controls; states share the stages they agree on."""
 
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
-from math import ceil, nan
-from typing import Any, Final, Generic, TypeAlias, TypeVar
+from math import ceil, nan, sqrt
+from typing import Any, ClassVar, Final, TypeAlias, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -11,19 +12,17 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
 from chipglow.analysis.distribution import PIXEL_PHASE
-from chipglow.analysis.images import PARTS
 from chipglow.analysis.looks import Schedule, View, look
-from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, State
-from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
-from chipglow.camera import Camera, Exposure
+from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, Controls, State
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.sweep import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.io import StoredScene
 from chipglow.quantities import Array
-from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
-from chipglow.surface import EmissivityField, Surface
+from chipglow.surface import Surface
 
 _Exposed: TypeAlias = tuple[ExposureImages, Exposure | None]
 _Result = TypeVar("_Result")
@@ -61,7 +60,7 @@ class Picture:
     data: xr.Dataset  # of a scene that of `error_images`, else ``measured`` and ``flagged``
     panels: dict[str, Panel]
     lines: dict[str, dict[str, Array]]  # ``along``, ``measured`` and ``reference`` by name
-    crossings: dict[str, float | None]  # where lines enter the tool in µm
+    crossings: dict[str, float]  # distances at which lines enter the tool in µm
     quick: bool = False
     camera: Camera | None = None
     exposure: Exposure | None = None
@@ -81,20 +80,6 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class Readout:
-    """Numbers at the cursor in K, and the parts of the error; NaN for those that are unknown."""
-
-    measured: float
-    uncertainty: float = nan
-    source: str = ""
-    flagged: bool = False
-    true: float = nan
-    emissivity: float = nan
-    reference: float = nan
-    parts: Mapping[str, float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Drawn:
     """Measured lines in °C, shape (draw, n), and error at the cursor over phases and textures."""
 
@@ -103,50 +88,35 @@ class Drawn:
     error: Distribution | None
 
 
-class _Cache(dict[Hashable, _Result], Generic[_Result]):
-    def __init__(self, size: int) -> None:
-        self._size = size
-
-    def result(self, key: Hashable, make: Callable[[], _Result]) -> _Result:
-        self[key] = result = self.pop(key) if key in self else make()
-        if len(self) > self._size:
-            del self[next(iter(self))]
-        return result
-
-
+@dataclass(eq=False)
 class SceneModel:
-    """Pictures of a scene for one session."""
+    """A scene, the controls of its study, and pictures; each session has a copy."""
 
-    def __init__(self, opened: OpenedScene) -> None:
-        self.opened, self.controls = opened, opened.controls
-        self._bands: _Cache[Band] = _Cache(4)
-        self._surfaces: _Cache[tuple[Scene, Surface]] = _Cache(4)
-        self._laid: _Cache[list[EmissivityField]] = _Cache(4)
-        self._exposures: _Cache[_Exposed] = _Cache(2)
-        self._quick_exposures: _Cache[_Exposed] = _Cache(24)
-        self._errors: _Cache[xr.Dataset] = _Cache(8)
-        self._parts: _Cache[xr.Dataset] = _Cache(2)
-        self._fields: _Cache[NDArray[np.float32]] = _Cache(6)
-        self._displayed = with_samples(opened.scene, DISPLAYED)
-        self._displayed_quick = with_samples(opened.scene, QUICK_SAMPLES)
+    name: str
+    scene: Scene
+    coarse: Scene | None  # with fewer samples, for a quick look before the exact picture
+    controls: Controls
+    file: str | None  # the scene as a saved study names it; None for the study's cut
+    _caches: dict[str, dict[Hashable, Any]] = field(
+        init=False, default_factory=lambda: defaultdict(dict)
+    )
 
     @property
     def has_quick_look(self) -> bool:
-        """Whether a picture of a coarser scene precedes the exact one."""
-        return self.opened.coarse is not None
+        return self.coarse is not None
 
     def is_ready(self, state: State) -> bool:
         """Whether the exact picture takes milliseconds."""
         key = self._exposure_key(state)
-        if key not in self._exposures:
+        if key not in self._caches["exposure"]:
             return False
-        camera, coarse = state.study.camera, self.opened.coarse
+        camera, coarse = state.study.camera, self.coarse
         on_samples = camera.psf_order != "detector" and (
             camera.psf is not None and camera.psf.kind == "annular-aperture"
         )
         # A quick look at pixels hardly larger than the coarse samples takes half as long.
         if on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing):
-            return (key, self._camera(state, self.opened.scene), False) in self._errors
+            return (key, self._camera(state, self.scene), False) in self._caches["errors"]
         return True
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
@@ -156,21 +126,20 @@ class SceneModel:
         camera, shown = self._camera(state, scene, quick), state.study.error_image
         images, untextured = self._exposed(scene, surface, camera, state, quick, check)
         key = self._exposure_key(state), camera, quick
-        data = self._errors.result(key, lambda: images.errors(camera))
+        data = self._kept(8, "errors", key, lambda: images.errors(camera))
 
         def parts() -> xr.Dataset:
-            return self._parts.result(
-                (*key, untextured is None), lambda: images.parts(camera, untextured)
-            )
+            of = *key, untextured is None
+            return self._kept(2, "parts", of, lambda: images.parts(camera, untextured))
 
         error = data["case_1"]
         if shown != "total":
             error = parts().get(shown, xr.zeros_like(error))
-        raster, exposure, tool = camera.pixels(scene.raster), images.exposure, scene.tool
+        raster, exposure = camera.pixels(scene.raster), images.exposure
         values = _unflagged(data, error)
         limit = round_limit(values, 99, 5.0)
         panels = {
-            "scene": self._scene_panel(state, exposure, quick),
+            "scene": self._scene_panel(state, exposure),
             "measured": _measured_panel(data, raster),
             "error": Panel(ERROR_IMAGES[shown], "K", values, raster, (-limit, limit), SIGNED),
         }
@@ -181,35 +150,31 @@ class SceneModel:
                 low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
                 limits = min(least, low), max(most, high)
             panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
-        lines, crossings = _lines(state, raster, data, tool)
         return Picture(
-            state, raster, data, panels, lines, crossings, quick, camera, exposure, parts,
-            dict(_absent(state, surface)),
+            state, raster, data, panels, _lines(state, raster, data),
+            _crossings(state, scene.tool), quick, camera, exposure, parts, _absent(state, surface),
         )  # fmt: skip
 
-    def readout(self, picture: Picture) -> Readout:
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the numbers at the cursor in K: those of the `error_parts`, and of the scene."""
         assert picture.camera and picture.exposure and picture.parts
         state, at, exposure = picture.state, picture.state.cursor, picture.exposure
-        data, raster, scene = picture.parts(), picture.raster, self.opened.scene
-        pixel = {name: float(nearest(image.values, raster, at)) for name, image in data.items()}
+        camera, raster, scene = picture.camera, picture.raster, self.scene
 
         def sample_of(name: str) -> float:
             return float(nearest(self._field(state, name, scene, exposure), scene.raster, at))
 
-        silent = () if picture.camera.detector else ("detector",)
-        names = {"case_1", *PARTS, "texture"}.difference(silent)
-        calibration = picture.camera.calibration(raster.shape)
-        noisy = calibration is not None and np.isfinite(pixel["measured"])
-        return Readout(
-            measured=pixel["measured"],
-            uncertainty=calibration.netd(pixel["measured"]) if calibration and noisy else nan,
-            source="noise of one frame" if noisy else "",
-            flagged=pixel["flagged"] == 1.0,
-            true=sample_of("temperature") + KELVIN,
-            emissivity=sample_of("emissivity"),
-            reference=pixel["reference"],
-            parts={name: pixel[name] for name in names if name in pixel},
-        )
+        numbers = _at(picture.parts(), raster, at)
+        if camera.detector is None:
+            del numbers["detector"]
+        if "emissivity" in picture.absent:
+            del numbers["emissivity"]
+        calibration = camera.calibration(raster.shape)
+        if calibration and np.isfinite(numbers["measured"]):
+            numbers["uncertainty"] = calibration.netd(numbers["measured"])
+        numbers["sample temperature"] = sample_of("temperature") + KELVIN
+        numbers["sample emissivity"] = sample_of("emissivity")
+        return numbers
 
     def drawn(
         self, state: State, phases: int, textures: int, progress: Callable[[float], None]
@@ -217,7 +182,7 @@ class SceneModel:
         """Return lines and error at the cursor over `phases`² pixel positions and textures."""
         # This is done in another thread than the pictures, whose caches it leaves alone.
         study = state.study
-        fitted = fit(study, self.opened.scene)
+        fitted = fit(study, self.scene)
         scene, (surface,) = fitted.scene, fitted.surfaces.values()
         camera = study.camera.on(scene.raster, study.seed)
         places = PointPlace(CURSOR, state.cursor), *map(state.line, LINES)
@@ -245,12 +210,20 @@ class SceneModel:
             state, lines, Distribution(error, ("texture", PIXEL_PHASE)) if is_known else None
         )
 
+    def _kept(self, size: int, stage: str, key: Hashable, make: Callable[[], _Result]) -> _Result:
+        """Return the result of a stage, of which the last ones are kept."""
+        cache: dict[Hashable, _Result] = self._caches[stage]
+        cache[key] = result = cache.pop(key) if key in cache else make()
+        if len(cache) > size:
+            del cache[next(iter(cache))]
+        return result
+
     def _exposure_key(self, state: State) -> Hashable:
         """With a rolling shutter the pixels determine when a sample's row is exposed."""
         return state.key(*(_ROLLING if state.study.camera.line_time is not None else _EXPOSURE))
 
     def _on(self, state: State, quick: bool) -> tuple[Scene, Surface]:
-        base = self.opened.coarse if quick else self.opened.scene
+        base = self.coarse if quick else self.scene
         assert base is not None
 
         def make() -> tuple[Scene, Surface]:
@@ -258,7 +231,7 @@ class SceneModel:
             (surface,) = fitted.surfaces.values()
             return fitted.scene, surface
 
-        return self._surfaces.result((state.key(*_SURFACE), quick), make)
+        return self._kept(4, "surface", (state.key(*_SURFACE), quick), make)
 
     def _camera(self, state: State, scene: Scene, quick: bool = False) -> Camera:
         """Return the study's camera; if quick, with no pixels finer than the scene's samples."""
@@ -269,7 +242,7 @@ class SceneModel:
             shape = (ceil(rows / larger), ceil(columns / larger)) if camera.shape else None
             camera = replace(camera, pitch=scene.raster.spacing, shape=shape)
         limits = camera.band.lower, camera.band.upper
-        return replace(camera, band=self._bands.result(limits, lambda: camera.band))
+        return replace(camera, band=self._kept(4, "band", limits, lambda: camera.band))
 
     def _exposed(
         self,
@@ -286,7 +259,9 @@ class SceneModel:
 
         def make() -> _Exposed:
             spectral = camera.band.lower, camera.band.upper, camera.reflected
-            laid = self._laid.result(
+            laid = self._kept(
+                4,
+                "laid",
                 (state.key(*_SURFACE), quick, both, () if surface.is_grey else spectral),
                 lambda: [camera.lay(one, scene) for one in (surface, plain)[: 1 + both]],
             )
@@ -297,27 +272,24 @@ class SceneModel:
 
         key = self._exposure_key(state)
         if quick:
-            return self._quick_exposures.result((key, both), make)
-        return self._exposures.result(key, make)
+            return self._kept(24, "quick exposure", (key, both), make)
+        return self._kept(2, "exposure", key, make)
 
-    def _scene_panel(self, state: State, exposure: Exposure, quick: bool) -> Panel:
-        name, (label, unit) = state.study.scene_image, SCENE_IMAGES[state.study.scene_image]
-        few = quick and self._field_key(state, name, self._displayed, exposure) not in self._fields
-        scene = self._displayed_quick if few else self._displayed
+    def _scene_panel(self, state: State, exposure: Exposure) -> Panel:
+        name = state.study.scene_image
+        scene = self._kept(1, "displayed", "", lambda: with_samples(self.scene, DISPLAYED))
+        label, unit = SCENE_IMAGES[name]
         values = self._field(state, name, scene, exposure)
         colours = HEAT if unit == "°C" else PLAIN
         return Panel(f"Scene: {label.lower()}", unit, values, scene.raster, ends(values), colours)
-
-    def _field_key(self, state: State, name: str, scene: Scene, exposure: Exposure) -> Hashable:
-        of_surface = name in ("radiance_temperature", "emissivity")
-        surface = (self._exposure_key(state), exposure.raster.shape) if of_surface else ()
-        return name, scene.raster.shape, self._middle_frame(state), surface
 
     def _field(
         self, state: State, name: str, scene: Scene, exposure: Exposure
     ) -> NDArray[np.float32]:
         """Return a field in the middle of the exposure in its image's unit; NaN off material."""
-        index = self._middle_frame(state)
+        study, of_surface = state.study, name in ("radiance_temperature", "emissivity")
+        index = self.scene.frame_at(study.start + study.camera.integration_time / 2)
+        surface = (self._exposure_key(state), exposure.raster.shape) if of_surface else ()
 
         def make() -> NDArray[np.float32]:
             values = self._values(state, name, scene, exposure, index).astype(np.float32)
@@ -325,7 +297,7 @@ class SceneModel:
             zero = np.float32(KELVIN if SCENE_IMAGES[name][1] == "°C" else 0.0)
             return np.where(void, np.float32(nan), values - zero)
 
-        return self._fields.result(self._field_key(state, name, scene, exposure), make)
+        return self._kept(6, "field", (name, scene.raster.shape, index, surface), make)
 
     def _values(
         self, state: State, name: str, scene: Scene, exposure: Exposure, index: int
@@ -341,49 +313,59 @@ class SceneModel:
             return np.asarray(self._camera(state, scene).band.temperature(radiance))
         return scene.field(name, index)
 
-    def _middle_frame(self, state: State) -> int:
-        """Return the index of the frame in the middle of the exposure."""
-        study = state.study
-        return self.opened.scene.frame_at(study.start + study.camera.integration_time / 2)
 
-
+@dataclass(eq=False)
 class MeasurementModel:
-    """Pictures of a measurement: its frames."""
+    """A measurement, its controls, and its frames as pictures."""
 
-    has_quick_look = False
-
-    def __init__(self, opened: OpenedMeasurement) -> None:
-        self.opened, self.controls = opened, opened.controls
+    name: str
+    measurement: Measurement
+    controls: Controls
+    has_quick_look: ClassVar = False
 
     def is_ready(self, state: State) -> bool:
         return True
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
-        measurement = self.opened.measurement
+        measurement = self.measurement
         index, raster = self._index(state), measurement.raster
         images = {
             "measured": measurement.data["radiance_temperature"][index].values.astype(np.float64),
             "flagged": ~measurement.usable[index],
         }
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
-        panels = {"measured": _measured_panel(data, raster)}
-        return Picture(state, raster, data, panels, *_lines(state, raster, data, measurement.tool))
+        panels, lines = {"measured": _measured_panel(data, raster)}, _lines(state, raster, data)
+        crossings = _crossings(state, measurement.tool)
+        return Picture(state, raster, data, panels, lines, crossings)
 
-    def readout(self, picture: Picture) -> Readout:
-        """Return the measured temperature at the cursor with its calibration's uncertainty."""
-        at, raster, measurement = picture.state.cursor, picture.raster, self.opened.measurement
-        image, index = picture.data["measured"].values, self._index(picture.state)
-        measured = float(nearest(image, raster, at))
-        flagged = bool(nearest(picture.data["flagged"].values, raster, at) == 1.0)
-        if measurement.calibration_errors is None:
-            return Readout(measured, flagged=flagged)
-        estimate = measurement.estimate(image[None], measurement.calibration_effects(index)[None])
-        uncertainty = float(nearest(estimate.standard_uncertainty[0], raster, at))
-        return Readout(measured, uncertainty, "calibration", flagged)
+    def numbers(self, picture: Picture) -> dict[str, float]:
+        """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""
+        measurement, index = self.measurement, self._index(picture.state)
+        data = picture.data
+        if measurement.calibration_errors is not None:
+            effects = measurement.calibration_effects(index)[None]
+            estimate = measurement.estimate(data["measured"].values[None], effects)
+            data = data.assign(uncertainty=(("y", "x"), estimate.standard_uncertainty[0]))
+        return _at(data, picture.raster, picture.state.cursor)
 
     def _index(self, state: State) -> int:
-        return int(np.abs(self.opened.measurement.times - state.study.start).argmin())
+        return int(np.abs(self.measurement.times - state.study.start).argmin())
+
+
+Model: TypeAlias = SceneModel | MeasurementModel
+
+
+def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
+    """Return a spline scene with at most `count` samples a frame; others as they are."""
+    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / count))
+    if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
+        return scene
+    return scene.coarser(step, step if fewer_frames else 1)
+
+
+def _at(data: xr.Dataset, raster: Raster, at: tuple[float, float]) -> dict[str, float]:
+    return {str(name): float(nearest(one.values, raster, at)) for name, one in data.items()}
 
 
 def _absent(state: State, surface: Surface) -> Mapping[str, str]:
@@ -397,34 +379,27 @@ def _absent(state: State, surface: Surface) -> Mapping[str, str]:
     return {name: reason for name, reason in reasons.items() if reason}
 
 
-def _lines(
-    state: State, raster: Raster, data: xr.Dataset, tool: Tool | None
-) -> tuple[dict[str, dict[str, Array]], dict[str, float | None]]:
-    """Return temperatures along the lines, and the distances at which these enter the tool."""
-    lines: dict[str, dict[str, Array]] = {}
-    crossings: dict[str, float | None] = dict.fromkeys(LINES)
+def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str, Array]]:
+    lines = {}
     for name in LINES:
         line = state.line(name).line(raster.spacing)
-        along = 1e6 * line.distance
-        lines[name] = {"along": along} | {
+        lines[name] = {"along": 1e6 * line.distance} | {
             key: sample(data[key].values, raster, line.points) - KELVIN
             for key in ("measured", "reference")
             if key in data
         }
-        crossings[name] = (
-            None if tool is None else _zero(along, tool.signed_distance(*line.points.T))
-        )
-    return lines, crossings
+    return lines
 
 
-def _zero(along: Array, values: Array) -> float | None:
-    """Return where values along a line first change their sign; None if they do not."""
-    changes = np.flatnonzero(np.diff(values > 0))
-    if not changes.size:
-        return None
-    pair = slice(changes[0], changes[0] + 2)
-    order = np.argsort(values[pair])
-    return float(np.interp(0.0, values[pair][order], along[pair][order]))
+def _crossings(state: State, tool: Tool | None) -> dict[str, float]:
+    """Return the distances in µm at which lines enter the tool."""
+    found = {}
+    for name in LINES if tool is not None else ():
+        line = state.line(name).line(1e-6)
+        depth = tool.signed_distance(*line.points.T)  # type: ignore[union-attr]
+        if depth.min() < 0 < depth.max():
+            found[name] = float(1e6 * line.distance[np.abs(depth).argmin()])
+    return found
 
 
 def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:

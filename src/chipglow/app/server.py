@@ -10,7 +10,8 @@ import panel as pn
 from bokeh.server.auth_provider import AuthProvider
 from tornado.web import RequestHandler
 
-from chipglow.app.opening import Opened, OpenFiles
+from chipglow.app.opening import OpenFiles
+from chipglow.app.pictures import Model
 from chipglow.app.view import View
 
 LOCAL: Final = "127.0.0.1"
@@ -49,7 +50,7 @@ class TokenAuth(AuthProvider):  # type: ignore[misc]
 class App:
     """The running app; port 0 means any that is free."""
 
-    def __init__(self, first: Opened, address: str = LOCAL, port: int = 0) -> None:
+    def __init__(self, first: Model, address: str = LOCAL, port: int = 0) -> None:
         port = _free_port(address, port)
         self.files = OpenFiles(first)
         auth = TokenAuth()

@@ -2,19 +2,19 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from threading import Event, Lock, Thread
 from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import State, Texts
-from chipglow.app.opening import Opened, OpenedScene
-from chipglow.app.pictures import MeasurementModel, Picture, SceneModel
+from chipglow.app.pictures import Model, Picture, SceneModel
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
 
 PHASES: Final = 3
 TEXTURES: Final = 5
-"""Draws of "Draw phases and textures": as many as in the paper's study."""
+"""Draws of "Draw phases and textures": nine positions of the pixels and five textures."""
 
 _PAINT_TIMEOUT: Final = 0.5
 """Seconds to wait for the page to paint a picture before the next one is sent."""
@@ -37,14 +37,12 @@ class Newest(Generic[_Job]):
         self._turn = Lock()
         self._superseded = Event()
         self._running = Event()
-        self._thread: Thread | None = None
 
     def ask(self, job: _Job) -> None:
         """Do this job next; waiting and running ones end."""
         self.cancel()
         self._superseded = Event()
-        self._thread = Thread(target=self._run, args=(job, self._superseded), daemon=True)
-        self._thread.start()
+        Thread(target=self._run, args=(job, self._superseded), daemon=True).start()
 
     def cancel(self) -> None:
         """End the running job and forget the waiting ones."""
@@ -74,12 +72,6 @@ class Newest(Generic[_Job]):
                 _log.exception("chipglow app")
                 self._notify("failed", f"defect: {type(error).__name__}: {error}")
 
-    def settle(self, seconds: float) -> bool:
-        """Wait until no job is left; return whether that happened within the time."""
-        if self._thread is not None:
-            self._thread.join(seconds)
-        return self._thread is None or not self._thread.is_alive()
-
 
 Notify: TypeAlias = Callable[..., None]
 """Takes the kind of a result and the result; called from the threads of a session."""
@@ -88,10 +80,8 @@ Notify: TypeAlias = Callable[..., None]
 class Session:
     """The state of one user, by default that of the study."""
 
-    def __init__(self, opened: Opened, notify: Notify) -> None:
-        self.model: SceneModel | MeasurementModel = (
-            SceneModel(opened) if isinstance(opened, OpenedScene) else MeasurementModel(opened)
-        )
+    def __init__(self, opened: Model, notify: Notify) -> None:
+        self.model = replace(opened)
         self.state = opened.controls.initial
         self._settled, self._at = [self.state], 0
         self._notify = notify
@@ -154,10 +144,6 @@ class Session:
         self._pictures.cancel()
         self._draws.cancel()
 
-    def settle(self, seconds: float = 60.0) -> bool:
-        """Wait until everything is computed; return whether that happened within the time."""
-        return self._pictures.settle(seconds) and self._draws.settle(seconds)
-
     def _picture(self, state: State) -> None:
         """Always send one picture, so that a moving control is followed; then the exact one."""
         work, model = self._pictures, self.model
@@ -172,7 +158,7 @@ class Session:
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
             work.pause(PAUSE if model.has_quick_look else 0.0)
-        self._notify("readout", picture, model.readout(picture))
+        self._notify("numbers", picture, model.numbers(picture))
 
     def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""

@@ -1,13 +1,12 @@
 """The page: a session and its figures as a Panel component, see page.js."""
 
-import json
 import logging
 import re
 from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
 from collections.abc import Callable
 from contextlib import suppress
-from itertools import groupby
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from threading import RLock
@@ -22,10 +21,11 @@ from jinja2 import Environment, PackageLoader
 from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
+from chipglow.analysis.images import PARTS
 from chipglow.app.controls import ERROR_IMAGES, Texts
 from chipglow.app.figures import TEXT, TITLES, Figures
-from chipglow.app.opening import MOST_UPLOADED, Opened, OpenedScene, OpenFiles
-from chipglow.app.pictures import Drawn, Picture, Readout, SceneModel
+from chipglow.app.opening import MOST_UPLOADED, OpenFiles
+from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
@@ -38,7 +38,6 @@ class Page(JSComponent):  # type: ignore[misc]
     """The page around the figures; it exchanges messages with `View`."""
 
     html = param.String()
-    spec = param.String()
     figures = Children()
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
@@ -62,7 +61,7 @@ class View:
 
     def __init__(
         self,
-        opened: Opened,
+        opened: Model,
         texts: Texts | None = None,
         link: Texts | None = None,
         files: OpenFiles | None = None,
@@ -72,20 +71,26 @@ class View:
         self._upload: Path | None = None
         self._uploads = Newest(self._open, self._notified)
         self.session = Session(opened, self._notified)
-        self._refused = self._restore(texts or {})
-        is_scene = isinstance(opened, OpenedScene)
-        shown = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
+        self._refused = ""
+        try:
+            self.session.restore(texts or {})
+        except ValueError as error:
+            self._refused = f"Link: {error}"
+        is_scene = isinstance(opened, SceneModel)
+        shown = opened.scene if isinstance(opened, SceneModel) else opened.measurement
         self.figures = Figures(
             shown.raster, shown.tool, tuple(TITLES) if is_scene else ("measured",)
         )
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
+        self._on_painted, self._on_theme = self.session.painted, self.figures.set_theme
+        self._show_opened = partial(self._send, "open")
+        self._show_failed = partial(self._say, kind="error")
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
         self.page = Page(
             html=_html(opened, self.figures, files is not None, embedded),
-            spec=_spec(opened, self.figures, embedded),
             figures=[
                 pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
                 for one in self.figures.all.values()
@@ -106,19 +111,6 @@ class View:
         self.session.end()
         if self._upload is not None:
             self._upload.unlink(missing_ok=True)
-
-    def _restore(self, texts: Texts) -> str:
-        """Set the controls of a link that are possible; return what is wrong with the others."""
-        refused = ""
-        for some in (texts, *({path: text} for path, text in texts.items())):
-            try:
-                self.session.restore(some)
-                if some is texts:
-                    return ""
-            except ValueError as error:
-                if some is not texts:
-                    refused = refused or f"Link: {error}"
-        return refused
 
     # Messages of the page
 
@@ -165,12 +157,6 @@ class View:
         self._began = perf_counter()
         self._put_values()
 
-    def _on_painted(self, number: int) -> None:
-        self.session.painted(number)
-
-    def _on_theme(self, theme: str) -> None:
-        self.figures.set_theme(theme)
-
     def _on_draw(self, _: None) -> None:
         self._show_progress(0.0)
         self.session.draw()
@@ -183,7 +169,7 @@ class View:
         from chipglow.app.files import chip_picture  # Matplotlib takes long to import
 
         assert isinstance(self.session.model, SceneModel)
-        self._send("chip", chip_picture(self.session.model.opened.scene, TEXT[theme]))
+        self._send("chip", chip_picture(self.session.model.scene, TEXT[theme]))
 
     def _on_save(self, name: str) -> None:
         from chipglow.app.files import measurement_file, study_file
@@ -194,9 +180,6 @@ class View:
             data = study_file(model, self.session.state)
         elif picture is None or picture.quick or picture.state != self.session.state:
             self._say("The exact picture is not finished: save it when it is.", "error")
-            return
-        elif name == "chipglow.png":
-            self._send("sheet", name)
             return
         else:
             data = measurement_file(picture, model)
@@ -232,9 +215,6 @@ class View:
 
     # Messages to the page
 
-    def _show_opened(self, key: str) -> None:
-        self._send("open", key)
-
     def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture = picture
         self.figures.show(picture)
@@ -244,7 +224,8 @@ class View:
             f"{name}_values": {key: curve.tolist() for key, curve in curves.items()}
             for name, curves in picture.lines.items()
         }
-        self._send("picture", {"number": number, "lines": lines, "absent": picture.absent})
+        content = {"number": number, "lines": lines, "absent": picture.absent}
+        self._send("picture", content | {"quick": picture.quick})
 
     def _described(self, picture: Picture) -> tuple[str, str]:
         """Return the status of the page with a picture, and its kind."""
@@ -269,20 +250,18 @@ class View:
         took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
         return f"Exact picture{took if self._began else ''}.", ""
 
-    def _show_readout(self, picture: Picture, readout: Readout) -> None:
+    def _show_numbers(self, picture: Picture, numbers: dict[str, float]) -> None:
         x, y = picture.state.cursor
-        is_true = picture.state.study.analysis.reference == "true"
-        hidden = {"case_1"} if is_true else {"case_1", "emissivity"}
-        parts = {key: one for key, one in (readout.parts or {}).items() if key not in hidden}
+        parts = {name: numbers[name] for name in (*PARTS, "texture") if name in numbers}
         largest = np.nanmax([1e-9, *np.abs(list(parts.values()))])
-        self._send(
-            "numbers",
-            _TEMPLATES.get_template("numbers.html").render(
-                readout=readout,
-                position=f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−"),
-                percent={name: 50 * np.nan_to_num(part) / largest for name, part in parts.items()},
-            ),
+        template = _TEMPLATES.get_template("numbers.html")
+        html = template.render(
+            numbers=numbers,
+            is_scene=bool(parts),
+            position=f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−"),
+            percent={name: 50 * np.nan_to_num(part) / largest for name, part in parts.items()},
         )
+        self._send("numbers", html)
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.state != self.session.state or self._picture is None:
@@ -300,9 +279,6 @@ class View:
 
     def _show_progress(self, done: float) -> None:
         self._say("Drawing phases and textures.", "busy", progress=done)
-
-    def _show_failed(self, text: str) -> None:
-        self._say(text, "error")
 
     def _send(self, kind: str, content: Any) -> None:
         self.page._send_msg({"kind": kind, "content": content})
@@ -347,36 +323,28 @@ def readable(text: str) -> str:
     return text
 
 
-def _html(opened: Opened, figures: Figures, may_upload: bool, embedded: bool) -> str:
+def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> str:
     """Return the page without figures and numbers."""
-    rows = (row for row in opened.controls.rows.values() if row.group)
-    scene = opened.scene if isinstance(opened, OpenedScene) else None
+    rows = [row for row in opened.controls.rows.values() if row.group]
+    left, right, bottom, top = figures.extent
+    spec = {
+        "embedded": embedded,
+        "most_uploaded": MOST_UPLOADED,
+        "stops": {row.path: row.stops for row in rows},
+        "images": list(figures.images),
+        "figures": list(figures.all),
+        "extent": figures.extent,
+        "shape": (top - bottom) / (right - left),
+    }
     return _TEMPLATES.get_template("page.html").render(
+        spec=spec,
         name=opened.name,
-        is_scene=scene is not None,
-        has_chip=scene is not None and scene.overview is not None,
-        embedded=embedded,
+        scene=opened.scene if isinstance(opened, SceneModel) else None,
         may_upload=may_upload,
-        groups=[(name, list(of)) for name, of in groupby(rows, lambda row: row.group)],
+        groups={row.group: [one for one in rows if one.group == row.group] for row in rows},
         images={name: one.figure.title.text for name, one in figures.images.items()},
         lines={name: one.figure.title.text for name, one in figures.lines.items()},
         draws=f"{PHASES}² positions of the pixels, {TEXTURES} textures",
-    )
-
-
-def _spec(opened: Opened, figures: Figures, embedded: bool) -> str:
-    """Return what page.js needs beside the page."""
-    left, right, bottom, top = figures.extent
-    return json.dumps(
-        {
-            "embedded": embedded,
-            "most_uploaded": MOST_UPLOADED,
-            "stops": {row.path: row.stops for row in opened.controls.rows.values()},
-            "images": list(figures.images),
-            "figures": list(figures.all),
-            "extent": figures.extent,
-            "shape": (top - bottom) / (right - left),
-        }
     )
 
 

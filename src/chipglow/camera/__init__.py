@@ -3,13 +3,11 @@
 from chipglow.camera.calibration.calibration import (
     MODELS as MODELS,
     Calibration as Calibration,
+    CalibrationErrors as CalibrationErrors,
     FactoryCalibration as FactoryCalibration,
     FittedCalibration as FittedCalibration,
     LinearCalibration as LinearCalibration,
     SakumaHattori as SakumaHattori,
-)
-from chipglow.camera.calibration.errors import (
-    CalibrationErrors as CalibrationErrors,
 )
 from chipglow.camera.calibration.fit import (
     Blackbody as Blackbody,
@@ -21,12 +19,6 @@ from chipglow.camera.camera import (
     Camera as Camera,
     ChipglowWarning as ChipglowWarning,
 )
-from chipglow.camera.detector.bad_pixels import (
-    LEAST_FRAMES as LEAST_FRAMES,
-    BadPixels as BadPixels,
-    find_bad_pixels as find_bad_pixels,
-    replace_bad_pixels as replace_bad_pixels,
-)
 from chipglow.camera.detector.detector import (
     Detector as Detector,
 )
@@ -35,8 +27,12 @@ from chipglow.camera.detector.flat_field import (
     flat_field_calibration as flat_field_calibration,
     lower_range_limit as lower_range_limit,
 )
-from chipglow.camera.detector.nonuniformity import (
+from chipglow.camera.detector.pixels import (
+    LEAST_FRAMES as LEAST_FRAMES,
+    BadPixels as BadPixels,
     NonUniformity as NonUniformity,
+    find_bad_pixels as find_bad_pixels,
+    replace_bad_pixels as replace_bad_pixels,
 )
 from chipglow.camera.detector.response import (
     RESPONSES as RESPONSES,

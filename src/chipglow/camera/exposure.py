@@ -14,7 +14,6 @@ from chipglow.quantities import Array
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Raster, Scene, is_gap
-from chipglow.scene.splines import SplineFrame
 from chipglow.surface import EmissivityField, EmissivityStack
 
 _ROUNDING: Final = 1e-6
@@ -43,14 +42,6 @@ class Exposure:
     """Attributes of its measurements about the surface: `Surface.effects`."""
     warnings: tuple[str, ...] = ()
     """Why the surface may have another emissivity: `Origin.doubts`."""
-
-    def __post_init__(self) -> None:
-        for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
-            shape = getattr(self, name).shape
-            if shape != self.raster.shape:
-                raise ValueError(
-                    f"exposure: {name} has shape {shape}, expected {self.raster.shape}"
-                )
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,21 +193,17 @@ def _sweep(
 ) -> None:
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
     features = stack.features if stack.is_bare else None
-    if features is not None and (splines := _splines(scene, indices)):
-        sums.add_splines(splines, features, weights, middles)
-        return
+    if features is not None:
+        splines = [one for i in indices if (one := scene.splines(i)) is not None]
+        if splines:
+            sums.add_splines(splines, features, weights, middles)
+            return
     for begin, frames in _batches(scene, indices, stack.needed):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
         if features is None:
             sums.add_given(frames, stack, part, middles - begin)
         else:
             sums.add_features(frames, features, part, middles - begin)
-
-
-def _splines(scene: Scene, indices: range) -> list[SplineFrame]:
-    """Return the splines of these frames; none for a scene of samples."""
-    found = (scene.splines(index) for index in indices)
-    return [splines for splines in found if splines is not None]
 
 
 def _batches(

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from enum import IntFlag
 from functools import cached_property
+from html import escape
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
+from chipglow.camera.calibration.calibration import CALIBRATION, CalibrationErrors
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
@@ -130,6 +131,9 @@ class Measurement:
         count = len(self.notes.warnings)
         said = f"; {count} warning{'s' if count > 1 else ''}: see .notes" if count else ""
         return f"<Measurement: {frames}; {tool}{said}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>{self.data._repr_html_()}"
 
     @property
     def notes(self) -> Notes:

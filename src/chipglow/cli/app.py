@@ -32,6 +32,31 @@ app = typer.Typer(
 cache_app = typer.Typer(help="List or delete cached scenes.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 
+EXAMPLES = {
+    "reproduce": "--quick --out results",
+    "init": "study.yaml",
+    "run": "study.yaml --out results",
+    "error": "scene.nc --emissivity 0.7 --out results",
+    "cut": "study.yaml --out scene.nc",
+    "import": "'chip_*.vtu' --set units.length=mm --set interval=1us --out scene.nc",
+    "measure": "scene.nc --study study.yaml --chip 'chip 2' --out measured.nc",
+    "wavelengths": "study.yaml --plot bands.png",
+    "show": "measured.nc --plot measured.png",
+    "app": "scene.nc",
+    "materials": "aisi-1045",
+    "doctor": "",
+    "calibrate": "points.csv --band 3.8-5.1um --integration-time 10us --out calibration.yaml",
+    "convert": "chip.hcc --set 'pitch=6 um' --set calibration=calibration.yaml --out chip.nc",
+    "emissivity": "chip.nc --regions regions.yaml --reference 391degC --out emissivity.nc",
+    "temperature": "chip.nc --regions regions.yaml --emissivity emissivity.nc",
+    "psf": "edge.nc --out psf.nc --plot psf.png",
+    "register": "infrared.nc visible.png --points points.csv --out map.yaml",
+    "rake": "chip.nc --tool found --out rake.csv",
+    "shearband": "chip.nc --plot band.png",
+    "compare": "measured.nc chip-1.nc chip-2.nc --out comparison",
+}
+"""Arguments of an example of each command, the last line of its help."""
+
 
 def main() -> None:
     """Run the command ``chipglow``."""
@@ -196,6 +221,11 @@ for command in (
     calibrate, convert, emissivity, temperature, psf, register, rake, shearband, compare,
 ):  # fmt: skip
     app.command(rich_help_panel="The laboratory")(command)
+
+
+for registered in app.registered_commands:
+    title = registered.name or registered.callback.__name__  # type: ignore[union-attr]
+    registered.epilog = f"Example: chipglow {title} {EXAMPLES[title]}"
 
 
 @cache_app.command("list")

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from struct import pack
 from typing import Any, Final
 
 import numpy as np
@@ -14,10 +13,9 @@ from numpy.typing import NDArray
 from chipglow.io.atomic import atomic_path
 
 PALETTE_SIZE: Final = 255
-"""Most colours of a GIF; one more stands for what did not change."""
+"""Most colours of a GIF: one more stands for what did not change."""
 
 _RATE: Final = 20
-_SAME: Final = 255
 
 
 def check_movie_path(path: str | os.PathLike[str]) -> None:
@@ -84,42 +82,25 @@ class _Mp4:
 
 
 class _Gif:
-    """Pillow's own writer of animations keeps all pictures; this one writes each at once.
-
-    What stays from picture to picture is transparent.
-    """
-
     def __init__(self, part: Path, shape: tuple[int, int], palette: NDArray[np.uint8]) -> None:
         from PIL import Image
 
-        self._last = len(palette) - 1
-        colours = np.vstack([palette, np.repeat(palette[-1:], _SAME - self._last, axis=0)])
+        self._part = part
+        self._pictures: list[Image.Image] = []
         self._palette = Image.new("P", (1, 1))
-        self._palette.putpalette(colours.tobytes())
-        self._before = np.full(shape, _SAME, np.uint8)
-        self._file = part.open("wb")
-        rows, columns = shape
-        self._file.write(b"GIF89a" + pack("<HHBBB", columns, rows, 0xF7, 0, 0) + colours.tobytes())
-        self._file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # again and again
+        self._palette.putpalette(palette.tobytes())
 
     def append(self, picture: NDArray[np.uint8]) -> None:
-        from PIL import GifImagePlugin, Image
+        from PIL import Image
 
-        quantised = Image.fromarray(picture).quantize(
-            palette=self._palette, dither=Image.Dither.NONE
-        )
-        now = np.minimum(
-            np.asarray(quantised), self._last
-        )  # what follows in the palette are copies
-        part = Image.fromarray(np.where(now != self._before, now, _SAME).astype(np.uint8))
-        how: dict[str, Any] = {"duration": 1000 // _RATE, "transparency": _SAME, "disposal": 1}
-        for block in GifImagePlugin.getdata(part, (0, 0), **how):
-            self._file.write(block)
-        self._before = now
+        plain, dither = Image.fromarray(picture), Image.Dither.NONE
+        self._pictures.append(plain.quantize(palette=self._palette, dither=dither))
 
     def finish(self) -> None:
-        self._file.write(b";")
-        self._file.flush()
+        first, *others = self._pictures
+        first.save(
+            self._part, "GIF", save_all=True, append_images=others, duration=1000 // _RATE, loop=0
+        )
 
     def close(self) -> None:
-        self._file.close()
+        self._pictures.clear()

@@ -367,6 +367,13 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
         names the file.
     """
     path = Path(path)
+    results = path / "results.nc" if path.is_dir() else path
+    if holds(results, ("reading", "measured")):
+        raise SceneError(
+            f"{path}: results of an analysis, expected a scene: see report.html beside "
+            "results.nc, open the folder by chipglow app, or write the scene by chipglow cut "
+            "study.yaml --out scene.nc"
+        )
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected a scene")
     try:
@@ -386,7 +393,7 @@ def example_scene() -> StoredScene:
     Returns
     -------
     StoredScene
-        44 frames, 1 µs apart, of 360 × 440 samples of 1.5 µm: the cut of Heigel and Whitenton
+        44 frames, 1 µs apart, of 520 × 460 samples of 1.5 µm: the cut of Heigel and Whitenton
         (2010) on cells of 20 µm, which is coarse for a shear band. Its numbers are for a first
         look; those to rely on are the full study's.
     """

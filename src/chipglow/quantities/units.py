@@ -139,7 +139,8 @@ class Quantity:
                 raise ValueError(f"{value} has no unit, {self.expected}")
             lower, upper = (self._to_base(str(value), match[i], match[3]) for i in (1, 2))
         if not lower < upper:
-            raise ValueError(f"{value} is reversed, {self.expected}, the lower limit first")
+            text = value if isinstance(value, str) else self.range_text((lower, upper))
+            raise ValueError(f"{text} is reversed, {self.expected}, the lower limit first")
         return lower, upper
 
     def text(self, value: float) -> str:

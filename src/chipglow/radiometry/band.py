@@ -1,4 +1,4 @@
-"""A camera's spectral band: in-band radiance (Equation 1) and its inverse, radiance temperature."""
+"""Planck's law, spectral bands, in-band radiance (Equation 1) and its inverse."""
 
 # Kernels have no types: Numba finds them.
 # mypy: allow-untyped-defs
@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import Array
 from chipglow.quantities.units import COLDEST, HOTTEST
-from chipglow.radiometry.planck import (
-    FIRST_RADIATION_CONSTANT,
-    SECOND_RADIATION_CONSTANT,
-    spectral_radiance,
-)
+
+FIRST_RADIATION_CONSTANT: Final = 1.191042972397188e-16
+"""c1L = 2hc² in W m²/sr (CODATA 2018); the paper's 1.191e-4 W µm² is this, rounded."""
+
+SECOND_RADIATION_CONSTANT: Final = 1.438776877503933e-2
+"""c2 = hc/k in m K (CODATA 2018); the paper's 14387.752 µm K."""
 
 Response: TypeAlias = Callable[[Array], Array]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
@@ -36,6 +37,48 @@ _POWERS: Final = 128
 
 _BLOCK: Final = 1024
 _KERNEL: Final[Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
+def spectral_radiance(wavelength: Array, temperature: Array) -> Array:
+    """Return the spectral radiance of a blackbody in W/(m² sr m): the integrand of Equation 1.
+
+    Wavelengths in m and temperatures in K are positive and are broadcast against each other.
+    """
+    exponent = SECOND_RADIATION_CONSTANT / (wavelength * temperature)
+    # exp(-x) / (1 - exp(-x)) is 1 / (exp(x) - 1) without overflow at large x.
+    occupation = np.exp(-exponent) / -np.expm1(-exponent)
+    return np.asarray(FIRST_RADIATION_CONSTANT / wavelength**5 * occupation, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class TabulatedResponse:
+    """Relative spectral response by straight lines between the points of a table; 0 outside it."""
+
+    wavelengths: tuple[float, ...]
+    """In m, ascending."""
+    values: tuple[float, ...]
+    """Relative response, 0 or more."""
+
+    def __post_init__(self) -> None:
+        wavelengths, values = np.asarray(self.wavelengths), np.asarray(self.values)
+        if len(wavelengths) < 2 or len(wavelengths) != len(values):
+            raise ValueError(
+                f"response: {len(wavelengths)} wavelengths and {len(values)} values, expected as "
+                "many, 2 or more"
+            )
+        if not (np.diff(wavelengths) > 0).all() or not wavelengths[0] > 0:
+            raise ValueError("response: wavelengths must be over 0 m and ascend")
+        if not (np.isfinite(values).all() and (values >= 0).all()):
+            raise ValueError("response: values must be finite, 0 or more")
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """First and last wavelength in m."""
+        return self.wavelengths[0], self.wavelengths[-1]
+
+    def __call__(self, wavelengths: Array) -> Array:
+        """Return the response at these wavelengths in m."""
+        return np.interp(wavelengths, self.wavelengths, self.values, left=0.0, right=0.0)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,6 @@ from .scene import (
 from .tool import (
     Chamfer as Chamfer,
     Hone as Hone,
-    PlacedTool as PlacedTool,
     Tool as Tool,
     ToolGeometry as ToolGeometry,
 )

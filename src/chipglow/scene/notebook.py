@@ -1,6 +1,6 @@
 """What a notebook shows of frames on a grid: a line of text, and a picture."""
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,6 @@ from chipglow.scene.tool import Tool
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_FACE: Final = 3e-3
-_NOTHING: Final = "#e5e7eb"
 
 
 def frames_text(
@@ -40,25 +37,15 @@ def plot_image(
     time: float,
     axes: "Axes | None",
 ) -> "Axes":
-    """Draw temperatures in °C on micrometre axes, with the tool's outline and a colour bar."""
-    import matplotlib
+    """Draw temperatures in °C with the tool's outline and a colour bar."""
+    from chipglow.drawing import drawing
 
     if axes is None:
         from matplotlib import pyplot as plt
 
         axes = plt.subplots(layout="compressed")[1]
-    left, right, bottom, top = (1e6 * edge for edge in raster.extent)
-    picture = axes.imshow(
-        np.ma.masked_invalid(celsius),
-        extent=(left, right, bottom, top),
-        cmap=matplotlib.colormaps["inferno"].with_extremes(bad=_NOTHING),
-        interpolation="nearest",
-    )
-    if tool is not None:
-        outline = 1e6 * tool.outline(_FACE)
-        axes.plot(*outline.T, color="white", linewidth=2.2)
-        axes.plot(*outline.T, color="black", linewidth=1.0)
-    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="x / µm", ylabel="y / µm")
+    limits = (np.nanmin(celsius), np.nanmax(celsius)) if np.isfinite(celsius).any() else (0.0, 1.0)
+    picture = drawing.show_image(axes, celsius, raster, tool, "inferno", limits)
     axes.set_title(f"{1e6 * time:.6g} µs", loc="left")
     axes.figure.colorbar(picture, ax=axes, label=label)
     return axes

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping
 from copy import copy
 from functools import cached_property
+from html import escape
 from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -160,6 +161,9 @@ class Scene:
     def __repr__(self) -> str:
         told = frames_text(self.times, self.raster, "samples", self._shown(0))
         return f"<Scene: {told}; {'with' if self.tool else 'without'} tool>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>{self.data._repr_html_()}"
 
     def celsius(self, frame: int = 0) -> NDArray[np.float64]:
         """Return the temperature of one frame in °C, shape (y, x); meaningless without material."""

@@ -1,10 +1,10 @@
 """Geometry of the cutting tool: two straight faces and the edge between them."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, cos, degrees, isfinite, pi, radians, sin, tan
-from typing import Annotated, Final
+from typing import Annotated, Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,9 +26,12 @@ _LARGEST_FORM_FACTOR: Final = 10.0
 class Tool(ABC):
     """Cross-section of a tool: a rake face, a flank face and the edge between them.
 
-    The edge's lowest point is on y = 0, the cut surface; the chip is to the left of the rake face.
-    The surface is at one distance, `corner_radius`, from the chain of `corners`.
+    The edge's lowest point is on the cut surface; the chip is to the left of the rake face. The
+    surface is at one distance, `corner_radius`, from the chain of `corners`.
     """
+
+    tip: tuple[float, float]
+    """x of the edge's leftmost point and y of its lowest one in m: 0, 0 in scenes."""
 
     @property
     @abstractmethod
@@ -42,8 +45,20 @@ class Tool(ABC):
 
     @property
     @abstractmethod
+    def own_corners(self) -> NDArray[np.float64]:
+        """The `corners` of the tool with its tip at 0, 0."""
+
+    @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Centres of the rounded corners from the rake to the flank face, in m, (n, 2)."""
+        return np.asarray(self.own_corners + self.tip, dtype=np.float64)
+
+    def at(self, tip: tuple[float, float]) -> Self:
+        """Return the same tool with its tip elsewhere, such as in a measurement's coordinates."""
+        if len(tip) != 2 or not all(map(isfinite, tip)):
+            raise ValueError(f"tip: {tip!r}, expected two finite positions in m")
+        tool: Any = self
+        return replace(tool, tip=tip)  # type: ignore[no-any-return]
 
     @property
     @abstractmethod
@@ -73,9 +88,9 @@ class Tool(ABC):
 
     @property
     def edge_point(self) -> NDArray[np.float64]:
-        """The place on the surface that is nearest to the origin: the middle of a round edge."""
-        distance, *normal = surface_distance(0.0, 0.0, self.surface)
-        return np.array([-distance * part for part in normal])
+        """The place on the surface that is nearest to the tip: the middle of a round edge."""
+        distance, *normal = surface_distance(*self.tip, self.surface)
+        return np.asarray(np.array(self.tip) - distance * np.array(normal), np.float64)
 
     @cached_property
     def surface(self) -> ToolSurface:
@@ -224,6 +239,7 @@ class ToolGeometry(Tool, Part):
             allowed="none, or {rake: 40 um, clearance: 20 um}",
         ),
     ] = None
+    tip: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -243,8 +259,8 @@ class ToolGeometry(Tool, Part):
         return self.chamfer.width - self.edge_radius * (tan(turn / 2) + tan(rest / 2))
 
     @property
-    def corners(self) -> NDArray[np.float64]:
-        """Centres of the rounded corners from the rake to the flank face, in m, (n, 2)."""
+    def own_corners(self) -> NDArray[np.float64]:
+        """Centres of the rounded corners with the tip at 0, 0, in m, (n, 2)."""
         if self.hone:
             return self._honed[0]
         lower = np.array([[self.edge_radius, self.edge_radius]])
@@ -308,49 +324,3 @@ def check_angles(rake_angle: float, clearance_angle: float) -> None:
         )
     if rake_angle + clearance_angle > _RIGHT_ANGLE - SMALLEST_WEDGE:
         raise ValueError("rake_angle and clearance_angle leave a wedge of less than 5 degrees")
-
-
-@dataclass(frozen=True)
-class PlacedTool(Tool):
-    """A tool whose tip is where a measurement's coordinates have it."""
-
-    tool: Tool
-    """The tool with its tip at the origin, as scenes have it."""
-    tip: tuple[float, float]
-    """Place of that origin in m: x of the edge's leftmost point and y of its lowest one."""
-
-    def __post_init__(self) -> None:
-        if isinstance(self.tool, PlacedTool):
-            raise ValueError(f"tool: it is at {self.tool.tip} m already, expected one at 0, 0")
-        if len(self.tip) != 2 or not all(map(isfinite, self.tip)):
-            raise ValueError(f"tip: {self.tip!r}, expected two finite positions in m")
-
-    @property
-    def rake_angle(self) -> float:
-        """Rake angle of the straight rake face in rad."""
-        return self.tool.rake_angle
-
-    @property
-    def clearance_angle(self) -> float:
-        """Clearance angle of the straight flank face in rad."""
-        return self.tool.clearance_angle
-
-    @property
-    def corners(self) -> NDArray[np.float64]:
-        """Centres of the rounded corners from the rake to the flank face, in m, (n, 2)."""
-        return np.asarray(self.tool.corners + self.tip, dtype=np.float64)
-
-    @property
-    def corner_radius(self) -> float:
-        """Radius of the rounded corners in m."""
-        return self.tool.corner_radius
-
-    @property
-    def rake_foot(self) -> NDArray[np.float64]:
-        """Lower end of the straight rake face in m, shape (2,)."""
-        return np.asarray(self.tool.rake_foot + self.tip, dtype=np.float64)
-
-    @property
-    def edge_point(self) -> NDArray[np.float64]:
-        """The place on the surface that is nearest to the tip: the middle of a round edge."""
-        return np.asarray(self.tool.edge_point + self.tip, dtype=np.float64)

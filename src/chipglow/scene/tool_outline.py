@@ -13,7 +13,6 @@ from chipglow.scene.tool import (
     SMALLEST_WEDGE,
     Chamfer,
     Hone,
-    PlacedTool,
     Tool,
     ToolGeometry,
     check_angles,
@@ -56,11 +55,12 @@ class ToolOutline(Tool):
     points: tuple[tuple[float, float], ...]
     """x and y in m from the rake face round the edge to the flank face, the tool on their left, the
     lowest point on y = 0; `placed` moves an outline there."""
+    tip: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        _check_points(self.corners)
+        _check_points(self.own_corners)
         self._check_faces()
-        lowest = float(self.corners[:, 1].min())
+        lowest = float(self.own_corners[:, 1].min())
         if abs(lowest) > _LEVEL:
             raise ToolOutlineError(f"lowest point at y {lowest * 1e6:g} um, expected 0 um")
         self._check_crossing()
@@ -75,7 +75,7 @@ class ToolOutline(Tool):
         return cls(tuple((float(x), float(y)) for x, y in moved))
 
     @cached_property
-    def corners(self) -> NDArray[np.float64]:
+    def own_corners(self) -> NDArray[np.float64]:
         """The points in m, shape (n, 2)."""
         return np.array(self.points, dtype=np.float64)
 
@@ -178,12 +178,11 @@ def _sides(line: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def tool_attributes(tool: Tool) -> dict[str, Any]:
     """Return the tool as attributes of a dataset: angles in rad, lengths in m."""
-    if isinstance(tool, PlacedTool):
-        return {**tool_attributes(tool.tool), "tool_tip": np.array(tool.tip)}
+    values: dict[str, Any] = {"tool_tip": np.array(tool.tip)} if tool.tip != (0.0, 0.0) else {}
     if isinstance(tool, ToolOutline):
-        return {"tool_outline": tool.corners.ravel()}
+        return values | {"tool_outline": tool.own_corners.ravel()}
     assert isinstance(tool, ToolGeometry)
-    values = {f"tool_{name}": getattr(tool, name) for name in _WEDGE}
+    values |= {f"tool_{name}": getattr(tool, name) for name in _WEDGE}
     if tool.chamfer:
         values |= zip(_CHAMFER, (tool.chamfer.width, tool.chamfer.angle), strict=True)
     if tool.hone:
@@ -197,7 +196,7 @@ def stored_tool(attributes: Mapping[str, Any]) -> Tool | None:
     if tool is None or "tool_tip" not in attributes:
         return tool
     x, y = np.asarray(attributes["tool_tip"], dtype=np.float64).tolist()
-    return PlacedTool(tool, (x, y))
+    return tool.at((x, y))
 
 
 def _tool_at_origin(attributes: Mapping[str, Any]) -> Tool | None:
@@ -206,7 +205,7 @@ def _tool_at_origin(attributes: Mapping[str, Any]) -> Tool | None:
         return ToolOutline(tuple((float(x), float(y)) for x, y in line))
     if not all(f"tool_{name}" in attributes for name in _WEDGE):
         return None
-    wedge = {name: float(attributes[f"tool_{name}"]) for name in _WEDGE}
+    wedge: dict[str, Any] = {name: float(attributes[f"tool_{name}"]) for name in _WEDGE}
     chamfer = [float(attributes[name]) for name in _CHAMFER if name in attributes]
     hone = [float(attributes[name]) for name in _HONE if name in attributes]
     return ToolGeometry(

@@ -151,17 +151,19 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
     """Yield what is the paper's in a study that is another, a sentence for each section."""
     if study.is_papers:
         return
-    without = dict(_HOW_FINELY)
+    without, plan = dict(_HOW_FINELY), study.analysis
+    of_a_cut = plan.cut and not plan.all_places
     if study.scene:
         del without["cutting"]
     if not isinstance(study.surface, FeaturesSection):
         del without["surface"]
+    if not (of_a_cut and isinstance(study.surface, FeaturesSection)):
         without["analysis"] = without["analysis"] | {"rake_chip", "band_chip"}
     for name, fields in without.items():
         left = list(_unset(getattr(study, name), fields, ""))
         if left:
             yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
-    if "psf_widths" not in study.analysis.given:
+    if of_a_cut and "psf_widths" not in plan.given:
         low, *_, high = (LENGTH.text(width) for width in study.plan.psf_widths)
         yield f"PSF widths from {low} to {high} go round the camera's own (analysis.psf_widths)."
 

@@ -38,6 +38,9 @@ from chipglow.text import Notes
 
 CUTTING_STEP: Final = "cutting simulation"
 PREVIEW_STEP: Final = "preview"
+_BAND_PHASES: Final = 3
+"""Positions of the pixels along each axis of many bands: seven and their pairs take minutes."""
+
 CHECKPOINT_INTERVAL: Final = 30.0
 """Time in s between checkpoints of a simulation, if they are cheap."""
 
@@ -148,7 +151,7 @@ def errors(
     resume: bool = False,
 ) -> Analysis:
     """Return the measurement error of any scene, exposure by exposure, at the study's places."""
-    any_scene = unchecked(study, analysis=replace(study.analysis, cut=False))
+    any_scene = unchecked(study, analysis=unchecked(study.analysis, cut=False))
     return run(any_scene, progress, resume)
 
 
@@ -184,7 +187,7 @@ def wavelengths(
             if missing := list(lacking(scene)):
                 raise ValueError(f"{missing[0]} Expected points to read (analysis.points).")
             spots = cut_spots(scene, camera, plan, progress)
-        draws = plan.phases, plan.textures
+        draws = min(plan.phases, _BAND_PHASES), plan.textures
         data = wavelength_errors(
             scene, fitted.surfaces, camera, study.wavelengths, spots, *draws, progress
         )

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from html import escape
 from typing import Annotated, Any, Self
 
 from chipglow.analysis import Plan, WavelengthPlan
@@ -11,6 +12,7 @@ from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import scaled
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
+from chipglow.text import commented_yaml
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,10 @@ class Study(Part):
         WavelengthPlan,
         Parameter("Bands that chipglow wavelengths compares, alone and as ratios."),
     ] = field(default_factory=WavelengthPlan)
+
+    def _repr_html_(self) -> str:
+        text = escape(commented_yaml("", self, set()))
+        return f"<details><summary>{escape(self.title)}</summary><pre>{text}</pre></details>"
 
     @property
     def plan(self) -> Plan:

@@ -80,7 +80,7 @@ class FeatureSurface(Surface, Part):
 
     @cached_property
     def textures(self) -> Mapping[str, Texture]:
-        """Textures by the names of `FEATURES`; their ``standard_deviation`` is the realised one."""
+        """Textures by the names of `FEATURES`."""
         streams = np.random.SeedSequence(self.seed).spawn(len(FEATURES))
         return {
             name: Texture.random(

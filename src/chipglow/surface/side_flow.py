@@ -4,7 +4,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, pi, radians, sin
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,54 +72,44 @@ class SideElements:
         return slice(self.tool_side, self.tool_side + self.rake_face)
 
 
-@dataclass(frozen=True, eq=False)
-class Sections:
+class _Sections(NamedTuple):
     """Cross-sections at right angles to the rake face, one to a sample along it."""
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
     """Samples that the elements are seen in, shape (section, element)."""
-    probes: NDArray[np.intp]
-    """Rows and columns of the samples by which a section is touched, (2, section, height)."""
+    probes: tuple[NDArray[np.intp], NDArray[np.intp]]
+    """Rows and columns of the samples by which a section is touched, (section, height) each."""
     samples: NDArray[np.intp]
     """Row, column, section and element of all samples beside the face, shape (4, sample)."""
     weight: NDArray[np.float64]
     """How far each sample is on the way from its element to the next one, 0 to 1."""
 
-    @classmethod
-    def of(cls, raster: Raster, tool: Tool, elements: SideElements) -> "Sections":
-        """Return the cross-sections of a scene."""
-        x, y = np.meshgrid(raster.x, raster.y)
-        along, depth = tool.face_coordinates(np.stack([x, y], axis=-1))
-        count = max(int(along.max() / raster.spacing) + 1, 0)
-        foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
-        step = raster.spacing / 2
-        heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
-        section = np.floor(along / raster.spacing).astype(np.intp)
-        beside = np.flatnonzero((section >= 0) & (section < count))
-        known, number, weight = _between(elements, depth.ravel()[beside])
-        beside = beside[known]
-        placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number)
-        return cls(
-            *_samples_at(raster, tool, foot, _looked_up(elements, raster.spacing)),
-            np.stack(_samples_at(raster, tool, foot, heights)),
-            np.stack(placed),
-            weight,
-        )
 
-    def touching(self, material: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Tell in which sections the chip touches the rake face and the tool is seen."""
-        rows, columns = self.probes
-        chip = (material[rows, columns] == Material.WORKPIECE).any(axis=1)
-        return np.asarray(chip & (material[self.rows, self.columns] == Material.TOOL).any(axis=1))
-
-    def seen(
-        self, touching: NDArray[np.bool_], material: NDArray[np.uint8]
-    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Return the `samples` in those sections, and their weights."""
-        rows, columns, section, _ = self.samples
-        there = touching[section] & (material[rows, columns] != Material.VOID)
-        return self.samples[:, there], self.weight[there]
+def _sections(raster: Raster, tool: Tool, elements: SideElements) -> _Sections:
+    """Return the cross-sections of a scene."""
+    x, y = np.meshgrid(raster.x, raster.y)
+    along, depth = tool.face_coordinates(np.stack([x, y], axis=-1))
+    count = max(int(along.max() / raster.spacing) + 1, 0)
+    foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
+    step = raster.spacing / 2
+    heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
+    section = np.floor(along / raster.spacing).astype(np.intp)
+    beside = np.flatnonzero((section >= 0) & (section < count))
+    known, number, weight = _between(elements, depth.ravel()[beside])
+    beside = beside[known]
+    placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number)
+    # So far from the face that a sample is on its element's side of it; the rake face has the
+    # temperature of the tool beside it.
+    inside, of_chip = _INSIDE * raster.spacing, np.arange(elements.depths.size)
+    looked_up = np.where(
+        of_chip < elements.chip.start,
+        np.minimum(elements.depths, -inside),
+        np.maximum(elements.depths, inside),
+    )
+    rows, columns = _samples_at(raster, tool, foot, looked_up)
+    probes = _samples_at(raster, tool, foot, heights)
+    return _Sections(rows, columns, probes, np.stack(placed), weight)
 
 
 @dataclass(frozen=True)
@@ -210,13 +200,15 @@ class SideShape(Modifier):
         modifiers = surface.modifiers if isinstance(surface, ModifiedSurface) else ()
         directions = [one for one in modifiers if isinstance(one, Direction)]
         ratio = directions[-1].slope_ratio(cosines) if directions else np.ones(cosines.shape)
-        sections = Sections.of(scene.raster, scene.tool, self.elements)
+        sections = _sections(scene.raster, scene.tool, self.elements)
 
         def black(frame: Frame, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
             return np.asarray(black_in_band(frame.temperature[rows, columns].astype(np.float64)))
 
         def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
-            touching = sections.touching(frame.material)
+            chip = frame.material[sections.probes] == Material.WORKPIECE
+            tool = frame.material[sections.rows, sections.columns] == Material.TOOL
+            touching = chip.any(axis=1) & tool.any(axis=1)
             if not touching.any():
                 return emissivity
             rows, columns = sections.rows[touching], sections.columns[touching]
@@ -234,16 +226,19 @@ class SideShape(Modifier):
                 self.mirror,
                 TOWARD_CAMERA,
             )
-            (rows, columns, section, element), weight = sections.seen(touching, frame.material)
+            rows, columns, section, _ = sections.samples
+            visible = touching[section] & (frame.material[rows, columns] != Material.VOID)
+            rows, columns, section, element = sections.samples[:, visible]
+            weight = sections.weight[visible]
             slopes = (1 - weight) * ratio[element] + weight * ratio[element + 1]
             added = (1 - weight) * incident[section, element]
             added += weight * incident[section, element + 1]
             own = np.minimum(emissivity[rows, columns] * slopes, 1.0)
             gain = black(frame, rows, columns) - surroundings
             # A sample just as warm as its surroundings shows neither itself nor what it reflects.
-            visible = np.abs(gain) > 1e-6 * surroundings
+            shows = np.abs(gain) > 1e-6 * surroundings
             effective = own + (1.0 - own) * np.divide(
-                added - surroundings, gain, out=np.zeros_like(gain), where=visible
+                added - surroundings, gain, out=np.zeros_like(gain), where=shows
             )
             result = emissivity.copy()
             result[rows, columns] = np.maximum(effective, 0.0)
@@ -318,18 +313,6 @@ class Wedge(SideShape):
 def _graded(count: int) -> NDArray[np.float64]:
     """Ends of `count` elements from 0 to 1, shorter toward 0."""
     return np.linspace(0.0, 1.0, count + 1) ** 2
-
-
-def _looked_up(elements: SideElements, spacing: float) -> NDArray[np.float64]:
-    """Return the elements' depths, so far from the face that a sample is on their side of it.
-
-    The rake face has the temperature of the tool beside it.
-    """
-    inside = _INSIDE * spacing
-    depths = elements.depths
-    tool, chip = np.minimum(depths, -inside), np.maximum(depths, inside)
-    number = np.arange(depths.size)
-    return np.where(number < elements.chip.start, tool, chip)
 
 
 def _between(

@@ -97,7 +97,6 @@ _AUTOCORRELATION: Final = np.array([1, -20, 71, 456, 71, -20, 1]) / 560
 """Overlap of that kernel with itself, for lags of −3 to 3 nodes."""
 _LANES: Final = tuple(ir.Constant(ir.IntType(32), lane) for lane in range(4))
 _LAST: Final = round(2 * REACH * STEPS)
-_PER_NODE: Final = 10
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 
 
@@ -118,14 +117,6 @@ class Texture:
     """Distance between the nodes in m."""
     emissivity: Emissivity
 
-    def __post_init__(self) -> None:
-        if self.nodes.shape != (MAP_SIZE, MAP_SIZE):
-            raise ValueError(
-                f"texture: nodes have shape {self.nodes.shape}, expected {(MAP_SIZE, MAP_SIZE)}"
-            )
-        if not 0 < self.grain < np.inf:
-            raise ValueError(f"texture: grain must be over 0 m, got {self.grain!r} m")
-
     @classmethod
     def random(
         cls,
@@ -140,22 +131,6 @@ class Texture:
         if restore_standard_deviation:
             deviates /= _enlarged_standard_deviation(deviates)
         return cls(deviates.astype(np.float32), grain, emissivity)
-
-    @cached_property
-    def mean(self) -> float:
-        """Mean over the enlarged map."""
-        return float(self._samples.mean())
-
-    @cached_property
-    def standard_deviation(self) -> float:
-        """Standard deviation over the enlarged map."""
-        return float(self._samples.std())
-
-    @cached_property
-    def _samples(self) -> NDArray[np.float64]:
-        """Values at even steps over one period: sums of cubics, good to 1e-4 of their scatter."""
-        along = np.arange(_PER_NODE * MAP_SIZE) * self.grain / _PER_NODE
-        return self.at(along[None, :], along[:, None]).astype(np.float64)
 
     def at(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float32]:
         """Return the emissivity of the enlarged map at places in m."""

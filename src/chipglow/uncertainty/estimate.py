@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from html import escape
 from typing import Any
 from uuid import uuid4
 
@@ -240,6 +241,11 @@ class Estimate:
             },
             {"cause": np.array(self.names, dtype=object)},
         )
+
+    def _repr_html_(self) -> str:
+        table = self.budget().to_dataframe().to_html(float_format="{:.4g}".format, max_rows=20)
+        head = f"Estimate {self.values} ± {self.standard_uncertainty} (standard uncertainty)"
+        return f"<pre>{escape(head)}</pre>{table}"
 
     def covariance(self) -> Array:
         """Return the covariance of all values, flat: JCGM 100:2008, H.2.3."""

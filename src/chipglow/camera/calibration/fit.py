@@ -1,5 +1,6 @@
 """Calibrations fitted to blackbodies."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Final, Generic, TypeVar
 
@@ -125,10 +126,6 @@ class CalibrationFit(Generic[Kind]):
             return float(stdtrit(free, _QUANTILE) / ndtri(_QUANTILE))
         return max(float(np.sqrt(self.chi_squared / free)), 1.0) if free else 1.0
 
-    def coverage_factor(self) -> float:
-        """Return the normal distribution's factor of an interval of 95 %."""
-        return float(ndtri(_QUANTILE))
-
 
 def fit_calibration(
     kind: type[Kind],
@@ -154,103 +151,57 @@ def fit_calibration(
     temperatures or of the blackbody's emissivity moves all points at once, and what it does to
     the parameters is added to their covariance as one more term (JCGM 100, Equation 13).
     """
-    points = _Points.checked(
-        temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty
+    kelvins, signal = np.asarray(temperatures, np.float64), np.asarray(counts, np.float64)
+    of_counts, of_kelvins, of_all = (
+        _uncertainty(name, value, signal.shape)
+        for name, value in (
+            ("count_uncertainty", count_uncertainty),
+            ("temperature_uncertainty", temperature_uncertainty),
+            ("common_uncertainty", common_uncertainty),
+        )
     )
-    points.expect_enough(len(kind.NAMES))
-    points = points.seen_in(band, blackbody)
-    start = kind.first_guess(points.temperatures, points.counts, band)
+    stated = count_uncertainty is not None or temperature_uncertainty is not None
+    _check_points(kelvins, signal, len(kind.NAMES), stated)
+    common = [of_all]
+    if blackbody != _IDEAL:
+        by_temperature, by_emissivity = blackbody.sensitivity(kelvins, band)
+        kelvins = blackbody.radiance_temperatures(kelvins, band)
+        of_kelvins = by_temperature * of_kelvins
+        common = [by_temperature * of_all, by_emissivity * blackbody.emissivity_uncertainty]
+    start = kind.first_guess(kelvins, signal, band)
     _expect_rising(start[-1] > 0)
     calibration = kind(
         band=band,
-        lowest=float(points.temperatures.min()),
-        highest=float(points.temperatures.max()),
+        lowest=float(kelvins.min()),
+        highest=float(kelvins.max()),
         integration_time=integration_time,
         range_name=range_name,
         parameters=start,
         covariance=np.zeros((start.size, start.size)),
     )
-    return _fit(points, calibration)
 
-
-@dataclass(frozen=True, eq=False)
-class _Points:
-    """Points of a calibration; an uncertainty is 0 where it is not stated.
-
-    What all points have in common is a list of errors in K by the point, each of one deviation.
-    """
-
-    temperatures: Array
-    counts: Array
-    count_uncertainty: Array
-    temperature_uncertainty: Array
-    common: tuple[Array, ...]
-    stated: bool
-
-    @classmethod
-    def checked(
-        cls,
-        temperatures: ArrayLike,
-        counts: ArrayLike,
-        count_uncertainty: ArrayLike | None,
-        temperature_uncertainty: ArrayLike | None,
-        common_uncertainty: float,
-    ) -> "_Points":
-        kelvins, signal = np.asarray(temperatures, np.float64), np.asarray(counts, np.float64)
-        if kelvins.ndim != 1 or kelvins.shape != signal.shape:
-            raise ValueError(
-                f"calibration: {kelvins.size} temperatures and {signal.size} counts, "
-                "expected as many"
-            )
-        if not np.isfinite(signal).all():
-            raise ValueError("calibration: counts are not finite")
-        impossible = kelvins[~((kelvins >= COLDEST) & (kelvins <= HOTTEST))]
-        if impossible.size:
-            raise ValueError(
-                f"calibration: a blackbody is at {impossible[0]:g} K "
-                f"({impossible[0] - 273.15:g} °C), expected {COLDEST:g} to "
-                f"{HOTTEST:g} K"
-            )
-        _expect_unsaturated(kelvins, signal)
-        return cls(
-            kelvins,
-            signal,
-            _uncertainty("count_uncertainty", count_uncertainty, kelvins.shape),
-            _uncertainty("temperature_uncertainty", temperature_uncertainty, kelvins.shape),
-            (_uncertainty("common_uncertainty", common_uncertainty, kelvins.shape),),
-            count_uncertainty is not None or temperature_uncertainty is not None,
-        )
-
-    def expect_enough(self, parameters: int) -> None:
-        """Raise a ValueError if there are too few points for so many parameters."""
-        needed = parameters if self.stated else parameters + 1
-        different = np.unique(self.temperatures).size
-        if different < parameters or self.counts.size < needed:
-            raise ValueError(
-                f"calibration: {self.counts.size} points at {different} temperatures, expected "
-                f"{needed} points or more at {parameters} temperatures or more"
-            )
-
-    def seen_in(self, band: Band, blackbody: Blackbody) -> "_Points":
-        """Return the points with the radiance temperatures of a blackbody of this emissivity."""
-        if blackbody == _IDEAL:
-            return self
-        by_temperature, by_emissivity = blackbody.sensitivity(self.temperatures, band)
-        return replace(
-            self,
-            temperatures=blackbody.radiance_temperatures(self.temperatures, band),
-            temperature_uncertainty=by_temperature * self.temperature_uncertainty,
-            common=(
-                *(by_temperature * error for error in self.common),
-                by_emissivity * blackbody.emissivity_uncertainty,
-            ),
-        )
-
-    def deviations(self, slope: Array) -> Array:
+    def deviations(calibration: Kind) -> Array:
         """Return effective standard uncertainties in counts; 1 if none are stated."""
-        if not self.stated:
-            return np.ones_like(self.counts)
-        return np.hypot(self.count_uncertainty, slope * self.temperature_uncertainty)
+        if not stated:
+            return np.ones_like(signal)
+        return np.hypot(of_counts, calibration.slope(kelvins) * of_kelvins)
+
+    calibration = _settled(calibration, kelvins, signal, deviations)
+    residuals, spread = signal - calibration.counts(kelvins), deviations(calibration)
+    if not stated:
+        rounding = _EXACT * np.abs(signal).max()
+        scatter = np.sqrt(np.sum(residuals**2) / (signal.size - start.size))
+        spread = np.full_like(signal, max(scatter, rounding))
+    fit = CalibrationFit(calibration, kelvins, signal, residuals, spread, stated)
+    scaled, design = residuals / spread, (calibration.gradient(kelvins) / spread).T
+    slope = calibration.slope(kelvins) / spread
+    covariance = _covariance(design, [slope * one for one in common], fit.enlargement)
+    drifts = alike(scaled, design)
+    if drifts:
+        shift = drift_shift(scaled, design)
+        covariance = covariance + np.outer(shift, shift)
+    warnings = tuple(residual_warnings(scaled, design, kelvins, stated, drifts))
+    return replace(fit, calibration=replace(calibration, covariance=covariance, warnings=warnings))
 
 
 def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> Array:
@@ -263,14 +214,32 @@ def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> 
     return values
 
 
-def _expect_unsaturated(kelvins: Array, counts: Array) -> None:
-    """Refuse points whose greatest counts are the same at several temperatures."""
+def _check_points(kelvins: Array, counts: Array, parameters: int, stated: bool) -> None:
+    """Raise a ValueError if points are impossible, saturated or too few for so many parameters."""
+    if kelvins.ndim != 1 or kelvins.shape != counts.shape:
+        raise ValueError(
+            f"calibration: {kelvins.size} temperatures and {counts.size} counts, expected as many"
+        )
+    if not np.isfinite(counts).all():
+        raise ValueError("calibration: counts are not finite")
+    impossible = kelvins[~((kelvins >= COLDEST) & (kelvins <= HOTTEST))]
+    if impossible.size:
+        raise ValueError(
+            f"calibration: a blackbody is at {impossible[0]:g} K "
+            f"({impossible[0] - 273.15:g} °C), expected {COLDEST:g} to {HOTTEST:g} K"
+        )
     greatest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
     if greatest.size > 1 and np.unique(counts).size > 1:
         places = ", ".join(f"{kelvin - 273.15:.5g}" for kelvin in greatest)
         raise ValueError(
             f"calibration: the counts are {counts.max():.7g} at each of {places} °C and nowhere "
             "greater: the camera is saturated there, expected points without saturation"
+        )
+    needed, different = parameters if stated else parameters + 1, np.unique(kelvins).size
+    if different < parameters or counts.size < needed:
+        raise ValueError(
+            f"calibration: {counts.size} points at {different} temperatures, expected "
+            f"{needed} points or more at {parameters} temperatures or more"
         )
 
 
@@ -281,50 +250,31 @@ def _expect_rising(rises: bool) -> None:
         )
 
 
-def _fit(points: _Points, calibration: Kind) -> CalibrationFit[Kind]:
+def _settled(
+    calibration: Kind, kelvins: Array, counts: Array, deviations: Callable[[Kind], Array]
+) -> Kind:
     """Fit by least squares with the effective variance, iterated until the weights stay."""
-    deviations = points.deviations(calibration.slope(points.temperatures))
-    if not deviations.all():
+    weights = deviations(calibration)
+    if not weights.all():
         raise ValueError(
             "calibration: a point's uncertainties are both 0, expected one over 0, or none stated"
         )
     for _ in range(_MOST_ROUNDS):
-        calibration = _least_squares(points, calibration, deviations)
-        before = deviations
-        deviations = points.deviations(calibration.slope(points.temperatures))
-        if np.allclose(deviations, before, rtol=_SETTLED, atol=0.0):
-            break
-    else:
-        raise ValueError("calibration: the reweighted fit did not converge; check for outliers")
-    _expect_rising(calibration.rises)
-    residuals = points.counts - calibration.counts(points.temperatures)
-    if not points.stated:
-        free = points.counts.size - calibration.parameters.size
-        rounding = _EXACT * np.abs(points.counts).max()
-        deviations = np.full_like(residuals, max(np.sqrt(np.sum(residuals**2) / free), rounding))
-    fit = CalibrationFit(
-        calibration, points.temperatures, points.counts, residuals, deviations, points.stated
-    )
-    scaled = residuals / deviations
-    design = (calibration.gradient(points.temperatures) / deviations).T
-    slope = calibration.slope(points.temperatures) / deviations
-    covariance = _covariance(design, [slope * one for one in points.common], fit.enlargement)
-    drifts = alike(scaled, design)
-    if drifts:
-        shift = drift_shift(scaled, design)
-        covariance = covariance + np.outer(shift, shift)
-    warnings = tuple(residual_warnings(scaled, design, points.temperatures, points.stated, drifts))
-    return replace(fit, calibration=replace(calibration, covariance=covariance, warnings=warnings))
+        calibration = _least_squares(calibration, kelvins, counts, weights)
+        before, weights = weights, deviations(calibration)
+        if np.allclose(weights, before, rtol=_SETTLED, atol=0.0):
+            _expect_rising(calibration.rises)
+            return calibration
+    raise ValueError("calibration: the reweighted fit did not converge; check for outliers")
 
 
-def _least_squares(points: _Points, calibration: Kind, deviations: Array) -> Kind:
+def _least_squares(calibration: Kind, kelvins: Array, counts: Array, deviations: Array) -> Kind:
     def misfit(parameters: Array) -> Array:
-        model = replace(calibration, parameters=parameters).counts(points.temperatures)
-        return np.asarray((model - points.counts) / deviations)
+        model = replace(calibration, parameters=parameters).counts(kelvins)
+        return np.asarray((model - counts) / deviations)
 
     def jacobian(parameters: Array) -> Array:
-        model = replace(calibration, parameters=parameters)
-        return (model.gradient(points.temperatures) / deviations).T
+        return (replace(calibration, parameters=parameters).gradient(kelvins) / deviations).T
 
     exact = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
     try:

@@ -10,9 +10,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from chipglow.camera.detector.bad_pixels import find_bad_pixels, replace_bad_pixels
 from chipglow.camera.detector.detector import BRIGHTER_SOURCE, DARKER_SOURCE, Detector
-from chipglow.camera.detector.nonuniformity import NonUniformity, mean_frame
+from chipglow.camera.detector.pixels import (
+    NonUniformity,
+    find_bad_pixels,
+    mean_frame,
+    replace_bad_pixels,
+)
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
 from chipglow.quantities import Array

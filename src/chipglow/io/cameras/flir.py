@@ -3,13 +3,11 @@
 The layout is that of ExifTool's documentation of FLIR's tags.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from math import exp, isfinite, nan, sqrt
 from pathlib import Path
-from struct import calcsize, unpack_from
 from typing import Any, Final
 
 import numpy as np
@@ -47,38 +45,38 @@ _MOST_PADDING: Final = 1 << 20
 _LARGE: Final = 100.0
 """An exponent that is possible, and no transmittance."""
 
-_RAW_FIELDS: Final = {"width": ("H", 2), "height": ("H", 4)}
-_CAMERA_LENGTH: Final = 4096
-_CAMERA_FIELDS: Final = {
-    "emissivity": ("f", 0x20),
-    "distance": ("f", 0x24),
-    "reflected": ("f", 0x28),
-    "atmosphere": ("f", 0x2C),
-    "window_temperature": ("f", 0x30),
-    "window": ("f", 0x34),
-    "humidity": ("f", 0x3C),
-    "r1": ("f", 0x58),
-    "b": ("f", 0x5C),
-    "f": ("f", 0x60),
-    "alpha_1": ("f", 0x70),
-    "alpha_2": ("f", 0x74),
-    "beta_1": ("f", 0x78),
-    "beta_2": ("f", 0x7C),
-    "air_part": ("f", 0x80),
-    "hottest": ("f", 0x90),
-    "coldest": ("f", 0x94),
-    "model": ("32s", 0xD4),
-    "serial": ("16s", 0x104),
-    "lens": ("16s", 0x170),
-    "filter": ("16s", 0x1EC),
-    "o": ("i", 0x308),
-    "r2": ("f", 0x30C),
-    "least_count": ("H", 0x310),
-    "most_counts": ("H", 0x312),
-    "seconds": ("I", 0x384),
-    "milliseconds": ("I", 0x388),
-    "rate": ("H", 0x464),
-}
+_RAW_FIELDS: Final = layout(_RAW_HEADER, width=("<u2", 2), height=("<u2", 4))
+_CAMERA_FIELDS: Final = layout(
+    0x466,
+    emissivity=("<f4", 0x20),
+    distance=("<f4", 0x24),
+    reflected=("<f4", 0x28),
+    atmosphere=("<f4", 0x2C),
+    window_temperature=("<f4", 0x30),
+    window=("<f4", 0x34),
+    humidity=("<f4", 0x3C),
+    r1=("<f4", 0x58),
+    b=("<f4", 0x5C),
+    f=("<f4", 0x60),
+    alpha_1=("<f4", 0x70),
+    alpha_2=("<f4", 0x74),
+    beta_1=("<f4", 0x78),
+    beta_2=("<f4", 0x7C),
+    air_part=("<f4", 0x80),
+    hottest=("<f4", 0x90),
+    coldest=("<f4", 0x94),
+    model=("S32", 0xD4),
+    serial=("S16", 0x104),
+    lens=("S16", 0x170),
+    filter=("S16", 0x1EC),
+    o=("<i4", 0x308),
+    r2=("<f4", 0x30C),
+    least_count=("<u2", 0x310),
+    most_counts=("<u2", 0x312),
+    seconds=("<u4", 0x384),
+    milliseconds=("<u4", 0x388),
+    rate=("<u2", 0x464),
+)
 
 
 @dataclass(frozen=True)
@@ -90,18 +88,12 @@ class _Frame:
     end: int
 
 
-def _fields(raw: bytes, fields: Mapping[str, tuple[str, int]]) -> dict[str, Any]:
-    """Return fields of a record; NaN, or no text, for later ones that are not there."""
-    order = "<" if raw[:2] == b"\x02\0" else ">"
-    values: dict[str, Any] = {}
-    for name, (kind, place) in fields.items():
-        if kind.endswith("s"):
-            values[name] = text_of(raw[place : place + calcsize(kind)])
-        elif place + calcsize(kind) <= len(raw):
-            values[name] = unpack_from(order + kind, raw, place)[0]
-        else:
-            values[name] = nan
-    return values
+def _fields(raw: bytes, kind: np.dtype[Any]) -> dict[str, Any]:
+    """Return fields of a record; 0, or no text, for later ones that are not there."""
+    order: Any = "<" if raw[:2] == b"\x02\0" else ">"
+    whole = raw[: kind.itemsize].ljust(kind.itemsize, b"\0")
+    values = np.frombuffer(whole, kind.newbyteorder(order))[0].item()
+    return dict(zip(kind.names or (), values, strict=True))
 
 
 class Flir(CameraFile):
@@ -169,7 +161,9 @@ class Flir(CameraFile):
 
     def _camera_fields(self, number: int) -> dict[str, Any]:
         place, length = self.frames[number].records.get(_CAMERA, (0, 0))
-        return _fields(self.binary.read(place, min(length, _CAMERA_LENGTH)), _CAMERA_FIELDS)
+        return _fields(
+            self.binary.read(place, min(length, _CAMERA_FIELDS.itemsize)), _CAMERA_FIELDS
+        )
 
     def _moment(self, number: int) -> float:
         """Return the time of a frame in s since 1970; NaN if the file does not state it."""
@@ -188,7 +182,7 @@ class Flir(CameraFile):
     def facts(self, chosen: range) -> dict[str, Any]:
         fields = self.camera_fields(chosen[0])
         self.note_start(self._moment(0))
-        model, serial = fields["model"], fields["serial"]
+        model, serial = text_of(fields["model"]), text_of(fields["serial"])
         name = model if model.startswith("FLIR") else f"FLIR {model}".strip()
         # Cameras without a range of counts state all 16 bits.
         has_range = fields["least_count"] < fields["most_counts"] < 65_535
@@ -199,8 +193,8 @@ class Flir(CameraFile):
             "object_parameters": self._object(fields),
         }
         for part in ("lens", "filter"):
-            if fields[part]:
-                self.notes.remarks.append(f"{part.capitalize()}: {fields[part]}.")
+            if text := text_of(fields[part]):
+                self.notes.remarks.append(f"{part.capitalize()}: {text}.")
         low, high = fields["coldest"], fields["hottest"]
         if 0 < low < high < 10_000:
             self.notes.remarks.append(

@@ -26,8 +26,6 @@ MOST_ON_A_SIDE: Final = 1_000_000
 
 _MOST_ARRAYS: Final = 10_000
 _KINDS: Final = "fiub"
-_UNPACKED_BY_TIFFFILE: Final = (1, 8, 32946)
-"""None, and two names of deflate: the other compressions need libtiff, which Pillow has."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
     "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
@@ -167,44 +165,32 @@ def _npz(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     for info in archive.infolist():
         if not info.filename.endswith(".npy"):
             continue
-        stream = stack.enter_context(archive.open(info))
-        shape, fortran, dtype = _npy_header(stream)
-        start = stream.tell()
-        if prod(shape) * dtype.itemsize + start != info.file_size:
+        with archive.open(info) as stream:
+            shape, dtype = _npy_header(stream)
+        if prod(shape) * dtype.itemsize > info.file_size:
             raise SourceError(
                 f"{path}: {info.filename} states shape {shape}, but has {info.file_size} bytes"
             )
-        read = partial(_read_member, stream, start, dtype, shape, fortran)
-        yield from _numpy_arrays(info.filename[:-4], dtype, shape, read)
+        whole = cache(partial(_read_member, archive, info.filename, prod(shape)))
+        yield from _numpy_arrays(info.filename[:-4], dtype, shape, partial(_of_member, whole))
 
 
-def _npy_header(stream: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    if np.lib.format.read_magic(stream) == (1, 0):
-        shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
-    else:
-        shape, fortran, dtype = np.lib.format.read_array_header_2_0(stream)
-    if dtype.hasobject:
-        raise ValueError("it holds Python objects, expected numbers")
-    return shape, fortran, dtype
+def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    first = np.lib.format.read_magic(stream) == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(stream)
+    return shape, dtype
 
 
-def _read_member(
-    stream: Any, start: int, dtype: np.dtype[Any], shape: tuple[int, ...], fortran: bool, key: Key
-) -> NDArray[Any]:
-    """Return a part of an array in an archive, unpacked as it is read: forward costs nothing twice.
+def _read_member(archive: ZipFile, member: str, count: int) -> NDArray[Any]:
+    """Return an array of an archive, which cannot be read in parts."""
+    check_samples(f"{archive.filename}: {member}", count)
+    with archive.open(member) as stream:
+        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
 
-    Parts are along the axis that lies outermost in the file.
-    """
-    stored = (shape[::-1] if fortran else shape) or (1,)
-    part = (key[::-1] if fortran else key) or (slice(None),)
-    first, last, _ = part[0].indices(stored[0])
-    row = prod(stored[1:])
-    check_samples(stream.name, (last - first) * row)
-    stream.seek(start + first * row * dtype.itemsize)
-    content = stream.read((last - first) * row * dtype.itemsize)
-    values = np.frombuffer(content, dtype).reshape(last - first, *stored[1:])
-    values = values[(slice(None), *part[1:])]
-    return (values.T if fortran else values) if shape else values.reshape(())
+
+def _of_member(whole: Callable[[], NDArray[Any]], key: Key) -> NDArray[Any]:
+    return np.asarray(whole()[key])
 
 
 def _numpy_arrays(
@@ -384,23 +370,8 @@ def _tiff_reader(path: Path, series: Any) -> Callable[[Key], NDArray[Any]]:
 def _tiff_pages(path: Path, series: Any, key: Key) -> NDArray[Any]:
     pages = list(series.pages)[key[0]] if len(series.shape) > 2 else list(series.pages)
     check_samples(str(path), len(pages) * prod(series.shape[-2:]))
-    part = np.stack([_tiff_page(path, page)[key[-2:]] for page in pages])
+    part = np.stack([page.asarray(maxworkers=1)[key[-2:]] for page in pages])
     return part[0] if len(series.shape) == 2 else part
-
-
-def _tiff_page(path: Path, page: Any) -> NDArray[Any]:
-    if page.compression in _UNPACKED_BY_TIFFFILE and page.keyframe.predictor == 1:
-        return np.asarray(page.asarray(maxworkers=1))
-    from PIL import Image
-
-    with Image.open(path) as picture:
-        picture.seek(page.index)
-        values = np.asarray(picture)
-    if values.shape != page.shape:
-        raise SourceError(
-            f"{path}: picture {page.index} cannot be unpacked, expected no LZW or JPEG"
-        )
-    return values
 
 
 # Zarr

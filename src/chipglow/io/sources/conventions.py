@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BeforeValidator, InstanceOf, PlainSerializer, WithJsonSchema
 
 from chipglow.io.sources.source import SourceError
 from chipglow.quantities import Parameter, Part
@@ -106,25 +106,15 @@ def match_names(
 METRE, SECOND, KELVIN = (Unit(1.0, text=text) for text in ("m", "s", "K"))
 
 
-@dataclass(frozen=True)
-class _UnitText:
-    """Schema of a field that holds a unit, which descriptions write as text."""
-
-    name: str
-    base: str
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            lambda value: (
-                value if isinstance(value, Unit) else parse_unit(str(value), self.base, self.name)
-            ),
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda unit: unit.text, when_used="json"
-            ),
-        )
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
-        return {"type": "string"}
+def _unit(name: str, base: str) -> tuple[Any, ...]:
+    """Return how descriptions write a field that holds a unit: as text."""
+    return (
+        BeforeValidator(
+            lambda value: value if isinstance(value, Unit) else parse_unit(str(value), base, name)
+        ),
+        PlainSerializer(lambda unit: unit.text, return_type=str, when_used="json"),
+        WithJsonSchema({"type": "string"}),
+    )
 
 
 @dataclass(frozen=True)
@@ -132,27 +122,27 @@ class Units(Part):
     """Units of the source."""
 
     length: Annotated[
-        Unit,
-        _UnitText("length", "m"),
+        InstanceOf[Unit],
+        *_unit("length", "m"),
         Parameter("Unit of positions and lengths.", allowed="m, mm, um, in, ..."),
     ] = METRE
     time: Annotated[
-        Unit, _UnitText("time", "s"), Parameter("Unit of times.", allowed="s, ms, us, ...")
+        InstanceOf[Unit], *_unit("time", "s"), Parameter("Unit of times.", allowed="s, ms, us, ...")
     ] = SECOND
     temperature: Annotated[
-        Unit,
-        _UnitText("temperature", "K"),
+        InstanceOf[Unit],
+        *_unit("temperature", "K"),
         Parameter("Unit of temperatures.", allowed="K, degC, degF"),
     ] = KELVIN
     velocity: Annotated[
-        Annotated[Unit, _UnitText("velocity", "m/s")] | None,
+        Annotated[InstanceOf[Unit], *_unit("velocity", "m/s")] | None,
         Parameter(
             "Unit of velocities; none: made of length and time.",
             allowed="none, m/s, mm/s, m/min, ...",
         ),
     ] = None
     strain_rate: Annotated[
-        Annotated[Unit, _UnitText("strain_rate", "1/s")] | None,
+        Annotated[InstanceOf[Unit], *_unit("strain_rate", "1/s")] | None,
         Parameter("Unit of strain rates; none: made of the time.", allowed="none, 1/s, 1/ms, ..."),
     ] = None
 

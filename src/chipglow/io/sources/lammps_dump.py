@@ -1,10 +1,12 @@
 """Dumps of LAMMPS in text: points over time, as ``dump custom`` writes them."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +16,8 @@ from chipglow.io.sources.source import SourceError, reading
 
 ENDINGS: Final = (".dump", ".lammpstrj", ".lammpsdump")
 
-_ITEM: Final = "ITEM: "
-_LONGEST_LINE: Final = 100_000
+_ITEM: Final = b"ITEM: "
+_ATOMS: Final = re.compile(rb"(?m)^ITEM: ATOMS ([^\r\n]*)\r?\n")
 _LENGTHS: Final[Mapping[str, tuple[str, str]]] = {
     "si": ("m", "s"), "cgs": ("cm", "s"), "micro": ("um", "us"), "nano": ("nm", "ns"),
     "metal": ("angstrom", "ps"), "real": ("angstrom", "fs"),
@@ -28,11 +30,11 @@ class Snapshot:
     """Frame of a dump."""
 
     path: Path
-    start: int
-    """Byte at which the lines of its atoms begin."""
+    rows: slice
+    """Bytes of the lines of its atoms."""
     count: int
     """Number of atoms."""
-    labels: Sequence[str]
+    labels: tuple[str, ...]
     """Names of the columns."""
     box: NDArray[np.float64]
     """Lowest and highest place along x, y and z, shape (3, 2)."""
@@ -48,12 +50,13 @@ class Snapshot:
         import pandas as pd
 
         check_samples(f"{self.path}: a frame", self.count * len(self.labels))
-        with self.path.open("rb") as stream, reading(self.path):
-            stream.seek(self.start)
-            table = pd.read_csv(stream, sep=r"\s+", header=None, nrows=self.count)
-        if table.shape[1] != len(self.labels):
+        with reading(self.path), _mapped(self.path) as content:
+            table = pd.read_csv(BytesIO(content[self.rows]), sep=r"\s+", header=None)
+        shape = self.count, len(self.labels)
+        if table.shape != shape or table.iloc[:, -1].isna().any():
             raise SourceError(
-                f"{self.path}: {table.shape[1]} numbers for an atom, expected {len(self.labels)}"
+                f"{self.path}: a frame has {table.shape[0]} atoms of {table.shape[1]} numbers, "
+                f"expected {shape[0]} of {shape[1]}: it is cut short"
             )
         table.columns = pd.Index(self.labels)
         numbers = table.select_dtypes("number")
@@ -77,29 +80,41 @@ class Snapshot:
 def is_dump(path: Path) -> bool:
     """Whether a file begins as a dump of LAMMPS in text does."""
     with path.open("rb") as stream:
-        return stream.read(len(_ITEM)) == _ITEM.encode()
+        return stream.read(len(_ITEM)) == _ITEM
+
+
+def _mapped(path: Path) -> mmap:
+    with path.open("rb") as stream:
+        return mmap(stream.fileno(), 0, access=ACCESS_READ)
 
 
 def snapshots(path: Path) -> list[Snapshot]:
     """Return all frames of a dump, whose atoms are not read yet."""
-    found: list[Snapshot] = []
-    items: dict[str, list[str]] = {}
-    units: dict[str, str] = {}
-    with path.open("rb") as stream:
-        while line := _line(stream):
-            if not line.startswith(_ITEM):
-                raise SourceError(f"{path}: {line[:40]!r}, expected ITEM: as LAMMPS writes it")
-            name = re.split(r" (?=[a-z])|(?<=BOUNDS)", line.removeprefix(_ITEM).strip())[0]
-            if name != "ATOMS":
-                lines = 3 if name == "BOX BOUNDS" else 1
-                items[name] = [line, *(_line(stream) for _ in range(lines))]
-                continue
-            if "UNITS" in items:
-                units = _units(items["UNITS"][1].strip())
-            found.append(_snapshot(path, items, line, stream.tell(), units))
-            _skip(found[-1], stream)
-            items = {}
-    return found
+    with _mapped(path) as content:
+        if content[-1:] != b"\n":
+            raise SourceError(f"{path}: its last line has no end, it is cut short")
+        return list(_snapshots(path, content))
+
+
+def _snapshots(path: Path, content: mmap) -> Iterator[Snapshot]:
+    begin, units = 0, _units("")
+    for atoms in _ATOMS.finditer(content):
+        head = content[begin : atoms.start()].decode("utf-8", "replace")
+        begin = content.find(b"\n" + _ITEM, atoms.end() - 1) + 1 or len(content)
+        items = dict(re.findall(r"ITEM: ([A-Z ]+)[^\n]*\n((?:(?!ITEM: ).*\n)*)", head))
+        items = {name.strip(): value.strip() for name, value in items.items()}
+        units = _units(items["UNITS"]) if "UNITS" in items else units
+        try:
+            count = int(items["NUMBER OF ATOMS"])
+            box = np.array([line.split()[:2] for line in items["BOX BOUNDS"].split("\n")], float)
+            time = float(items["TIME"]) if "TIME" in items else None
+        except (KeyError, ValueError):
+            raise SourceError(f"{path}: a frame's head is damaged") from None
+        labels = tuple(atoms[1].decode("utf-8", "replace").split())
+        if count < 1 or box.shape != (3, 2) or len(set(labels)) < max(len(labels), 1):
+            raise SourceError(f"{path}: a frame's head is damaged")
+        rows = slice(atoms.end(), begin)
+        yield Snapshot(path, rows, count, labels, box, " xy " in head, time, units)
 
 
 def _units(system: str) -> dict[str, str]:
@@ -108,41 +123,3 @@ def _units(system: str) -> dict[str, str]:
     length, time = _LENGTHS[system]
     places = dict.fromkeys("xyz", length)
     return {**places, **dict.fromkeys(("vx", "vy", "vz"), f"{length}/{time}"), "time": time}
-
-
-def _snapshot(
-    path: Path,
-    items: Mapping[str, list[str]],
-    atoms: str,
-    start: int,
-    units: Mapping[str, str],
-) -> Snapshot:
-    try:
-        count = int(items["NUMBER OF ATOMS"][1])
-        bounds = items["BOX BOUNDS"]
-        box = np.array([[float(cell) for cell in line.split()[:2]] for line in bounds[1:]])
-        time = float(items["TIME"][1]) if "TIME" in items else None
-    except (KeyError, ValueError, IndexError):
-        raise SourceError(f"{path}: a frame's head is damaged") from None
-    if count < 1 or box.shape != (3, 2):
-        raise SourceError(f"{path}: a frame with {count} atoms, expected 1 or more")
-    labels = atoms.removeprefix(f"{_ITEM}ATOMS").split()
-    if not labels or len(set(labels)) < len(labels):
-        raise SourceError(f"{path}: {atoms[:60]!r}, expected names of columns")
-    return Snapshot(path, start, count, labels, box, " xy " in bounds[0], time, units)
-
-
-def _skip(frame: Snapshot, stream: IO[bytes]) -> None:
-    last = b"\n"
-    for number in range(frame.count):
-        last = stream.readline(_LONGEST_LINE)
-        if last.startswith(_ITEM.encode()) or len(last.split()) < len(frame.labels):
-            raise SourceError(
-                f"{frame.path}: a frame has {number} of {frame.count} atoms, it is cut short"
-            )
-    if not last.endswith(b"\n"):
-        raise SourceError(f"{frame.path}: its last line has no end, it is cut short")
-
-
-def _line(stream: IO[bytes]) -> str:
-    return stream.readline(_LONGEST_LINE).decode("utf-8", "replace").rstrip("\r\n")

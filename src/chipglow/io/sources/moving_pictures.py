@@ -103,17 +103,18 @@ def _index(path: Path, size: int, changed: int) -> MovieIndex:
         times = (np.array(marks, np.float64) - marks[0]) * float(unit)
     elif rate:
         times = np.arange(len(shown)) / float(rate)
-    _check_end(path, kind, times, duration)
+    _check_end(path, kind, times, duration, rate)
     return MovieIndex(codec, *shape, len(shown), times, square)
 
 
 def _check_end(
-    path: Path, kind: str, times: NDArray[np.float64] | None, duration: int | None
+    path: Path, kind: str, times: NDArray[np.float64] | None, duration: int | None, rate: Any
 ) -> None:
     """Refuse a file that ends between two pictures, in the formats that do not count them."""
     short = False
-    if kind == "matroska" and duration and times is not None and len(times) > 1:
-        short = duration * 1e-6 > times[-1] + 1.5 * times[-1] / (len(times) - 1)
+    if kind == "matroska" and duration and times is not None:
+        step = times[-1] / (len(times) - 1) if len(times) > 1 else 1 / float(rate or 1)
+        short = duration * 1e-6 > times[-1] + 1.5 * step
     if kind == "gif":
         with path.open("rb") as file:
             file.seek(-min(_GIF_TAIL, path.stat().st_size), SEEK_END)

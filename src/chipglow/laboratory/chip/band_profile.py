@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
-from chipglow.camera.calibration.errors import CALIBRATION
+from chipglow.camera.calibration.calibration import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
 from chipglow.laboratory.chip.ridge import (

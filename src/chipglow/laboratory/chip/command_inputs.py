@@ -15,7 +15,7 @@ from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.tool_position import ToolUncertainty, tool_of
 from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import Position
-from chipglow.scene import PlacedTool, Tool
+from chipglow.scene import Tool
 from chipglow.text import Notes, load_described
 
 _FACE: Final = 200e-6
@@ -40,7 +40,7 @@ class ToolDescription(ToolSection):
     def build(self) -> Tool:
         """Return the tool in the measurement's coordinates."""
         tool = super().build()
-        return tool if self.tip is None else PlacedTool(tool, self.tip)
+        return tool if self.tip is None else tool.at(self.tip)
 
 
 def load_tool(path: str | Path) -> Tool:

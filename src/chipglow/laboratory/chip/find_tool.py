@@ -13,7 +13,7 @@ from scipy.special import ndtr
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.tool_position import ToolUncertainty
 from chipglow.quantities import Array
-from chipglow.scene import PlacedTool, Raster, ToolGeometry
+from chipglow.scene import Raster, ToolGeometry
 from chipglow.text import Notes
 
 _REACH: Final = 6
@@ -41,7 +41,7 @@ _SHIFT: Final = 0.5 / sqrt(3.0)
 class FoundTool:
     """A tool detected in an image."""
 
-    tool: PlacedTool
+    tool: ToolGeometry
     """The tool in the measurement's coordinates."""
     uncertainty: ToolUncertainty
     """Standard uncertainties of its place and its rake angle."""
@@ -293,11 +293,11 @@ def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float,
     return row - 1 + float((upper - level[hottest] / 2) / (upper - lower)), True
 
 
-def _placed(tool: ToolGeometry, raster: Raster, line: Array, tip_row: float) -> PlacedTool:
+def _placed(tool: ToolGeometry, raster: Raster, line: Array, tip_row: float) -> ToolGeometry:
     """Place the tool with its lowest point at the tip's row and its face on the line."""
     tip_y = raster.top - raster.spacing * (tip_row + 0.5)
     foot = tool.rake_foot + np.array([0.0, tip_y])
     row = (raster.top - foot[1]) / raster.spacing - 0.5
     column = line[0] + line[1] * ((raster.rows - 1) / 2 - row)
     on_line = raster.left + raster.spacing * (column + 0.5)
-    return PlacedTool(tool, (float(on_line - foot[0]), float(tip_y)))
+    return tool.at((float(on_line - foot[0]), float(tip_y)))

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera import UNUSABLE, Measurement
-from chipglow.camera.calibration.errors import CALIBRATION
+from chipglow.camera.calibration.calibration import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.laboratory.chip.frames import (
     FRAMES,
