@@ -87,7 +87,7 @@ html_theme_options = {
 GENERATED.mkdir(exist_ok=True)
 (GENERATED / "study.yaml").write_text(study_text(Study()), encoding="utf-8")
 
-# The page on studies shows what the schema itself says of every field of the cut.
+# The page on studies shows the schema's description of every field of the cut.
 (GENERATED / "fields.md").write_text(field_tables(Study().cutting, "cutting"), encoding="utf-8")
 
 # So does the page on imports.

@@ -12,7 +12,7 @@ from sphinx.writers.html5 import HTML5Translator
 logger = logging.getLogger(__name__)
 
 OPERATOR: Final = re.compile(r"<(mi|mo)>([A-Za-z]{2,})</\1>(?=(<mo [^>]*>&#x00028;|<mrow><mo)?)")
-"""The name of a function, and the parenthesis after it if there is one."""
+"""The name of a function, with the parenthesis after it if present."""
 
 LONE_UPRIGHT: Final = re.compile(r"\\mathrm\{(\w)\}")
 """One upright letter in braces, which latex2mathml would make italic."""
@@ -25,7 +25,7 @@ def inline(translator: HTML5Translator, node: nodes.math) -> None:
 
 
 def block(translator: HTML5Translator, node: nodes.math_block) -> None:
-    """Write an equation of its own."""
+    """Write a displayed equation."""
     translator.body.append(f'<div class="math-block">{mathml(node, "block")}</div>\n')
     raise nodes.SkipNode
 

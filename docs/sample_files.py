@@ -102,7 +102,7 @@ def a_chip(folder: Path) -> None:
 
 
 def recordings(folder: Path) -> None:
-    """Write a recording by a camera, and numbers whose meaning has to be said."""
+    """Write a recording by a camera, and numbers whose meaning must be stated."""
     write_hcc(folder / "chip.hcc", sliding_chip())
     counts = sliding_chip().signal[:, ::4, ::4]
     for number, frame in enumerate(counts[:2], 1):

@@ -167,7 +167,7 @@ def test_a_page_opens_only_with_the_token(server, visit, model):
     assert page.get_by_label("Pixel pitch", exact=True).first.input_value() == "6"
 
 
-def test_knobs_change_what_the_library_says(page, model):
+def test_controls_change_what_the_library_says(page, model):
     for label, text, texts in (
         ("Pixel pitch", "5", {"camera.pitch": "5"}),
         (
@@ -303,7 +303,7 @@ def test_downloads_hold_what_is_shown(visit, tmp_path, model):
     sheet = tmp_path / "chipglow.png"
     started.value.save_as(sheet)
     assert Image.open(sheet).convert("L").getextrema()[0] < 50 < sheet.stat().st_size / 1000
-    # What was saved is opened again, and it has no knobs of a camera.
+    # What was saved is opened again, and it has no controls of a camera.
     page.locator("input[type=file]").set_input_files(saved)
     page.wait_for_url("**open=*")
     page.get_by_text(saved.name, exact=True).wait_for()

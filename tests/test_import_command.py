@@ -317,7 +317,7 @@ def test_what_cannot_be_is_one_line(arrays, tmp_path, settings, wrong):
         ("empty.npz", b"", "empty.npz"),
         ("import.yaml", b"source: [", "import.yaml"),
         ("import.yaml", b"fields: {}", "source: is missing"),
-        ("import.yaml", b"- a list", "is no section"),
+        ("import.yaml", b"- a list", "is not a section"),
     ],
 )
 def test_what_is_no_source_is_one_line(tmp_path, name, content, wrong):

@@ -133,12 +133,12 @@ def test_a_response_file_weighs_the_band(tmp_path):
 @pytest.mark.parametrize(
     ("camera", "wrong"),
     [
-        ({"detector_pitch": "15 um"}, "magnification: is missing"),
-        ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, expected over 0"),
+        ({"detector_pitch": "15 um"}, "magnification: must be given"),
+        ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, must be positive"),
         ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "makes 6 um"),
         ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
         ({"preset": {}}, "{} is unknown, expected one of flir-lepton-3"),
-        ({"preset": "alpha-nir"}, "magnification: is missing"),
+        ({"preset": "alpha-nir"}, "magnification: must be given"),
         ({"psf": {"kind": "airy", "f_number": 2.5}}, "magnification: is missing, expected it with"),
         ({"psf": {"kind": "airy"}}, "expected one of numerical_aperture and f_number"),
         (

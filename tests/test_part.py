@@ -114,7 +114,7 @@ def test_comment_schema_and_documentation_say_the_same():
 def test_a_family_finds_parts_of_other_packages(monkeypatch):
     family = Family("furniture")
     family.add("shelf", Shelf)
-    with pytest.raises(ValueError, match="furniture: 'shelf' is no new kind"):
+    with pytest.raises(ValueError, match="furniture: 'shelf' is not a new kind"):
         family.add("shelf", GaussianPSF)
     family.add("shelf", Shelf)  # as a notebook's cell does that is run again
     entry = EntryPoint("gauss", "chipglow.camera:GaussianPSF", "chipglow.furniture")

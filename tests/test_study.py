@@ -169,7 +169,7 @@ REFUSED = [
         "cutting: {window: {band_duration: 5 us}}",
         "5 us is shorter than the exposure, expected 10 us",
     ),
-    ("cutting: 3", "cutting: 3 is no section, expected keys of speed"),
+    ("cutting: 3", "cutting: 3 is not a section, expected keys of speed"),
     ("camera: {band: 5.1-3.8 um}", "camera.band: 5.1-3.8 um is reversed"),
     (
         "{camera: {integration_time: 200 us}, cutting: {window: {start: 1.579 mm, end: 1.958 mm}}}",
@@ -184,7 +184,7 @@ REFUSED = [
     ("camera: {psf: {kind: gaussian}}", "camera.psf.fwhm: is missing"),
     ("camera: {psf: {kind: measured, file: no.npy, spacing: 1 um}}", "no.npy: No such file"),
     ("camera: {psf_order: pixels}", "psf_order: 'pixels', expected 'optics' or 'detector'"),
-    ("surface: {chips: {}}", "surface: chips: {} is empty, expected one chip or more"),
+    ("surface: {chips: {}}", "surface: chips: {} is empty, must have a chip"),
     (
         "surface: {chips: {a: chip-3}}",
         "surface.chips.a: 'chip-3' is unknown, expected one of chip-1",
@@ -203,7 +203,7 @@ REFUSED = [
         "cutting: {tool: {outline: none.csv}}",
         "none.csv: No such file or directory, expected a file",
     ),
-    ("- 1", "[1] is no section"),
+    ("- 1", "[1] is not a section"),
     ("a: [1,", "line 1, column 7: "),
     ("seed: 1\nseed: 2", "line 2, column 1: duplicate key 'seed'"),
     ("x: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
@@ -447,7 +447,7 @@ def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
     assert [sentence[:23] for sentence in fitted.notes.assumed] == [
         "The scene has no tool: ",
         "The scene shows no tool",
-        "The scene does not say ",
+        "The scene does not stat",
     ]
 
 

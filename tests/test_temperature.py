@@ -454,7 +454,7 @@ def test_the_command_takes_the_line_of_several_temperatures(folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "expected none with a file"),
+        (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "omit the option"),
         (["--emissivity", "e.nc"], "is known of other, expected one of the regions"),
         (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),
     ],

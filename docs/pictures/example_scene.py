@@ -3,7 +3,7 @@
     python docs/pictures/example_scene.py
 
 A part of the quick study's cut: every second frame from the time at which its first shear band is
-developed, and the whole chip at the end. It is cut anew where it is not in the cache.
+developed, and the whole chip at the end. The cut is computed if it is not in the cache.
 """
 
 import json

@@ -78,7 +78,7 @@ def print_thermometers() -> None:
 
 
 def draw_images(errors: xr.Dataset, raster: Raster, tool: Any) -> None:
-    """Truth, ratio temperature, and what makes its error."""
+    """Truth, ratio temperature, and the causes of its error."""
     with drawing.style():
         figure = drawing.image_figure(raster, 2.6, 3)
         axes = figure.subplots(3, 2, sharex=True, sharey=True)
@@ -101,7 +101,7 @@ def draw_images(errors: xr.Dataset, raster: Raster, tool: Any) -> None:
 
 
 def print_study(grey: xr.Dataset, metal: xr.Dataset) -> None:
-    """Rows of the table of bands, the least error first."""
+    """Rows of the table of bands, the smallest error first."""
     frame = wavelengths_frame(grey).assign(metal_K=wavelengths_frame(metal).emissivity_K)
     for place, rows in frame.groupby("place", sort=False):
         truth = grey.truth.sel(place=place)

@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def draw(rows: list[Any]) -> Figure:
-    """Errors of all repeats as fractions of their own intervals."""
+    """Errors of all repeats as fractions of their intervals."""
     kinds = np.array([Laboratory(seed).optics.kind for seed in range(REPEATS)])
     with style():
         figure = new_figure(3.4)
@@ -81,7 +81,7 @@ def draw(rows: list[Any]) -> Figure:
                 )  # fmt: skip
         axes.set_yticks(range(len(QUANTITIES)), list(QUANTITIES))
         axes.invert_yaxis()
-        axes.set_xlabel("error over half the width of its own 95 % interval")
+        axes.set_xlabel("error over half the width of its 95 % interval")
         axes.legend(title="optics", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 

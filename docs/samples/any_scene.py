@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 AMBIENT: Final = 293.0
 
 POWER, SPEED = 90.0, 0.8
-"""Absorbed laser power in W and scanning speed in m/s, as of laser powder-bed fusion."""
+"""Absorbed laser power in W and scanning speed in m/s, typical of laser powder-bed fusion."""
 
 CONDUCTIVITY, DIFFUSIVITY = 30.0, 5.4e-6
-"""Of hot stainless steel, in W/(m K) and m²/s."""
+"""Conductivity and diffusivity of hot stainless steel, in W/(m K) and m²/s."""
 
 HOTTEST_POOL: Final = 3500.0
 

@@ -17,7 +17,7 @@ FIRST: Final = 395e-6
 
 
 def closed_form_chip(frames: int) -> Scene:
-    """Frames 1 us apart with samples of 4 um; the band is greatest 28 us after the first."""
+    """Frames 1 us apart with samples of 4 um; the band is hottest 28 us after the first."""
     return late(AnalyticChip(raster=COARSE, frames=frames, frame_spacing=1e-6))
 
 

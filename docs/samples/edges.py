@@ -19,7 +19,7 @@ NOISE: Final = 0.005
 
 
 def seen(bright: NDArray[np.float64], psf: PointSpreadFunction) -> NDArray[np.float64]:
-    """What pixels see of fine samples: blurred, then the mean over each pixel's square."""
+    """Return pixel values of fine samples: blurred, then the mean over each pixel's square."""
     fine = blur(bright, psf, PITCH / PER_SENSOR)
     count = len(fine) // PER_SENSOR
     return fine.reshape(count, PER_SENSOR, count, PER_SENSOR).mean(axis=(1, 3))

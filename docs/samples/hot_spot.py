@@ -2,7 +2,7 @@
 
     python docs/samples/hot_spot.py
 
-draws it anew. FFmpeg is taken from the path, or from ``pip install imageio-ffmpeg``.
+draws it again. FFmpeg is taken from the path, or from ``pip install imageio-ffmpeg``.
 """
 
 import shutil

@@ -1,6 +1,6 @@
 """Two frames of a block that is hot on its left side, as files of other programs.
 
-Lengths are in mm and temperatures in °C where the program has no units of its own.
+Lengths are in mm and temperatures in °C where the program has no units.
 """
 
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 COLUMNS, ROWS = 51, 41
 STEP: Final = 4e-3
-"""How far the block moves to the left from frame to frame, in mm."""
+"""Displacement of the block to the left from frame to frame, in mm."""
 MICROSECOND: Final = 1e-6
 
 

@@ -14,7 +14,7 @@ from chipglow.quantities.units import TEMPERATURE_DIFFERENCE
 class HotSpot(Part):
     """The hottest pixels of every frame, averaged over the frames."""
 
-    pixels: Annotated[int, Parameter("How many pixels of a frame.", least=1)] = 5
+    pixels: Annotated[int, Parameter("Number of pixels of a frame.", least=1)] = 5
     calibration: Annotated[
         float,
         Parameter("Standard uncertainty of the calibration.", TEMPERATURE_DIFFERENCE, least=0.0),

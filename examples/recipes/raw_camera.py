@@ -1,4 +1,4 @@
-"""A camera's file: a header of four numbers, then frames of 16 bits.
+"""A camera file: a header of four numbers, then frames of 16 bits.
 
 An entry point makes `chipglow convert` read it; in the pyproject.toml of the package::
 
@@ -26,12 +26,12 @@ def read(path: Path, frames: slice | None, interval: float | None) -> Recording:
     """Read frames; what is wrong with a file is one SourceError that names it."""
     data = path.read_bytes()
     if len(data) < HEADER.itemsize:
-        raise SourceError(f"{path}: is cut short, expected a header of {HEADER.itemsize} bytes")
+        raise SourceError(f"{path}: truncated, expected a header of {HEADER.itemsize} bytes")
     header = np.frombuffer(data, HEADER, 1)[0]
     shape = (int(header["rows"]), int(header["columns"]))
     samples, over = divmod(len(data) - HEADER.itemsize, 2 * max(shape[0] * shape[1], 1))
     if over or not samples:
-        raise SourceError(f"{path}: is cut short, expected whole frames of {shape[0]} x {shape[1]}")
+        raise SourceError(f"{path}: truncated, expected whole frames of {shape[0]} x {shape[1]}")
     signal = np.frombuffer(data, "<u2", offset=HEADER.itemsize).reshape(samples, *shape)
     chosen = frames or slice(None)
     times = np.arange(samples) * (interval or float(header["period_us"]) * 1e-6)

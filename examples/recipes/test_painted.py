@@ -21,7 +21,7 @@ def test_a_study_lays_the_paint_and_the_camera_sees_it_by_plancks_law():
     scene = Scene.from_fields(Raster(0.0, 0.0, 1e-6, 120, 120), [0.0, 5e-6, 10e-6], plate)
     seen = Camera(psf=None, frame_rate=1e5, lower_limit=None).measure(scene, surface, 0.0)
     band = Band(3.8e-6, 5.1e-6)
-    # Of the pixels of 6 um one is whole in the paint, the other whole beside it.
+    # One pixel of 6 um lies in the paint, the other next to it.
     assert seen.radiance[0, 10, 10] == pytest.approx(0.95 * band.radiance(900.0), rel=1e-5)
     assert seen.radiance[0, 2, 2] == pytest.approx(0.2 * band.radiance(900.0), rel=1e-5)
 

@@ -1,4 +1,4 @@
-"""The recipe of a camera's file: frames come back, damage is one error."""
+"""The recipe of a camera file: frames come back, damage is one error."""
 
 from importlib.metadata import EntryPoint
 
@@ -30,7 +30,7 @@ def test_frames_come_back_with_their_times(tmp_path):
 def test_a_file_that_is_cut_short_is_one_error_with_its_name(tmp_path, length):
     path = written(tmp_path / "a.raw16", np.zeros((1, 3, 4)))
     path.write_bytes(path.read_bytes()[:length])
-    with pytest.raises(SourceError, match=r"a\.raw16: is cut short, expected"):
+    with pytest.raises(SourceError, match=r"a\.raw16: truncated, expected"):
         read(path, None, None)
 
 

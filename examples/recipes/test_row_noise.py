@@ -1,4 +1,4 @@
-"""The recipe of a detector term: mean and variance of its counts are those of theory."""
+"""The recipe of a detector term: mean and variance of its counts agree with theory."""
 
 import numpy as np
 import pytest

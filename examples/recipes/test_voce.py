@@ -1,4 +1,4 @@
-"""The recipe of a flow law: stress and slopes by hand, and a material's file that names it."""
+"""The recipe of a flow law: stress and slopes by hand, and a material file that names it."""
 
 from math import exp
 from pathlib import Path

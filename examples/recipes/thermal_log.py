@@ -31,7 +31,7 @@ class ThermalLog(Source, Part):
     offset: Annotated[float, Parameter("Added to the temperatures, in K.")] = 0.0
 
     def survey(self) -> Survey:
-        """Look at what is there."""
+        """Survey the file."""
         values, spacing, interval = self._read()
         count, rows, columns = values.shape
         return Survey(

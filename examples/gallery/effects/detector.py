@@ -13,7 +13,7 @@ and gains:
    N_{ij} = g_{ij}\, \eta\, \Phi\, t_e + d_{ij} .
 
 What you see: the same frame of a chip, and below it the change by noise, by patterns of 3 % in gain
-and 40 000 electrons in the dark, and by what a correction leaves.
+and 40 000 electrons in the dark, and by the residual of a correction.
 
 Source: EMVA 1288. More: :doc:`/understand/detector`.
 """

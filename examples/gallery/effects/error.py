@@ -5,7 +5,7 @@ The error, and the optics' part of it
 .. image:: images/sphx_glr_error_001.png
    :alt: The error, and the optics' part of it
 
-The paper's error of a pixel is the measured radiance temperature less the *greatest* that was
+The paper's error of a pixel is the measured radiance temperature minus the *largest* that was
 there:
 
 .. math:: e = T_\mathrm{measured}
@@ -16,7 +16,7 @@ rest is the mean over the detector's footprint and over the exposure.
 
 What you see, where the radiance temperature is over the camera's lower range limit of 300 °C: the
 error is largest where the temperature is steep, at the rake face and beside the shear band, and the
-optics make it *smaller* in places: light from what is hot falls on what is cold.
+optics *reduce* it in places: light from hot areas falls on cold ones.
 
 Source: Figures 10 and 11 of Heigel and Whitenton (2010). More: :doc:`/learn/paper-study`.
 """

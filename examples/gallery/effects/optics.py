@@ -1,9 +1,9 @@
 r"""
-What the optics add and take away
-=================================
+Light added and removed by the optics
+=====================================
 
 .. image:: images/sphx_glr_optics_001.png
-   :alt: What the optics add and take away
+   :alt: Light added and removed by the optics
 
 Between a scene and its image stand windows that absorb and radiate, lenses that shine by
 themselves, the reflected image of the cold detector (narcissus), light scattered far (veil, the

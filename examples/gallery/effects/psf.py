@@ -5,7 +5,7 @@ Point spread functions
 .. image:: images/sphx_glr_psf_001.png
    :alt: Point spread functions
 
-The optics make a spot of every point. The spot of a pupil :math:`P` with a path difference
+The optics image every point as a spot. The spot of a pupil :math:`P` with a path difference
 :math:`W` (defocus, and aberrations as Zernike polynomials) is, at one wavelength,
 
 .. math:: \mathrm{PSF}_\lambda(x, y) \propto \left| \iint P(u, v)\,
@@ -16,7 +16,7 @@ and what the camera has is its mean over the band. Diffusion of charge, motion a
 further.
 
 What you see: a pupil of numerical aperture 0.28 with an obscuration of 0.35 over 3.8 µm to 5.1 µm,
-and what each effect alone makes of it; the root of the density, so that the faint parts show, and
+and the spot with each effect alone; the root of the density, so that the faint parts show, and
 the peak.
 
 Source: Goodman, *Introduction to Fourier Optics*; Zernike's polynomials in Noll's order. More:

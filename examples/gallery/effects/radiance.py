@@ -6,8 +6,8 @@ Emissivity: radiance temperature is not temperature
    :alt: Emissivity: radiance temperature is not temperature
 
 A camera measures radiance, and a chip radiates less than a blackbody does. Its *radiance
-temperature* is that of the blackbody with the same radiance in the camera's band. For an emissivity
-:math:`\varepsilon` it is
+temperature* is the temperature of the blackbody with the same radiance in the camera's band. For an
+emissivity :math:`\varepsilon` it is
 
 .. math:: T_r = L^{-1}\bigl(\varepsilon L(T) + (1 - \varepsilon) L(T_\mathrm{env})\bigr),
    \qquad L(T) = \int_{\lambda_1}^{\lambda_2}
@@ -30,7 +30,7 @@ ENVIRONMENT = 293.0
 
 
 def radiance_temperature(band, true, emissivity):
-    """Of a grey surface in surroundings of 293 K, in K."""
+    """Return the radiance temperature of a grey surface in surroundings of 293 K, in K."""
     seen = emissivity * band.radiance(true) + (1 - emissivity) * band.radiance(ENVIRONMENT)
     return band.temperature(seen)
 
@@ -52,7 +52,7 @@ with style():
         right.plot(celsius, error, color=colour, label=name)
     right.legend(title="emissivity 0.42")
     for axes in (left, right):
-        axes.set(xlabel="true temperature / °C", ylabel="radiance less true temperature / K")
+        axes.set(xlabel="true temperature / °C", ylabel="radiance minus true temperature / K")
 
 # %%
 # The same numbers, to compare with:

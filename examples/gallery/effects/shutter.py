@@ -12,8 +12,8 @@ time :math:`t_l`. What moves at :math:`v` along the rows is skewed by
 
 a row; what stands still is seen as with a global shutter.
 
-What you see: hot segments of 60 µm that move to the right at 4 m/s, exposed for 2 µs; 0.25 µs a row
-make 1 µm a row, so the last row sees them 79 µm farther to the right.
+What you see: hot segments of 60 µm that move to the right at 4 m/s, exposed for 2 µs; 0.25 µs per
+row make 1 µm a row, so the last row sees them 79 µm farther to the right.
 
 More: :doc:`/understand/detector`.
 """
@@ -43,7 +43,7 @@ temperature = np.repeat(kelvins[:, None, :], SCENE.rows, axis=1)
 fields = {"temperature": temperature, "material": np.ones(temperature.shape, np.uint8)}
 scene = Scene.from_fields(SCENE, times, fields)
 
-shutters = {"global shutter": None, f"rolling, {1e6 * LINE_TIME:g} µs a row": LINE_TIME}
+shutters = {"global shutter": None, f"rolling, {1e6 * LINE_TIME:g} µs per row": LINE_TIME}
 frames = [
     replace(CAMERA, line_time=line_time).measure(scene, SURFACE, 0.0).celsius()
     for line_time in shutters.values()
@@ -66,7 +66,7 @@ with style():
     figure.colorbar(difference, ax=panels[2], label="change / K", extend="both")
 
 # %%
-# How far to the right the last row sees them, and the greatest change of a pixel:
+# Displacement of the segments in the last row, and the largest change of a pixel:
 
 last = CAMERA.pixels(SCENE).rows - 1
 print(f"{1e6 * last * SPEED * LINE_TIME:.1f} um, {np.abs(change).max():.0f} K")

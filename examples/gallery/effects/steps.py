@@ -16,7 +16,7 @@ and only then is the radiance turned into a temperature.
 
 What you see, with the highest value of each: a chip in closed form, its hot contact with the tool
 and its shear band. An exposure of 8 µs smears the band, which moves and still grows; pixels of 12
-µm and the point spread function take most from what is hot and narrow.
+µm and the point spread function reduce hot and narrow features most.
 
 Source: Figure 6 of Heigel and Whitenton (2010). More: :doc:`/understand/physics`,
 :doc:`/understand/optics`.
@@ -40,7 +40,7 @@ sharp = chipglow.Camera(
     psf=None, pitch=4e-6, integration_time=1e-7, lower_limit=None, reflected=293.0
 )
 cameras = {
-    "what is there": sharp,
+    "scene": sharp,
     "exposure of 8 µs": replace(sharp, integration_time=8e-6),
     "pixels of 12 µm": replace(sharp, integration_time=8e-6, pitch=12e-6),
     "point spread function": replace(

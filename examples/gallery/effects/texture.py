@@ -13,7 +13,7 @@ from 6 000 /s to 30 000 /s the chip becomes shear band:
    + c\,\varepsilon_\mathrm{chip}\bigr]
    + b\,\varepsilon_\mathrm{band} .
 
-What you see: emissivities drawn from the paper's Table 1 in grains of 20 µm, and what they make of
+What you see: emissivities drawn from the paper's Table 1 in grains of 20 µm, and their effect on
 the radiance temperature. The texture moves with the material.
 
 Source: "Create emissivity maps for each feature" and Equation 3 of Heigel and Whitenton (2010).

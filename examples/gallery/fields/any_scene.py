@@ -28,7 +28,7 @@ from chipglow.report.figures import error_images, error_lines
 from chipglow.study import errors
 
 # %%
-# The studies are those of the page: each says surface, camera and places.
+# The studies stand on the page: each states surface, camera and places.
 
 files = sample_files.folder("any-scene")
 page = (sample_files.HERE / "do" / "any-scene.md").read_text(encoding="utf-8")

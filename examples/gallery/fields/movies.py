@@ -12,8 +12,8 @@ takes the place of the nearest one of the legend in CIE L*a*b*,
    |\mathbf{c} - \mathbf{c}_k| \to \min .
 
 What you see: a picture of a movie that FFmpeg drew, the temperature that was read from it, and its
-error against what FFmpeg was asked to draw. Under the mesh lines the value is that of the nearest
-pixel that shows one.
+error against what FFmpeg was asked to draw. Under the mesh lines the value is taken from the
+nearest pixel that shows one.
 
 Source: the paper's own way, an AVI exported by a finite-element program. More:
 :doc:`/do/import-movie`.

@@ -9,8 +9,8 @@ The files in which AdvantEdge, DEFORM, Abaqus, LS-DYNA, Ansys and OpenFOAM would
 block, in mm and °C, or in SI: each is imported with its description in the documentation.
 
 What you see: the temperature that arrives. A wrong unit, axis or origin would show; below is how
-far the six are from what was written: linear between nodes 10 µm apart, or constant in OpenFOAM's
-cells.
+far the six differ from the written values: linear between nodes 10 µm apart, or constant in
+OpenFOAM's cells.
 
 More: :doc:`/do/import` and :doc:`/do/from-programs`.
 """

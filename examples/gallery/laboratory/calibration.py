@@ -5,9 +5,9 @@ Calibration with blackbodies
 .. image:: images/sphx_glr_calibration_001.png
    :alt: Calibration with blackbodies
 
-Blackbodies of known temperature tell what a count means. A straight line over the in-band radiance
-needs the band; the Planckian form of Sakuma and Hattori finds its effective wavelength from the
-points:
+Blackbodies of known temperature relate counts to radiance. A straight line over the in-band
+radiance needs the band; the Planckian form of Sakuma and Hattori finds its effective wavelength
+from the points:
 
 .. math:: S = S_0 + g\,L(T) \qquad\text{or}\qquad
    S = S_0 + \frac{C}{\exp\bigl(c_2/(A\,T + B)\bigr) - 1} .
@@ -56,7 +56,7 @@ fits = {
 figure = draw_calibrations(fits)
 
 # %%
-# How far the Planckian form is from the integral over several bands, without any noise, and what a
+# Difference of the Planckian form from the integral over several bands, without noise, and what a
 # straight line over the radiance of a wrong band leaves:
 
 for lower, upper, coldest, hottest in (

@@ -14,7 +14,7 @@ of a blackbody,
 What you see: left, a simulated chip in a file of Telops' format, as counts; right, a frame of a
 real FLIR T420 through its own constants.
 
-Source: the layouts are described, with what was tested, on :doc:`/do/camera-files`.
+Source: the layouts and their tests are described on :doc:`/do/camera-files`.
 """
 
 import lzma
@@ -54,7 +54,7 @@ with style():
         figure.colorbar(picture, ax=axes, label=unit, fraction=0.036)
 
 # %%
-# What the camera was set to for the object, and what had to be assumed:
+# The camera's settings for the object, and the assumptions:
 
 print(real.object_parameters)
 print(*simulated.notes.assumed, *real.notes.assumed, sep="\n")

@@ -1,9 +1,9 @@
 r"""
-Measured beside simulated
-=========================
+Measured and simulated
+======================
 
 .. image:: images/sphx_glr_compare_001.png
-   :alt: Measured beside simulated
+   :alt: Measured and simulated
 
 Which emissivities describe the chip? Differences at the rake face and along the shear band are
 judged by their uncertainties,

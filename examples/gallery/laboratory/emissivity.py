@@ -5,7 +5,7 @@ Emissivity of a heated chip
 .. image:: images/sphx_glr_emissivity_001.png
    :alt: Emissivity of a heated chip
 
-A chip is heated to a known temperature and looked at. What it radiates beyond its reflections, over
+A chip is heated to a known temperature and recorded. Its radiance without reflections, over
 what a blackbody would, is its emissivity:
 
 .. math:: \varepsilon = \frac{L_\mathrm{app} - L(T_\mathrm{env})}{L(T) - L(T_\mathrm{env})} .
@@ -38,7 +38,7 @@ found = determine_emissivity([heated(chip, background, at_391.reference)], at_39
 figure = draw_emissivity(found, REGIONS)
 
 # %%
-# What was put in, what comes back with its standard and expanded uncertainty, and what makes them:
+# Input, result with standard and expanded uncertainty, and the uncertainty budget:
 
 samples = {area.name: area.mask for area in areas(heated_chip.fine(REGIONS), heated_chip.RASTER)}
 for area in areas(REGIONS, found.raster):
@@ -74,8 +74,8 @@ for line in lines:
     )
 
 # %%
-# What blur makes of narrow bands
-# -------------------------------
+# The effect of blur on narrow bands
+# ----------------------------------
 #
 # The mean of a band of 0.53 in a body of 0.42, by its width; of all its pixels, and with one and
 # two pixels left out on either side.

@@ -45,7 +45,7 @@ print("\n".join(sentences(found)))
 
 
 def in_temperature(measurement):
-    """The same image with the temperature in the place of the radiance: what not to do."""
+    """The same image with temperature instead of radiance: a mistake to avoid."""
     wrong = measurement.data.copy(deep=True)
     wrong["radiance"].values[:] = wrong["radiance_temperature"].values
     return Measurement(wrong)

@@ -6,8 +6,8 @@ Temperature along the rake face
    :alt: Temperature along the rake face
 
 The paper lays squares of 3 by 3 pixels on the chip, which stand on the rake face, and averages the
-radiance temperature in each. Pixels in a turned square do not lie evenly about its middle, so the
-mean weights them:
+radiance temperature in each. Pixels in a turned square are not distributed evenly around its
+centre, so the mean weights them:
 
 .. math:: \sum_i w_i = 1, \qquad \sum_i w_i\,\mathbf{r}_i = \mathbf{r}_\mathrm{middle}, \qquad
    \sum_i w_i^2 \to \min .
@@ -30,7 +30,7 @@ grid = chipglow.rake_grid(measured, measured.tool)
 figure = draw_rake_grid(measured, grid)
 
 # %%
-# Where nobody says where the tool is, it is found in the image, with its uncertainty:
+# If the tool's position is not given, it is found in the image, with its uncertainty:
 
 found = chipglow.find_tool(measured)
 print(f"true rake angle: {degrees(measured.tool.rake_angle):.1f}°")

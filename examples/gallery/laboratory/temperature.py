@@ -11,7 +11,7 @@ temperature gives that temperature:
 .. math:: T = L^{-1}\!\left(
    \frac{L_\mathrm{app} - (1 - \varepsilon)\, L(T_\mathrm{env})}{\varepsilon}\right) .
 
-What is wrong in both, the camera's calibration and the room, is one error and does not count twice.
+Errors common to both, of the camera's calibration and the room, count once.
 
 What you see: the regions of a chip at 470 °C, as a blackbody's radiance would have it, and with the
 emissivity that was measured at 391 °C and 570 °C, a line between; bars are 95 % intervals.

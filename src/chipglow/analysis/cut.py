@@ -29,13 +29,13 @@ Progress: TypeAlias = Callable[[str, float], None]
 """Told what is being done and which fraction of it, 0 to 1, is done."""
 
 _DEVELOPED: Final = 0.95
-"""Rise of a developed band's mean temperature, as a fraction of the greatest."""
+"""Rise of a developed band's mean temperature, as a fraction of the largest."""
 
 _AROUND: Final = 2
 """Instants from the developed band to the one that still develops, and to the one that moved."""
 
 _NEEDED: Final = {
-    "plastic_strain": "plastic strain: no chip is told from the workpiece",
+    "plastic_strain": "plastic strain: the chip is not distinguished from the workpiece",
     "plastic_strain_rate": "plastic strain rate: no shear band is looked for",
     "velocity_x": "velocity: the chip's speed and shape are not measured",
 }
@@ -159,7 +159,7 @@ def other_starts(scene: Scene, duration: float) -> list[float]:
 
 
 def _developed(scene: Scene, instants: list[Instant]) -> int:
-    """Return the number of the first instant whose band is near its greatest temperature."""
+    """Return the index of the first instant whose band is near its highest temperature."""
     means = np.array([instant.mean_temperature for instant in instants])
     if np.isnan(means).all():
         raise NoShearBandError("shear band: none is found in any of the exposures")

@@ -15,7 +15,7 @@ PIXEL_PHASE: Final = "pixel phase"
 """Position of the pixels on the scene: a known population, of which every value is as likely."""
 
 TOGETHER: Final = "causes together"
-"""What no cause makes by itself: it needs two or three of them."""
+"""Interactions: the scatter that no single cause explains."""
 
 COVERAGE: Final = 0.95
 """Probability of `Distribution.interval` and `Distribution.expanded_uncertainty`."""
@@ -25,7 +25,7 @@ _LEAST_FREEDOM: Final = 2.0
 
 
 def student_factor(freedom: float) -> float:
-    """Return the coverage factor with so many degrees of freedom; infinite below two."""
+    """Return the coverage factor for a number of degrees of freedom; infinite below two."""
     return float(stdtrit(freedom, (1 + COVERAGE) / 2)) if freedom >= _LEAST_FREEDOM else inf
 
 
@@ -78,7 +78,7 @@ class Distribution:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest draw."""
+        """Smallest and largest draw."""
         return float(self.values.min()), float(self.values.max())
 
     @cached_property
@@ -104,7 +104,7 @@ class Distribution:
 
         The phases are a known population, the other causes random: t distributions around the mean
         of each phase, with the sum of their variances (JCGM 100, G.4). With finite limits the
-        interval is that of the logarithm or the logit.
+        interval is computed for the logarithm or the logit.
         """
         low, high = self.limits
         if not isfinite(low) or not low < self.range[0] <= self.range[1] < high:

@@ -75,7 +75,7 @@ class Analysis:
     data : xarray.Dataset
         Every number, in SI units; `chipglow.analysis.reductions` reads it.
     plan : Plan
-        What was analysed.
+        The plan of the analysis.
     camera : Camera
         The camera.
     raster : Raster
@@ -85,17 +85,17 @@ class Analysis:
     tool : Tool or None
         The scene's tool.
     places : tuple of Place
-        Where the errors are read in the shown exposure.
+        Places at which the errors are read in the shown exposure.
     measurements : mapping
         By surface, one frame for each instant.
     cut : Cut or None
-        What only a cut has.
+        Segments, chip and forces of a cut.
     warnings, missing : tuple of str
         Sentences: what limits the validity of the results; what could not be analysed, and why.
     failed : mapping
         Parts of the analysis that failed, by title, with the reason.
     assumed : tuple of str
-        Sentences on what the scene or the study does not say.
+        Sentences on assumed settings of scene and study.
     """
 
     data: xr.Dataset
@@ -151,23 +151,23 @@ def analyse(
     Parameters
     ----------
     scene : Scene
-        What is truly there. Temperature alone is enough.
+        The true fields. Temperature alone is enough.
     surfaces : mapping
         Surfaces by name, such as chip 1 and chip 2.
     camera : Camera
         The camera.
     plan : Plan
-        What to analyse, and where.
+        Exposures, draws and places.
     progress : callable, optional
-        Called with what is being done and which fraction of it is done.
+        Called with the current step and the fraction of it that is complete.
     effects : mapping
-        What the axis ``effects`` of the result holds: by name a function that changes the camera
-        and the exposure. ``all`` is the first and changes nothing, ``without psf`` is there too.
+        The axis ``effects`` of the result: by name a function that changes the camera and the
+        exposure. ``all`` comes first and changes nothing; ``without psf`` is required.
 
     Returns
     -------
     Analysis
-        Of a scene that shows a cut, as the paper has it: the errors at the rake face and in the
+        For a scene that shows a cut, as in the paper: the errors at the rake face and in the
         shear band of each segment. Of any other scene, and at places of the plan: the errors there
         in each exposure.
 
@@ -399,7 +399,7 @@ def _image_variables(
             np.stack([stack for _, stack in looked.shown.values()]),
             _KELVIN,
         ),
-        # A detector may flag more than what is under the limit.
+        # A detector may flag more than the pixels below the limit.
         "flagged": (
             ("surface", *per_pixel),
             np.stack([~one.usable[shown] for one in every]),
@@ -449,7 +449,7 @@ def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Varia
     over = "instant", "ridge_point"
     curves = []
     for one in measurements.values():
-        # Whether under the lower limit or not.
+        # Pixels below the lower limit included.
         frames, pixels = one.band.temperature(one.radiance), one.raster
         curves.append(along(lambda i, band: sample(frames[i], pixels, band.ridge.points)))  # noqa: B023
     temperatures = [instant.temperatures for instant in cut.instants]

@@ -104,7 +104,7 @@ def _heated_chip(
     away = np.abs(raster.x - spacing * np.round(raster.x / spacing))
     inside = np.abs(raster.y - (raster.top - pitch * _ROWS / 2)) < pitch * (last - _ROWS / 2)
     material = np.where(inside, Material.WORKPIECE, Material.VOID)[:, None]
-    # Wholly shear band within its width: the rate says so, as in the developing band.
+    # Wholly shear band within its width, by the rate, as in the developing band.
     rate = np.where(away < width / 2, 1e6, 0.0)
     temperature = CHIP_TEMPERATURES.get(name, CHIP_TEMPERATURES["chip 1"])
     images = _images(camera, surface, textures, raster, temperature, material, rate)

@@ -23,12 +23,12 @@ Effect: TypeAlias = Callable[[Camera, Exposure], tuple[Camera, Exposure]]
 """Changes the camera or what reaches it, such as to switch an effect off."""
 
 ReferenceKind: TypeAlias = Literal["maximum", "mean", "centre", "true"]
-"""What the measured radiance temperature is compared with.
+"""The reference of the measured radiance temperature.
 
-``maximum`` (the paper's): the greatest radiance temperature, emissivity included, of any scene
+``maximum`` (the paper's): the largest radiance temperature, emissivity included, of any scene
 sample in the pixel's square during the exposure; ``mean``: that of the mean radiance over square
 and exposure; ``centre``: that of the sample under the pixel's centre in the middle of the
-exposure; ``true``: the greatest true temperature in the square during the exposure.
+exposure; ``true``: the largest true temperature in the square during the exposure.
 """
 
 LEAST_COVERED: Final = 0.05
@@ -71,9 +71,9 @@ def error_images(
     camera : Camera
         The camera, with its point spread function.
     exposure : Exposure
-        What reached it.
+        The exposure.
     reference : {"maximum", "mean", "centre", "true"}
-        What to compare with; the paper's is the maximum.
+        The reference; the paper's is the maximum.
 
     Returns
     -------
@@ -100,9 +100,9 @@ def error_parts(
     camera : Camera
         The camera.
     exposure : Exposure
-        What reached it.
+        The exposure.
     reference : {"maximum", "mean", "centre", "true"}
-        What to compare with; the paper's is the maximum.
+        The reference; the paper's is the maximum.
     untextured : Exposure, optional
         The same exposure with the surface's `Surface.without_texture`.
 
@@ -110,11 +110,11 @@ def error_parts(
     -------
     xarray.Dataset
         The variables of `error_images`, and parts of the error in K: ``emissivity``, radiance
-        temperature less true temperature if the reference is the true one; ``motion``, the mean
-        over the exposure less its greatest, at the samples that make the reference;
-        ``footprint``, the mean over the pixel's area less the reference of a scene that stands
+        temperature minus true temperature if the reference is the true one; ``motion``, the mean
+        over the exposure minus the maximum, at the samples of the reference;
+        ``footprint``, the mean over the pixel's area minus the reference of a scene that stands
         still; ``psf``; ``detector``. Their sum is ``case_1``. They include ``texture``, which is
-        there with `untextured`: the error less that of the surface without texture.
+        there with `untextured`: the error minus the error of the surface without texture.
 
     Notes
     -----
@@ -142,7 +142,7 @@ class ExposureImages:
         self._references: dict[tuple[object, ...], Array] = {}
 
     def reference(self, camera: Camera, kind: ReferenceKind | None = None) -> Array:
-        """Return the temperature in K of pixels without error, by default of the own kind."""
+        """Return the temperature in K of pixels without error, by default of its kind."""
         kind = kind or self.kind
         key = kind, camera.pitch, camera.offset, camera.shape, camera.fill_factor
         reference = self._references.get(key)
@@ -284,7 +284,7 @@ def reference_temperature(
 def _maximum(
     values: NDArray[np.floating], camera: Camera, exposure: Exposure, pixels: Raster
 ) -> NDArray[np.float64]:
-    """Return the greatest value of the samples in every pixel's sensitive square; NaN for none."""
+    """Return the largest value of the samples in every pixel's sensitive square; NaN for none."""
     grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
     known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
     columns = _covered(pixels.x - grid.left, side, grid.columns, grid.spacing)

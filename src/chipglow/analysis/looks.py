@@ -59,7 +59,7 @@ class Schedule:
 
     @property
     def varied_phases(self) -> tuple[int, ...]:
-        """Numbers of the pixel phases that the other cameras have."""
+        """Indices of the pixel phases of the other cameras."""
         along = range(0, self.phases, max(self.phases // _VARIED, 1))
         return tuple(row * self.phases + column for row in along for column in along)
 
@@ -177,7 +177,7 @@ class Looked:
             self.motion[row, *index] = temperature(mean) - temperature(peak)
 
     def variables(self, names: Mapping[tuple[str, str], str], cause: str) -> Variables:
-        """Return variables of the Dataset; `names` are those of readings by place and quantity."""
+        """Return variables of the Dataset; `names` names readings by place and quantity."""
         schedule, views = self.schedule, self.schedule.views
         readings, lines, kelvin, metre = self.readings, self.lines, {"units": "K"}, {"units": "m"}
 

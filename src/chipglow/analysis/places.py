@@ -34,11 +34,11 @@ class Place(ABC):
     quantities: ClassVar[tuple[str, ...]]
     """Names of the readings."""
     motion_samples: ClassVar[float] = 0.0
-    """Where motion is read on its lines: distance in samples of the scene."""
+    """Position of the reading of motion on its lines, in samples of the scene."""
 
     def __post_init__(self) -> None:
         if not self.name.strip():
-            raise ValueError("place: the name is empty, expected one such as melt pool")
+            raise ValueError("place: the name is empty, expected a name such as melt pool")
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
         """Return lines along which the images are sampled, by name; `pitch` is in m."""
@@ -115,7 +115,7 @@ class LinePlace(Place):
 
 @dataclass(frozen=True)
 class RegionPlace(Place):
-    """The pixels whose middle is in a region, which is in m."""
+    """The pixels whose centre is in a region, which is in m."""
 
     region: Region
     quantities: ClassVar = _EXTREMES
@@ -136,7 +136,7 @@ class RegionPlace(Place):
 
 @dataclass(frozen=True)
 class HottestPlace(Place):
-    """The greatest temperature of each image, wherever it is: the error of a peak temperature."""
+    """The largest temperature of each image at any position: the error of a peak temperature."""
 
     name: str = "hottest pixel"
     quantities: ClassVar = ("peak",)
@@ -186,7 +186,7 @@ class RakePlace(Place):
 
 @dataclass(frozen=True)
 class BandPlace(Place):
-    """The shear band, read across its middle."""
+    """The shear band, read on a line across its centre."""
 
     band: ShearBand
     half_length: float = LINE_REACH
@@ -229,7 +229,7 @@ def _mean(values: Stack) -> float:
 
 
 def _mean_and_extremes(values: Stack) -> Array:
-    """Return mean, and the values at the least and the greatest error, shape (3, row)."""
+    """Return mean, and the values at the smallest and the largest error, shape (3, row)."""
     known = values[:, np.isfinite(values).all(axis=0)]
     if known.shape[1] == 0:
         return np.full((3, len(values)), np.nan)

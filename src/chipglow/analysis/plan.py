@@ -1,4 +1,4 @@
-"""What to analyse."""
+"""The plan of an analysis: exposures, draws, reference and places."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -16,7 +16,7 @@ PointOfScene = tuple[Position, Position]
 
 @dataclass(frozen=True)
 class Plan(Part):
-    """What is computed from the simulated measurement.
+    """Numbers to compute from the simulated measurement.
 
     Parameters
     ----------
@@ -37,14 +37,14 @@ class Plan(Part):
         int,
         Parameter(
             "Positions of the pixels along each axis, evenly over a pixel, on which each headline "
-            "is drawn anew: 9 makes 81.",
+            "is drawn: 9 gives 81.",
             least=1,
         ),
     ] = 9
     textures: Annotated[
         int,
         Parameter(
-            "Textures of the emissivity on which each headline is drawn anew: of the study's seed "
+            "Textures of the emissivity on which each headline is drawn: of the study's seed "
             "and those after it.",
             least=1,
         ),
@@ -60,9 +60,9 @@ class Plan(Part):
         # YAML reads true as a truth value.
         BeforeValidator(lambda value: "true" if value is True else value),
         Parameter(
-            "What a pixel's measured temperature is compared with, in its square during the "
-            "exposure: the greatest radiance temperature (maximum, the paper's), that of the mean "
-            "radiance (mean), that in the middle of both (centre) or the greatest true "
+            "Reference of a pixel's measured temperature, in its square during the "
+            "exposure: the largest radiance temperature (maximum, the paper's), that of the mean "
+            "radiance (mean), that in the middle of both (centre) or the largest true "
             "temperature (true)."
         ),
     ] = "maximum"
@@ -75,7 +75,7 @@ class Plan(Part):
     points: Annotated[
         dict[str, PointOfScene],
         Parameter(
-            "Points by name where the error is read, in the place of rake face and shear band.",
+            "Points by name where the error is read, instead of rake face and shear band.",
             allowed="{} or positions: {middle of the pool: [0 um, -20 um]}",
         ),
     ] = field(default_factory=dict)
@@ -100,7 +100,7 @@ class Plan(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.psf_widths:
-            raise ValueError("psf_widths: none, expected one length or more")
+            raise ValueError("psf_widths: must have one length or more")
         names = [place.name for place in self.all_places]
         for name in names:
             if names.count(name) > 1:

@@ -25,7 +25,7 @@ class Headline:
     error: Distribution
     psf_portion: Distribution
     true_error: Distribution
-    """Radiance temperature less the greatest true temperature in the pixel."""
+    """Radiance temperature minus the largest true temperature in the pixel."""
     corrected_error: Distribution
     """The same, with the emissivity set in the camera."""
 
@@ -118,7 +118,7 @@ def line_change(data: xr.Dataset, line: str, near: float, far: float) -> float:
 
 
 def line_steepest(data: xr.Dataset, line: str, length: float) -> float:
-    """Return the mean greatest change of the scene's temperature in K over a length in m."""
+    """Return the mean of the largest change of the scene's temperature in K over a length in m."""
     changes = [
         np.nanmax(np.abs(np.interp(at + length, at, values) - values))
         for at, values in _scene_lines(data, line)

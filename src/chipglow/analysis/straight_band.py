@@ -38,7 +38,7 @@ class StraightBand:
     width: float
     """Full width at half maximum in m."""
     rise: float
-    """Greatest rise over its sides in K."""
+    """Maximum rise over its sides in K."""
     sweep: float
     """Travel during an exposure in m."""
     beside: float
@@ -46,7 +46,7 @@ class StraightBand:
 
     @classmethod
     def of(cls, segment: Segment, raster: Raster) -> "StraightBand":
-        """Return what comes closest to a segment's band: profile across its middle."""
+        """Return the straight band closest to a segment's band across its centre."""
         line = segment.moment.across(_REACH, 1e-6)
         profile = sample(segment.frame.temperature, raster, line.points)
         sides = np.interp(line.distance, line.distance[[0, -1]], profile[[0, -1]])

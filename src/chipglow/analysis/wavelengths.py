@@ -34,7 +34,7 @@ CAUSES: Final = (
     "delay",
     "noise",
 )
-"""What makes the error, in the order in which they come one upon the other."""
+"""Causes of the error in the order in which they are added."""
 
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
 """Causes of the mean error of a band or ratio; the others scatter."""
@@ -72,8 +72,7 @@ class WavelengthPlan(Part):
     bands: Annotated[
         tuple[BandText, ...],
         Parameter(
-            "The bands; each pair of them is a ratio. The camera's diffraction is that of each "
-            "band."
+            "The bands; each pair of them is a ratio. Diffraction is computed for each band."
         ),
     ] = (
         Band(0.9e-6, 1.1e-6),
@@ -87,14 +86,14 @@ class WavelengthPlan(Part):
     misregistration: Annotated[
         float,
         Parameter(
-            "How far the pixels of a ratio's second channel look beside those of the first, on "
-            "the scene, in a direction that is not known.",
+            "Distance on the scene from the pixels of a ratio's first channel to the pixels of the "
+            "second, in an unknown direction.",
             POSITION,
             least=0.0,
         ),
     ] = 1e-6
     delay: Annotated[
-        float, Parameter("How much later the second channel is exposed.", INSTANT, least=0.0)
+        float, Parameter("Delay of the second channel's exposure.", INSTANT, least=0.0)
     ] = 0.0
     emissivity_uncertainty: Annotated[
         float,
@@ -118,14 +117,14 @@ class WavelengthPlan(Part):
 
     @property
     def pairs(self) -> Iterator[tuple[int, int]]:
-        """Numbers of the bands of every ratio, that of the shorter waves first."""
+        """Indices of the bands of every ratio, the shorter wavelengths first."""
         middles = [one.lower + one.upper for one in self.bands]
         order = sorted(range(len(self.bands)), key=middles.__getitem__)
         return combinations(order, 2)
 
     @property
     def ratios(self) -> list[tuple[int, ...]]:
-        """Numbers of the bands that are compared: each alone, then the pairs."""
+        """Indices of the compared bands: each alone, then the pairs."""
         return [*((number,) for number in range(len(self.bands))), *self.pairs]
 
     def thermometer(self, pair: Sequence[int]) -> RatioThermometer:
@@ -145,18 +144,18 @@ class Spot:
 
 
 def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: float) -> xr.Dataset:
-    """Errors of the ratio temperature of one exposure, and what makes them.
+    """Errors of the ratio temperature of one exposure, and their causes.
 
     Parameters
     ----------
     camera : RatioCamera
         The camera.
     scene : Scene
-        What is truly there.
+        The true fields.
     surface : Surface
         Its emissivity.
     start : float
-        When the first channel begins to integrate in s.
+        Start time of the first channel's integration in s.
 
     Returns
     -------
@@ -430,7 +429,7 @@ def _of_place(
     """Return all draws of a place but those without material at the pixel's centre."""
     data = xr.concat(parts, "draw").dropna("draw", subset=["truth"])
     if not data.sizes["draw"]:
-        raise ValueError(f"{name}: no material is there, expected some in one draw or more")
+        raise ValueError(f"{name}: must have material in one draw or more")
     radiances = data.radiance.mean("draw").values
     relative = [_noise(camera, one) for camera, one in zip(cameras, radiances, strict=True)]
     noise = [np.linalg.norm([relative[number] for number in bands]) for bands in plan.ratios]

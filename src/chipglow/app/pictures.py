@@ -107,17 +107,15 @@ class SceneModel:
 
     def is_ready(self, state: State) -> bool:
         """Whether the exact picture takes milliseconds."""
-        key = self._exposure_key(state)
-        if key not in self._caches["exposure"]:
-            return False
-        camera, coarse = state.study.camera, self.coarse
-        on_samples = camera.psf_order != "detector" and (
-            camera.psf is not None and camera.psf.kind == "annular-aperture"
-        )
+        key, camera = self._exposure_key(state), state.study.camera
+        kind = camera.psf.kind if camera.psf else ""
         # A quick look at pixels hardly larger than the coarse samples takes half as long.
-        if on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing):
-            return (key, self._camera(state, self.scene), False) in self._caches["errors"]
-        return True
+        spacing = self.coarse.raster.spacing if self.coarse else 0.0
+        on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
+        is_slow = on_samples or camera.pitch < 1.5 * spacing
+        exact = key, self._camera(state, self.scene), False
+        is_known = exact in self._caches["errors"]
+        return key in self._caches["exposure"] and (is_known or not is_slow)
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return images and lines at a state; `check` is called meanwhile and may raise."""
@@ -278,7 +276,7 @@ class SceneModel:
     def _scene_panel(self, state: State, exposure: Exposure) -> Panel:
         name = state.study.scene_image
         scene = self._kept(1, "displayed", "", lambda: with_samples(self.scene, DISPLAYED))
-        label, unit = SCENE_IMAGES[name]
+        label, unit, _ = SCENE_IMAGES[name]
         values = self._field(state, name, scene, exposure)
         colours = HEAT if unit == "°C" else PLAIN
         return Panel(f"Scene: {label.lower()}", unit, values, scene.raster, ends(values), colours)

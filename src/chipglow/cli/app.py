@@ -198,7 +198,7 @@ def open_app(
 
     def announce(url: str) -> None:
         screen = current()
-        screen.say(f"The app is at {url}\nCtrl-C ends it.", {"url": url})
+        screen.say(f"The app is at {url}\nCtrl-C stops it.", {"url": url})
         screen.close()
         if browser:
             webbrowser.open(url)

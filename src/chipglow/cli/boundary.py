@@ -1,4 +1,4 @@
-"""Where errors become one line and an exit code."""
+"""Conversion of errors to one line and an exit code."""
 
 import sys
 from collections.abc import Callable
@@ -41,7 +41,9 @@ class Boundary(TyperGroup):
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None
         except KeyboardInterrupt as error:
-            kept = f"{error}: --resume goes on from there" if str(error) else "nothing was written"
+            kept = (
+                f"{error}: --resume continues from there" if str(error) else "nothing was written"
+            )
             raise _ended(f"interrupted, {kept}", INTERRUPTED) from None
         except RuntimeError as error:
             from chipglow.cutting import SolverError

@@ -1,4 +1,4 @@
-"""The command ``chipglow compare``: a measurement beside simulations."""
+"""The command ``chipglow compare``: a measurement and simulations."""
 
 from functools import partial
 from pathlib import Path
@@ -68,7 +68,7 @@ def compare(
     if not 0.0 <= emissivity_uncertainty < 1.0:
         raise ValueError(f"--emissivity-uncertainty: {emissivity_uncertainty:g}, expected 0 to < 1")
     if uncertainty is not None and not uncertainty > 0.0:
-        raise ValueError(f"--uncertainty: {uncertainty:g} K, expected over 0 K")
+        raise ValueError(f"--uncertainty: {uncertainty:g} K, must be positive")
     whole = load_measurement(measured, settings or ())
     chosen, known, notes = chosen_tool(whole, tool, position)
     result = lab.compare(

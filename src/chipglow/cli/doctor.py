@@ -52,7 +52,7 @@ def examine() -> None:
         names = ", ".join(f"{row.package} ({row.state})" for row in wrong.itertuples())
         raise ValueError(f"packages: {names}, expected pip install --upgrade chipglow")
     if not largest < _TOLERANCE:
-        raise ValueError(f"in-band radiance: off by {largest:.1g}, expected under {_TOLERANCE:g}")
+        raise ValueError(f"in-band radiance: off by {largest:.1g}, expected below {_TOLERANCE:g}")
 
 
 def _machine() -> Iterator[tuple[str, str]]:

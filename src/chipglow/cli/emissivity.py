@@ -188,7 +188,7 @@ def _emissivities(
     except ValueError:
         if uncertainty is not None:
             raise ValueError(
-                "--emissivity-uncertainty: the file states it, expected none with a file"
+                "--emissivity-uncertainty: the file states it, omit the option"
             ) from None
         return lab.read_emissivity_lines(Path(text))
     return lab.EmissivityLine.constant(number, uncertainty or 0.0)

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have, and the check of what a command writes."""
+"""Arguments and options of several commands, and the check of output files."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress

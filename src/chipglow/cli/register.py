@@ -20,7 +20,7 @@ Method: TypeAlias = Literal["points", "dots", "mutual-information"]
 def register(
     infrared: Annotated[Path, opt.argument("INFRARED", "Measurement file.")],
     visible: Annotated[
-        Path, opt.argument("VISIBLE", "Image, or a visible camera's file (CINE, ...).")
+        Path, opt.argument("VISIBLE", "Image, or a visible camera file (CINE, ...).")
     ],
     points: Annotated[
         Path | None,
@@ -34,7 +34,7 @@ def register(
     method: Annotated[
         Method | None,
         typer.Option(
-            help="Default: points if given, otherwise mutual-information; dots are those of a "
+            help="Default: points if given, otherwise mutual-information; dots belong to a "
             "target, e.g. a heated plate with holes."
         ),
     ] = None,
@@ -162,7 +162,7 @@ def _print_fit(fit: "lab.PointFit | lab.DotFit | lab.ImageFit") -> None:
     screen = current()
     if isinstance(fit, lab.ImageFit):
         screen.say(
-            f"Mutual information: {fit.information:.3f} bits a pixel; score of the placement "
+            f"Mutual information: {fit.information:.3f} bits per pixel; score of the placement "
             f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
             f"{fit.by_chance.max():.3g}.",
             {"mutual_information_bits": fit.information, "placement_score": fit.placement},

@@ -89,7 +89,7 @@ def _steady(
 
 
 def _titled(study: Study) -> Study:
-    """Return the study, with a title of its own if it has the default one and is another study."""
+    """Return the study, with a new title if it has the default one and is not the paper's."""
     if study.is_papers or study.title != Study().title:
         return study
     of = Path(study.scene).name if study.scene is not None else "a cut"

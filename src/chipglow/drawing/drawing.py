@@ -63,7 +63,7 @@ def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
 
 
 def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
-    """Write a figure as PNG at 150 dots an inch and as SVG; images in it stay images."""
+    """Write a figure as PNG at 150 dots per inch and as SVG; images in it stay images."""
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
     if layout := figure.get_layout_engine():  # once; `savefig` repeats it for each file
         figure.set_dpi(150)

@@ -4,7 +4,7 @@ from math import floor, isfinite, isnan, log10
 
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
-    """Return a number with its unit, or a dash where there is none."""
+    """Return a number with its unit, or a dash for None."""
     if value is None:
         return "–"
     rounded = round(value, decimals) + 0.0  # no negative zero

@@ -27,7 +27,7 @@ NONE: Final = "none"
 class Parameter:
     """Meaning, unit and limits of a setting: the annotation of a field.
 
-    The field's type is that of Python: a description writes None as ``none``, and a word of a
+    The field has its Python type: a description writes None as ``none``, and a word of a
     ``Literal`` beside a number as it is. Limits are numbers in SI units.
 
     Parameters
@@ -39,7 +39,7 @@ class Parameter:
     over, least, under, most : float, optional
         Limits: `over` and `under` are excluded, `least` and `most` are included.
     allowed : str
-        Which values are allowed, where the limits do not say it.
+        Allowed values that the limits do not state.
     """
 
     meaning: str
@@ -144,7 +144,7 @@ class Parameter:
         )
 
     def _without_words(self, source: Any) -> tuple[Any, dict[str, Any]]:
-        """Return the type of a value that is no word, and the words with their values."""
+        """Return the type of a value that is not a word, and the words with their values."""
         if get_origin(source) not in (Union, UnionType):
             return source, {}
         words: dict[str, Any] = {}

@@ -206,7 +206,7 @@ class Family:
         taken = self._own.get(kind, part)
         same = (taken.__module__, taken.__qualname__) == (part.__module__, part.__qualname__)
         if not kind or not same:
-            raise ValueError(f"{self.name}: {kind!r} is no new kind")
+            raise ValueError(f"{self.name}: {kind!r} is not a new kind")
         self._own[kind] = part
 
     @property
@@ -261,7 +261,7 @@ class Family:
 
 
 adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
-"""What reads and writes a part, by its class."""
+"""Return the adapter that reads and writes a part, by its class."""
 
 
 def problem(error: ValidationError) -> str:
@@ -332,7 +332,7 @@ def _fields_of(part: Any) -> TypeAdapter[Any]:
 
 
 _section: Final[Callable[[Any], TypeAdapter[Any]]] = cache(_fields_of)
-"""What reads and writes the declared fields of a part."""
+"""Return the adapter that reads and writes the declared fields of a part."""
 
 
 _CONFIG: Final = ConfigDict(
@@ -352,7 +352,7 @@ def _keys(part: Any) -> list[str]:
 def _known_keys(data: object, names: Iterable[str]) -> Mapping[str, Any]:
     known = ", ".join(names)
     if not isinstance(data, Mapping):
-        raise ValueError(f"{reprlib.repr(data)} is no section, expected keys of {known}")
+        raise ValueError(f"{reprlib.repr(data)} is not a section, expected keys of {known}")
     for key in data:
         if key not in names:
             close = get_close_matches(str(key), names, n=1)

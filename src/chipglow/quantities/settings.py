@@ -72,7 +72,7 @@ def own_settings(part: Part) -> Iterator[Setting]:
 
 
 def value_at(part: Any, path: str) -> Any:
-    """Return a setting's value by its path; a LookupError if there is none."""
+    """Return a setting's value by its path; a LookupError if it does not exist."""
     for key in path.split("."):
         if isinstance(part, tuple):
             part = dict(enumerate(part))[int(key) if key.isdigit() else -1]

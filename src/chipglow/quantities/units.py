@@ -66,7 +66,7 @@ class Unit:
 
     def __post_init__(self) -> None:
         if not (isfinite(self.scale) and self.scale > 0 and isfinite(self.offset)):
-            raise ValueError(f"unit: scale {self.scale!r} must be finite and over 0")
+            raise ValueError(f"unit: scale {self.scale!r} must be finite and positive")
 
     def to_si(self, values: ArrayLike) -> NDArray[np.float32]:
         return np.asarray(np.asarray(values, np.float64) * self.scale + self.offset, np.float32)
@@ -160,7 +160,7 @@ class Quantity:
 
     @property
     def expected(self) -> str:
-        """What a field of this quantity expects, as errors say it."""
+        """The values that a field of this quantity accepts, as text for errors."""
         return f"expected {self.kind} such as {self.example}"
 
     def __get_pydantic_core_schema__(
@@ -283,12 +283,12 @@ def _scale_and_offset(text: str, base: str) -> tuple[Decimal, Decimal]:
     spelled = _SPELLINGS.get(clean.lower().replace(" ", "_"), clean)
     spelled = _BELOW.sub(lambda below: "/" + "/".join(below[1].split()), spelled)
     if not _TERMS.fullmatch(spelled):
-        raise ValueError(f"{text!r} is no unit")
+        raise ValueError(f"{text!r} is not a unit")
     written = re.sub(r"(?<=[\w°%])[\s.·]+(?=[A-Za-z°µμ])", "*", spelled)
     try:
         unit = _registry().parse_units(_EXPONENT.sub(r"\1**\2", written))
         zero, one = (_registry().Quantity(Decimal(value), unit).to(base) for value in (0, 1))
     # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
     except Exception:
-        raise ValueError(f"{text!r} is no unit such as {base}") from None
+        raise ValueError(f"{text!r} is not a unit such as {base}") from None
     return one.magnitude - zero.magnitude, zero.magnitude

@@ -23,7 +23,7 @@ _COLOURS: Final = (BLUE, VERMILLION)
 
 _GRAIN, _SEED, _STEEL = 9e-6, 8, Emissivity(0.62, 0.07)
 _VOID, _SHEARED, _DARKEST = 0.28, (1.5, 5.0), 0.45
-"""Of the visible picture: texture in m, grey values, plastic strains and darkness of bands."""
+"""Settings of the visible picture: texture in m, greys, plastic strains, darkness of bands."""
 
 
 def heated_chips(facts: Facts) -> Figure | None:

@@ -1,4 +1,4 @@
-"""What Heigel and Whitenton (2010) published, and how results compare with it."""
+"""Values of Heigel and Whitenton (2010), and the comparison of results with them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ PAPER: Final[Mapping[str, PaperValue]] = {
 """The values of Heigel and Whitenton (2010) that a study is compared with, by the report's rows."""
 
 RAKE_MISSING: Final = PaperValue(**_TEXTS["rake_missing"])
-"""How far the paper's simulated profile is below its measured one at the rake face, in K."""
+"""Difference of the paper's measured and simulated profile at the rake face, in K."""
 
 FIGURES: Final[Mapping[str, tuple[str, str]]] = _TEXTS["figures"]
 """The figures of the paper by the report's figures, and what is the same and different."""

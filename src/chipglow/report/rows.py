@@ -28,7 +28,7 @@ _ACROSS: Final = ("rake", "band")
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of the report, in its unit, and the published value if there is one."""
+    """One quantity of the report, in its unit, and the published value, if known."""
 
     key: str
     quantity: str
@@ -148,7 +148,7 @@ def _number_rows(facts: Facts, group: str) -> list[Row]:
 
 
 def _segment_rows(facts: Facts) -> Iterator[Row]:
-    """Yield rows of values of every segment; the first is that of the one draw."""
+    """Yield rows of values of every segment; the first belongs to the one draw."""
     assert facts.analysis.cut is not None
     for key, template in texts()["rows"]["segments"].items():
         every = np.array(
@@ -192,7 +192,7 @@ def _reading(facts: Facts, name: str) -> Iterator[Row]:
 def _drawn(
     facts: Facts, name: str, kind: str, draws: Distribution | None, one: float, **more: Any
 ) -> Row:
-    """Return a row of a reading; `kind` names its texts if it has none of its own."""
+    """Return a row of a reading; `kind` names its texts if it has no special ones."""
     key, readings = f"{slug(name)}_{kind}", texts()["rows"]["readings"]
     if key not in readings and draws:
         more["decimals"] = _decimals(draws)

@@ -49,7 +49,7 @@ class SceneSummary:
 
     index: int
     sampled: tuple[int, ...]
-    fields: pd.DataFrame  # least, median and greatest over the workpiece; overall: of all frames
+    fields: pd.DataFrame  # minimum, median and maximum over the workpiece; overall: of all frames
     fractions: Mapping[Material, float]  # of the samples
     quality: QualitySummary | None
 

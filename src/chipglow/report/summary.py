@@ -25,7 +25,9 @@ class Scatter(_Numbered):
     count: Annotated[int, Field(ge=1, description="Number of draws.")]
     mean: FiniteFloat
     standard_deviation: Annotated[_Known, Field(description="Sample standard deviation.")]
-    expanded_uncertainty: Annotated[_Known, Field(description="Of the mean, coverage 95 %.")]
+    expanded_uncertainty: Annotated[
+        _Known, Field(description="Uncertainty of the mean, coverage 95 %.")
+    ]
     lowest: FiniteFloat
     highest: FiniteFloat
     interval_low: Annotated[
@@ -55,9 +57,10 @@ class Cause(_Numbered):
 
     count: Annotated[int, Field(ge=1, description="Number of values that the cause took.")]
     standard_deviation: Annotated[
-        _Known, Field(description="Of the means over all other causes, in the number's unit.")
+        _Known,
+        Field(description="Deviation of the means over all other causes, in the number's unit."),
     ]
-    fraction_percent: Annotated[FiniteFloat, Field(description="Of the sum of squares.")]
+    fraction_percent: Annotated[FiniteFloat, Field(description="Fraction of the sum of squares.")]
 
 
 class Mean(_Numbered):
@@ -76,7 +79,7 @@ class BothTools(_Numbered):
     steady_standard_deviation: _Known
     difference: Annotated[_Known, Field(description="Steady minus own.")]
     difference_standard_deviation: Annotated[
-        _Known, Field(description="Of the difference of two single values.")
+        _Known, Field(description="Deviation of the difference of two single values.")
     ]
 
 
@@ -86,7 +89,7 @@ class Summary(_Numbered):
     provenance: Annotated[
         dict[str, str], Field(description="Origin, time, version, seed and the like.")
     ]
-    camera: Annotated[_Numbers, Field(description="Of the detector, if there is one.")] = {}
+    camera: Annotated[_Numbers, Field(description="Numbers of the detector, if present.")] = {}
     results: Annotated[_Numbers, Field(description="Means of the draws, and single numbers.")]
     references: Annotated[
         _Numbers, Field(description="Mean reading of a camera without error, of each error.")

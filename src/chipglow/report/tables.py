@@ -36,7 +36,7 @@ class Column(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A row of a table that is no number of the report; None if its cells have no unit."""
+    """A row of a table apart from the report's numbers; None if its cells have no unit."""
 
     cells: Mapping[str, str]
     unit: str | None
@@ -106,7 +106,7 @@ def _column(name: str, terms: Mapping[str, Term]) -> Column:
 
 
 def _scatter(errors: Sequence[Row]) -> Table:
-    """Return the causes of the scatter of each error; no rows if there is one draw only."""
+    """Return the causes of the scatter of each error; no rows for a single draw."""
     rows = [row for row in errors if row.draws and row.draws.draws > 1 and "_error_" in row.key]
     columns = [Column("quantity", "Quantity")]
     for name, part in rows[0].draws.parts.items() if rows and rows[0].draws else ():

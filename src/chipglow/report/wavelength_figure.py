@@ -1,4 +1,4 @@
-"""The picture of the wavelengths: all bands and pairs, and what makes the error of the best."""
+"""The picture of the wavelengths: all bands and pairs, and the parts of the smallest errors."""
 
 from typing import Final
 
@@ -87,4 +87,4 @@ def _draw_causes(axes: Axes, rows: pd.DataFrame) -> None:
     ]
     axes.set_yticks(places, names, fontsize=7)
     axes.invert_yaxis()
-    axes.set(xlabel="parts of the least errors / K")
+    axes.set(xlabel="parts of the smallest errors / K")

@@ -1,4 +1,4 @@
-"""Scenes that were computed before, found again by what they were computed from."""
+"""Cached scenes, found by the inputs of their computation."""
 
 import os
 from collections.abc import Mapping

@@ -71,7 +71,9 @@ class CameraSection(Part):
     ] = None
     magnification: Annotated[
         float | None,
-        Parameter("Of the lens: a pitch of 15 um at 2.5 is 6 um on the scene.", over=0.0),
+        Parameter(
+            "Magnification of the lens: a pitch of 15 um at 2.5 is 6 um on the scene.", over=0.0
+        ),
     ] = None
     array: Annotated[
         tuple[int, int] | None,
@@ -95,7 +97,7 @@ class CameraSection(Part):
     ] = field(default_factory=AnnularAperturePSF)
     blur: Annotated[
         tuple[Annotated[BlurTerm, BLURS], ...],
-        Parameter("What spreads light besides, a list: it is part of the point spread function."),
+        Parameter("Other blurs, a list: they are part of the point spread function."),
     ] = ()
     optics: Annotated[
         tuple[Annotated[OpticsTerm, OPTICS_TERMS], ...], Camera.parameter("optics")
@@ -112,7 +114,7 @@ class CameraSection(Part):
         replace(
             Camera.parameter("lower_limit"),
             meaning="Radiance temperatures under this are flagged, not returned; or none. With a "
-            "detector it is the detector's, unless it is said.",
+            "detector it is the detector's, unless it is given.",
             allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
     ] = PAPER_LIMIT
@@ -175,7 +177,7 @@ class CameraSection(Part):
         if self.psf is None:
             if self.blur:
                 raise ValueError(
-                    "blur: stands beside psf: none, expected a point spread function that it is "
+                    "blur: is given with psf: none, expected a point spread function that it is "
                     "part of"
                 )
             return None

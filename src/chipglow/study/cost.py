@@ -1,4 +1,4 @@
-"""What a study will cost before it is begun: time, disk and memory."""
+"""Expected cost of a study: time, disk and memory."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -15,7 +15,7 @@ _SECONDS_A_SAMPLE: Final = 80e-9
 """Sampling, packing and writing a frame of the scene, for each of its samples."""
 
 _BYTES_A_NODE: Final = 18.0
-"""Of a scene's file: nine splines, of which each coefficient takes 1.3 to 2 bytes."""
+"""Size of a scene file: nine splines, each coefficient of which takes 1.3 to 2 bytes."""
 
 _NODES_BEYOND: Final = 6
 """Nodes beside those that lie among the samples, in either direction."""

@@ -25,12 +25,12 @@ from chipglow.quantities.units import LENGTH, POSITION, TEMPERATURE
 from chipglow.scene import Raster
 
 STEADY: Final = "steady"
-"""Temperature of a tool that has been cutting for long."""
+"""Temperature of a tool at steady state."""
 
 
 @dataclass(frozen=True)
 class FieldOfViewSection(Part):
-    """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
+    """Samples of the scene. The tip of the tool is near the origin, y points up."""
 
     left: Annotated[float, Parameter("Left edge of the scene.", POSITION)] = -650e-6
     top: Annotated[float, Parameter("Upper edge of the scene.", POSITION)] = 700e-6
@@ -60,15 +60,15 @@ class CutToolSection(ToolSection):
     temperature: Annotated[
         float | Literal["steady"] | None,
         Parameter(
-            "Temperature of the tool when the cut begins; steady: that of a tool that has been "
-            "cutting for long; none: as cold as the workpiece, as the paper's.",
+            "Temperature of the tool when the cut begins; steady: after a long cut; none: "
+            "as cold as the workpiece, as the paper's.",
             TEMPERATURE,
             least=INITIAL_TEMPERATURE.least,
             most=INITIAL_TEMPERATURE.most,
             allowed=f"{INITIAL_TEMPERATURE.limits}; none; or steady",
         ),
     ] = None
-    body: Annotated[ToolBody, Parameter("What the heat of a steady tool flows through.")] = field(
+    body: Annotated[ToolBody, Parameter("Holder and cooling of a steady tool.")] = field(
         default_factory=ToolBody
     )
 
@@ -82,7 +82,7 @@ def _known(name: str, info: ValidationInfo) -> str:
     try:
         workpiece(name)
     except OSError as error:
-        raise ValueError(f"{name!r}: {error.strerror}, expected a material's file") from None
+        raise ValueError(f"{name!r}: {error.strerror}, expected a material file") from None
     return name
 
 
@@ -96,7 +96,7 @@ class CuttingSection(CuttingConditions):
         Parameter(
             "Material of the workpiece. The command chipglow materials shows them.",
             allowed=f"{', '.join(material_names('workpiece'))}; with one of its sets of the "
-            "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
+            "flow stress after a slash (aisi-1045/ozel); or your own file (steel.yaml)",
         ),
     ] = "aisi-1045"
     tool: Annotated[CutToolSection, Parameter("The cutting tool.")] = field(
@@ -107,11 +107,9 @@ class CuttingSection(CuttingConditions):
     )
     surroundings: Annotated[
         Surroundings,
-        Parameter(
-            "What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."
-        ),
+        Parameter("Surroundings to which chip, workpiece and tool lose heat; none by default."),
     ] = field(default_factory=Surroundings)
-    numerics: Annotated[Numerics, Parameter("How finely the cut is computed.")] = field(
+    numerics: Annotated[Numerics, Parameter("Cells and time steps of the computation.")] = field(
         default_factory=Numerics
     )
     window: Annotated[OutputWindow, Parameter("The part of the cut that becomes the scene.")] = (
@@ -119,7 +117,7 @@ class CuttingSection(CuttingConditions):
     )
     field_of_view: Annotated[
         FieldOfViewSection,
-        Parameter("Where the scene is sampled: the tool's tip is near the origin, y points up."),
+        Parameter("Samples of the scene: the tool's tip is near the origin, y points up."),
     ] = field(default_factory=FieldOfViewSection)
 
     def __post_init__(self) -> None:

@@ -15,12 +15,12 @@ def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
     path : str or Path
         The file. Files that it names are looked up beside it.
     scene : str or Path, optional
-        A scene in the place of that which the file names, or of its cut.
+        A scene instead of the file's scene or cut.
 
     Raises
     ------
     DescriptionError
-        If the file is no YAML or the study is not possible.
+        If the file is not YAML or the study is impossible.
     OSError
         If the file cannot be read.
     """

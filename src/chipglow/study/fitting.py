@@ -31,7 +31,7 @@ _HOW_FINELY: Final = {
     "camera": {"offset_right", "offset_down"},
     "analysis": set(Plan.declared()) - {"reference", "rake_chip", "band_chip"},
 }
-"""Fields whose defaults are no property of the paper's experiment."""
+"""Fields whose defaults do not belong to the paper's experiment."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     said = "cutting" in study.given and "tool" in study.cutting.given
     if scene.tool is None and said:
         scene = scene.with_tool(study.cutting.tool.build())
-        assumed.append("The scene has no tool: it is that of the study's section cutting.tool.")
+        assumed.append("The scene has no tool: the study's section cutting.tool defines it.")
     if scene.tool is not None and not (scene.frame(0).material == Material.TOOL).any():
         assumed.append(
             "The scene shows no tool: beyond the rake face nothing shines into the blur of the "
@@ -66,7 +66,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
             "none": "textures stay where they are, as it has no velocity either",
         }
         assumed.append(
-            f"The scene does not say where each point was before the cut: {moving[follow]} "
+            f"The scene does not state the position of each point before the cut: {moving[follow]} "
             f"(surface.follow: {follow})."
         )
     assumed.extend(_measured_at(surfaces))
@@ -101,7 +101,7 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
             if low == high:
                 yield f"{text}: it is taken to be the same at all temperatures."
             else:
-                beyond = "its straight line is taken to go on beyond."
+                beyond = "its straight line is extrapolated."
                 yield f"{text} to {high - 273.15:.0f} °C: {beyond}"
 
 
@@ -123,7 +123,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
 
 
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
-    """Yield what emissivity maps leave of the scene, a sentence each."""
+    """Yield a sentence on each part of the scene outside of the emissivity maps."""
     for name, outer in surfaces.items():
         surface = _bare(outer)
         if not isinstance(surface, MapSurface):

@@ -1,4 +1,4 @@
-"""What a preview shows of a study's cut: coarse frames of the scene's view."""
+"""Previews of a study's cut: coarse frames of the scene's view."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -72,7 +72,7 @@ def cut(
     Returns
     -------
     Path
-        The scene's file in the cache, for `open_scene`.
+        The scene file in the cache, for `open_scene`.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def run(
     Parameters
     ----------
     study : Study
-        What to do; the paper's study is ``Study()``.
+        The study; the paper's is ``Study()``.
     progress : callable, optional
         Told which step is under way and how much of it is done.
     resume : bool
@@ -131,13 +131,13 @@ def run(
     -------
     Analysis
         All that the report shows: the paper's analysis of a cut; or, of a scene that shows no
-        shear band or no contact with a tool, and at places of the user's own, the camera's error
+        shear band or no contact with a tool, and at the user's places, the camera's error
         there and what is missing.
 
     Raises
     ------
     ValueError
-        If the scene cannot be analysed as the study wants it; the message names the scene's file.
+        If the scene cannot be analysed as the study wants it; the message names the scene file.
     """
     with _fitted(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
@@ -163,12 +163,12 @@ def wavelengths(
     """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
 
     They are read at the rake face and in the shear band of a cut, or at the points of the section
-    analysis, if there are any. The study's camera is given each band in turn.
+    analysis, if given. The study's camera is given each band in turn.
 
     Parameters
     ----------
     study : Study
-        What to do.
+        The study.
     progress, resume
         As for `run`.
 
@@ -202,7 +202,7 @@ def wavelengths(
 
 @contextmanager
 def _fitted(study: Study, progress: Progress | None, resume: bool) -> Iterator[Fitted]:
-    """Yield the scene and the surfaces of a study; errors name the scene's file."""
+    """Yield the scene and the surfaces of a study; errors name the scene file."""
     path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
     try:
         fitted, left = fit(study, open_scene(path)), Notes(list(left_to_the_paper(study)))
@@ -221,7 +221,7 @@ def _inputs(study: Study) -> dict[str, Any]:
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)
     del cutting["tool"]["outline"]
     workpiece, tool_material = map(asdict, (simulation.workpiece, simulation.tool_material))
-    del workpiece["name"], tool_material["name"]  # all else of a material's file counts
+    del workpiece["name"], tool_material["name"]  # everything else in a material file counts
     return {
         "cutting": cutting,
         "outline": tool.points if isinstance(tool, ToolOutline) else None,
@@ -296,7 +296,7 @@ def _kept(checkpoint: Checkpoint, file: Path) -> str:
 
 
 class _Keeper:
-    """Makes checkpoints now and then; `note` tells of the last one."""
+    """Writer of checkpoints; `note` describes the last one."""
 
     def __init__(self, writer: SceneWriter) -> None:
         self._writer = writer

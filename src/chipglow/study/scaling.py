@@ -26,7 +26,7 @@ _ACROSS: Final = 9
 """Samples along a pixel, as in the paper."""
 
 _EXPOSURES: Final = 3.0
-"""A window that is made longer holds so many exposures."""
+"""Number of exposures in a lengthened window."""
 
 _SUB_FRAMES: Final = 10
 """Frames that an exposure has at least."""
@@ -91,9 +91,9 @@ def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, A
     if detector in (None, "none"):
         return dict(camera)
     if isinstance(magnification, bool) or not isinstance(magnification, int | float):
-        raise ValueError("magnification: is missing, expected it with detector_pitch")
+        raise ValueError("magnification: must be given with detector_pitch")
     if not magnification > 0:
-        raise ValueError(f"magnification: {magnification:g}, expected over 0")
+        raise ValueError(f"magnification: {magnification:g}, must be positive")
     pitch = LENGTH.parse(detector, si=not from_file) / magnification
     given = LENGTH.parse(camera["pitch"], si=not from_file) if "pitch" in camera else pitch
     if abs(given - pitch) > 1e-6 * pitch:

@@ -1,4 +1,4 @@
-"""What a study says: its sections, the paper's study as defaults, what they must have in common."""
+"""The settings of a study: its sections, with the paper's as defaults, and checks across them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ class Study(Part):
     5e-06
     """
 
-    title: Annotated[str, Parameter("What the report is headed with.")] = (
+    title: Annotated[str, Parameter("Title of the report.")] = (
         "Reproduction of Heigel and Whitenton (2010) by chipglow"
     )
     seed: Annotated[int, Parameter("Seed of all random numbers.", least=0)] = 2010
@@ -56,7 +56,7 @@ class Study(Part):
     camera: Annotated[CameraSection, Parameter("The infrared camera.")] = field(
         default_factory=CameraSection
     )
-    analysis: Annotated[Plan, Parameter("What is computed from the simulated measurement.")] = (
+    analysis: Annotated[Plan, Parameter("Numbers to compute from the simulated measurement.")] = (
         field(default_factory=Plan)
     )
 
@@ -71,7 +71,7 @@ class Study(Part):
 
     @property
     def plan(self) -> Plan:
-        """What to analyse: PSF widths about the camera's; a single surface is seen everywhere."""
+        """The plan of the analysis, with PSF widths around the camera's."""
         plan, psf = self.analysis, self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
         if "psf_widths" not in plan.given and ratio != 1.0:
@@ -83,7 +83,7 @@ class Study(Part):
         return replace(plan, rake_chip=name, band_chip=name)
 
     def with_steady_tool(self) -> Self:
-        """Return the same study with a tool that has been cutting for long."""
+        """Return the same study with a tool at steady-state temperature."""
         return changed(self, {"cutting.tool.temperature": STEADY})
 
     @property

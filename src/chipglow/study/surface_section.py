@@ -99,7 +99,7 @@ class FeaturesSection(Part):
         dict[str, FileBeside],
         Parameter(
             "Measured chips by name, files of chipglow emissivity: chip body and shear band (and "
-            "workpiece and tool, if they are there) by their regions, over the temperature.",
+            "workpiece and tool, if present) by their regions, over the temperature.",
             allowed="{} or names and files beside this one: {heated chip: emissivity.nc}",
         ),
     ] = field(default_factory=dict)
@@ -149,9 +149,7 @@ class FeaturesSection(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.chips:
-            raise ValueError(
-                "chips: {} is empty, expected one chip or more, such as chip 1: chip-1"
-            )
+            raise ValueError("chips: {} is empty, must have a chip such as chip 1: chip-1")
         taken = set(self.chips)
         for kind in ("maps", "measured"):
             for name in getattr(self, kind):
