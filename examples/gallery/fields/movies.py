@@ -38,7 +38,7 @@ error = temperature - truth(0)
 with style():
     figure = new_figure(2.9)
     one, two, three = figure.subplots(1, 3, width_ratios=(1.15, 1, 1))
-    one.imshow(next(pictures(MOVIE, index_movie(MOVIE))))
+    one.imshow(next(pictures(MOVIE, index_movie(MOVIE), (0,))))
     one.set(title="picture of the movie", xlabel="pixels", ylabel="pixels")
     extent = tuple(1e3 * value for value in survey.extent)
     for axes, values, colours, limits, title in (

@@ -28,15 +28,15 @@ LINES: Final[Mapping[str, str]] = {
 }
 """The lines, and their names in a study."""
 
-SCENE_IMAGES: Final[Mapping[str, tuple[str, str]]] = {
-    "temperature": ("True temperature", "°C"),
-    "radiance_temperature": ("Radiance temperature", "°C"),
-    "emissivity": ("Emissivity", ""),
-    "plastic_strain": ("Plastic strain", ""),
-    "plastic_strain_rate": ("Plastic strain rate", "(1/s)"),
-    "speed": ("Speed", "(m/s)"),
+SCENE_IMAGES: Final[Mapping[str, tuple[str, str, str]]] = {
+    "temperature": ("True temperature", "°C", "temperature"),
+    "radiance_temperature": ("Radiance temperature", "°C", "temperature"),
+    "emissivity": ("Emissivity", "", "temperature"),
+    "plastic_strain": ("Plastic strain", "", "plastic_strain"),
+    "plastic_strain_rate": ("Plastic strain rate", "(1/s)", "plastic_strain_rate"),
+    "speed": ("Speed", "(m/s)", "velocity_x"),
 }
-"""Label and unit of each."""
+"""Label, unit and the scene's field that each needs."""
 
 ERROR_IMAGES: Final[Mapping[str, str]] = {
     "total": "Error",
@@ -63,11 +63,6 @@ _NOISE: Final = {
     "terms": [{"kind": "netd", "netd": "0.1 K", "temperature": "300 degC"}],
 }
 """A detector with this noise and steps too fine to matter."""
-
-_FIELDS: Final = {
-    "radiance_temperature": "temperature", "emissivity": "temperature", "speed": "velocity_x"
-}  # fmt: skip
-"""Fields of a scene that its images need, where the names differ."""
 
 _SLACK: Final = 1e-7
 """How far outside the image a position may be in m: links round to this."""
@@ -376,9 +371,7 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
         "noise": Option("Noise", {"camera.detector": _NOISE, **limit}),
     }
     scene_images = {
-        name: label
-        for name, (label, _) in SCENE_IMAGES.items()
-        if _FIELDS.get(name, name) in scene.fields
+        name: label for name, (label, _, needed) in SCENE_IMAGES.items() if needed in scene.fields
     }
     orders = {"detector": "Blur on the pixels", "optics": "Blur on the scene"}
     words = {

@@ -276,7 +276,7 @@ class SceneModel:
     def _scene_panel(self, state: State, exposure: Exposure) -> Panel:
         name = state.study.scene_image
         scene = self._kept(1, "displayed", "", lambda: with_samples(self.scene, DISPLAYED))
-        label, unit = SCENE_IMAGES[name]
+        label, unit, _ = SCENE_IMAGES[name]
         values = self._field(state, name, scene, exposure)
         colours = HEAT if unit == "°C" else PLAIN
         return Panel(f"Scene: {label.lower()}", unit, values, scene.raster, ends(values), colours)

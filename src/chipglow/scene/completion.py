@@ -114,18 +114,29 @@ class Completion(Part):
         }
         return tuple(name for name, there in has.items() if there)
 
-    def assumptions(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
-        """Return a sentence for each missing field and its substitute."""
+    def assumptions(self, found: Iterable[str], frames: int) -> Iterator[str]:
+        """Yield a sentence for each missing field and its substitute."""
         known = set(found)
-        return tuple(
-            sentence
-            for missing, sentence in (
-                (not known & _VELOCITY, self._of_velocity(known, frames)),
-                ("plastic_strain" not in known, self._of_strain()),
-                ("plastic_strain_rate" not in known, self._of_rate(known, frames)),
-            )
-            if missing
-        )
+        if not known & _VELOCITY:
+            yield f"Velocity: {self._velocity_text(known, frames)}"
+        if "plastic_strain" not in known and self.chip is None:
+            yield "Plastic strain: none, so no feature of the chip has its own emissivity."
+        elif "plastic_strain" not in known:
+            yield f"Plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere."
+        if "plastic_strain_rate" not in known and self._has_rate(known, frames):
+            yield "Plastic strain rate: from the change of the strain along the motion."
+        elif "plastic_strain_rate" not in known:
+            yield "Plastic strain rate: none, so the shear band has no emissivity of its own."
+
+    def _velocity_text(self, known: set[str], frames: int) -> str:
+        if not self._has_velocity(known):
+            return "none; completion.motion: flow derives it from the images."
+        if self.cutting_speed is None and frames == 1:
+            return "0 everywhere, as there is one frame and no cutting speed."
+        if self.cutting_speed is None:
+            return "from the optical flow, which fails where the image has no pattern."
+        chip = "0" if frames == 1 else "that of the optical flow"
+        return f"the cutting speed where the strain is small, in the chip {chip}."
 
     def uses_flow(self, found: Iterable[str], frames: int) -> bool:
         """Whether the optical flow may be asked for the velocity."""
@@ -145,26 +156,6 @@ class Completion(Part):
         if self.motion == "auto":
             return self.cutting_speed is not None or self._has_strain(known)
         return self.motion == "flow"
-
-    def _of_velocity(self, known: set[str], frames: int) -> str:
-        if not self._has_velocity(known):
-            return "Velocity: none; completion.motion: flow derives it from the images."
-        if self.cutting_speed is None and frames == 1:
-            return "Velocity: 0 everywhere, as there is one frame and no cutting speed."
-        if self.cutting_speed is None:
-            return "Velocity: from the optical flow, which fails where the image has no pattern."
-        chip = "0" if frames == 1 else "that of the optical flow"
-        return f"Velocity: the cutting speed where the strain is small, in the chip {chip}."
-
-    def _of_strain(self) -> str:
-        if self.chip is None:
-            return "Plastic strain: none, so no feature of the chip has its own emissivity."
-        return f"Plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere."
-
-    def _of_rate(self, known: set[str], frames: int) -> str:
-        if not self._has_rate(known, frames):
-            return "Plastic strain rate: none, so the shear band has no emissivity of its own."
-        return "Plastic strain rate: from the change of the strain along the motion."
 
 
 def complete(
