@@ -45,8 +45,8 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
     for seed in range(repeats):
         normal = generator.uniform(3.0, 12.0) + generator.choice([0, 90, 180, 270])
         found = knife_edge([image(generator, edge, normal, noise, seed, saturation)])
-        within.append(abs(found.fwhm - fwhm) < 1.96 * found.fwhm_uncertainty)
-        uncertainty.append(found.fwhm_uncertainty)
+        within.append(abs(found.fwhm - fwhm) < 1.96 * found.edge_uncertainty)
+        uncertainty.append(found.edge_uncertainty)
         if gaussian:
             curves = found.edges[0].curves
             true = gaussian_transfer(curves["frequency"].values, fwhm, normal)
@@ -108,11 +108,9 @@ def kinds_of_optics(repeats, names):
             ]
             found = knife_edge(images)
             errors.append(found.fwhm - fwhm)
-            uncertainties.append(found.fwhm_uncertainty)
-            oblique = any("lies oblique" in text for text in found.notes.assumed)
-            said.append(
-                oblique or any("No model fits" in warning for warning in found.notes.warnings)
-            )
+            round_ = len(normals) == 1
+            uncertainties.append(found.edge_uncertainty if round_ else found.fwhm_uncertainty)
+            said.append(any("No model fits" in warning for warning in found.notes.warnings))
             models[found.best.model.name] += 1
         held = np.abs(errors) < 1.96 * np.array(uncertainties)
         micrometres = [f"{1e6 * fwhm:.2f}", f"{1e6 * np.mean(errors):+.2f}"]

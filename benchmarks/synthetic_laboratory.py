@@ -342,12 +342,7 @@ def _even(kelvins: float) -> NDArray[np.float64]:
     return np.full(SHAPE, float(BAND.radiance(np.array(kelvins))))
 
 
-CAMERA_FIELDS = (
-    "flat_field.low=cold.hcc",
-    "flat_field.high=hot.hcc",
-    "bad_pixels=find",
-    "pitch=6 um",
-)
+_FLAT = (("low", "cold"), ("high", "hot"))
 STACK_FIELDS = ("unit=counts", "interval=2 ms", "saturation=4094")
 
 
@@ -357,12 +352,18 @@ class Evaluation:
 
     folder: Path
 
+    @property
+    def fields(self) -> list[str]:
+        """Description of the camera's files."""
+        flat = [f"flat_field.{end}={self.folder.resolve() / file}.hcc" for end, file in _FLAT]
+        return [*flat, "bad_pixels=find", "pitch=6 um"]
+
     @cached_property
     def calibration(self) -> FittedCalibration:
         """Calibration by the blackbodies, as ``chipglow calibrate`` makes it."""
         points = read_calibration_points(
             self.folder / "points.csv",
-            lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS)[0],
+            lambda file: uniform_counts(self.folder / file, self.fields)[0],
         )
         fit = fit_calibration(
             LinearCalibration,
@@ -380,7 +381,7 @@ class Evaluation:
 
     def images(self, pattern: str) -> list[Measurement]:
         """Return recordings as measurements, as ``chipglow convert`` does."""
-        fields = [*CAMERA_FIELDS, "calibration=calibration.yaml"]
+        fields = [*self.fields, f"calibration={self.folder.resolve() / 'calibration.yaml'}"]
         paths = sorted(self.folder.glob(pattern))
         if not pattern.endswith("hcc"):
             fields += STACK_FIELDS
@@ -423,7 +424,7 @@ class Evaluation:
         curves = result.edges[0].curves
         at = int(np.argmin(np.abs(curves["frequency"].values - FREQUENCY)))
         return {
-            "PSF, full width": Found(result.fwhm, factor * result.fwhm_uncertainty),
+            "PSF, full width": Found(result.fwhm, factor * result.edge_uncertainty),
             "MTF at 31 /mm": Found(
                 float(curves["mtf"][at]), factor * float(curves["mtf_uncertainty"][at])
             ),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 import yaml
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from hypothesis import given, settings, strategies as st
@@ -418,9 +419,6 @@ def test_the_command_fits_over_the_temperature(two):
     assert "change in 100 K" in two
     assert Path("p.svg").is_file()
     assert surfaces_of(study_of(two).surface, 1).keys() >= {"measured chip"}
-    hotter = read_emissivity_map("two.nc", reference=770.0)
-    # The body's emissivity is 0.04 more; its mean over 960 pixels varies by 0.07 / 31.
-    assert hotter.values[:, :16].mean() == pytest.approx(0.46, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -536,9 +534,11 @@ def test_a_measured_chip_is_its_features_by_their_lines(strain, rate, parts):
 @pytest.mark.usefixtures("two")
 def test_a_map_of_several_temperatures_has_a_line_in_each_pixel():
     surface = read_emissivity_map("two.nc")
-    for kelvins, nearest in ((TRUTH, 660.0), (500.0 + CELSIUS, 770.0)):
-        one = read_emissivity_map("two.nc", reference=nearest)
-        np.testing.assert_allclose(shown(surface, kelvins), one.values, atol=1e-6)
+    with xr.open_dataset("two.nc", engine="h5netcdf") as data:
+        for kelvins, one in zip((TRUTH, 500.0 + CELSIUS), data["emissivity"].values, strict=True):
+            np.testing.assert_allclose(shown(surface, kelvins), np.clip(one, 0, 1), atol=1e-6)
+    # The body's emissivity is 0.04 more; its mean over 960 pixels varies by 0.07 / 31.
+    assert shown(surface, 500.0 + CELSIUS)[:, :16].mean() == pytest.approx(0.46, abs=0.01)
     # One error of all pixels: as much as each of them is uncertain.
     drawn = np.array([surface.redrawn(k).at(RASTER)[5, 5] for k in range(1, 401)])
     assert drawn.std() == pytest.approx(surface.uncertainty[5, 5], rel=0.11)

@@ -529,16 +529,6 @@ def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
     assert body == pytest.approx(expected[0] + fraction * (expected[1] - expected[0]), abs=0.5)
 
 
-def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
-    seen_bodies(laboratory)
-    arguments = [*settings_of(CORRECTED), "--out", "of files.yaml"]
-    run("calibrate", "bodies.csv", "--band", "3.8-5.1 um", *arguments)
-    counts = [uniform_counts(f"body {celsius:g}.npy", CORRECTED)[0] for celsius in CELSIUS[:4]]
-    expected = fit_calibration(LinearCalibration, CELSIUS[:4] + 273.15, counts, BAND).calibration
-    found = load_calibration("of files.yaml")
-    np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
-
-
 def test_a_blackbody_before_a_background_is_refused_until_its_region_is_given(tmp_path):
     """A hot disc on a cold ground, as an aperture shows it: its gain would be a fifth."""
     y, x = np.mgrid[:64, :64]

@@ -9,7 +9,7 @@ from camera_files import cine
 from dual_spectrum import DualSpectrum
 from hypothesis import given, settings, strategies as st
 from PIL import Image
-from scipy.stats import chi2, f, t
+from scipy.stats import f, t
 from typer.testing import CliRunner
 
 from chipglow.camera import Measurement
@@ -247,10 +247,10 @@ def event(time):
     return entry * (1 + 0.3 * np.sin(2 * np.pi * 133 * time + 40 * time**2))
 
 
-def clocks(generator, offset, drift=0.0, noise=0.02):
+def clocks(generator, offset, noise=0.02):
     infrared = np.arange(30) / 600.0
     visible = np.arange(2400) / 30000.0
-    seen = event((visible - offset + drift * infrared.mean()) / (1 + drift))
+    seen = event(visible - offset)
     hot = event(infrared) + generator.normal(0.0, noise, infrared.size)
     return infrared, hot, visible, 7.0 - 3.0 * seen + generator.normal(0.0, noise, visible.size)
 
@@ -262,27 +262,13 @@ def test_the_offset_of_the_clocks_is_within_its_interval():
     for _ in range(15):
         offset = generator.uniform(5e-3, 25e-3)
         found = align_times(*clocks(generator, offset))
-        limit = t.ppf(0.975, found.degrees_of_freedom) * np.sqrt(found.covariance[0, 0])
+        limit = t.ppf(0.975, found.degrees_of_freedom) * found.uncertainty
         inside += abs(found.offset - offset) < limit
         assert found.warnings == ()
         assert found.correlation < -0.99
         assert abs(found.offset - offset) < 200e-6
     # 15 trials at 0.95: less than 12 has a chance of 0.5 %.
     assert inside >= 12
-
-
-def test_a_clock_that_is_faster_is_found():
-    generator = np.random.default_rng(12)
-    inside = 0
-    for _ in range(6):
-        infrared, hot, visible, bright = clocks(generator, 20e-3, drift=2e-3)
-        found = align_times(infrared, hot, visible, bright, drift=True)
-        error = np.array([found.offset - 20e-3, found.drift - 2e-3])
-        inside += error @ np.linalg.solve(found.covariance, error) < chi2.ppf(0.99, 2)
-        late = infrared[-1:]
-        true = late + 20e-3 + 2e-3 * (late - infrared.mean())
-        assert abs(found.visible_time(late) - true) < 5 * found.uncertainty(late)
-    assert inside >= 4
 
 
 def test_periodic_and_unrelated_signals_are_doubtful():

@@ -160,7 +160,7 @@ def psf(
         opt.value(
             "NAME",
             "Model to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
-            "'annular aperture', 'elliptical gaussian' or radial. Default: the best fit.",
+            "'defocused ring', 'annular aperture' or 'elliptical gaussian'. Default: the best fit.",
         ),
     ] = None,
     out: Annotated[
@@ -183,7 +183,7 @@ def psf(
     result = lab.knife_edge(images, holes)
     kernel = lab.psf_kernel(result, model)
     screen, fwhm = current(), "fwhm_um ± fwhm_uncertainty_um"
-    columns = ["model", fwhm, "aicc", "bic", "weight", "reduced_chi_squared"]
+    columns = ["model", fwhm, "bic", "weight", "reduced_chi_squared"]
     screen.table("models", result.to_frame(), columns)
     screen.heading()
     columns = ["image", "normal_deg ± normal_uncertainty_deg", fwhm, "line_fwhm_um"]

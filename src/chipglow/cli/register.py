@@ -205,7 +205,7 @@ def _print_registration(registration: "lab.Registration", measured: "Measurement
 
 def _print_clocks(alignment: "lab.RecordingAlignment") -> None:
     clocks = alignment.clocks
-    offset, uncertainty = 1e6 * clocks.offset, 1e6 * float(clocks.covariance[0, 0]) ** 0.5
+    offset, uncertainty = 1e6 * clocks.offset, 1e6 * clocks.uncertainty
     current().say(
         f"Visible clock = infrared clock + {offset:.2f} us, standard uncertainty "
         f"{uncertainty:.2g} us, correlation {clocks.correlation:.3f}.",

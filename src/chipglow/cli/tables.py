@@ -23,7 +23,6 @@ _SHORT: Final = {
     "fwhm": "FWHM",
     "rms": "RMS",
     "mtf": "MTF",
-    "aicc": "AICc",
     "bic": "BIC",
     "chi squared": "chi²",
     "E n": "E_n",

@@ -9,7 +9,6 @@ covariance of a systematic one is the product of its values. What obsarray has n
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -20,11 +19,7 @@ from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.estimate import Estimate, factor
 
-_FEW: Final = 32
-"""Errors of one component that are all kept, also where there are fewer values."""
-
-_MANY: Final = 1000
-"""Values from which on their covariance is not decomposed."""
+_MOST_ERRORS: Final = 1000
 
 _RANDOM, _SYSTEMATIC, _MATRIX = "random", "systematic", "err_corr_matrix"
 
@@ -34,8 +29,7 @@ def to_xarray(
 ) -> xr.Dataset:
     """Return values and components as variables of a dataset; those of several can be merged.
 
-    A component of more errors than values, and more than 32, is kept by as many errors as there
-    are values: with the same covariance, but no longer the same as the errors of other estimates.
+    A component of over 1000 errors, such as those of all pixels in a mean, is refused.
     """
     dims = [f"dim_{n}" for n in range(estimate.values.ndim)] if dims is None else list(dims)
     if len(dims) != estimate.values.ndim:
@@ -44,7 +38,7 @@ def to_xarray(
         )
     variables: dict[str, Any] = {}
     for component in estimate.components:
-        for values, attributes in _parts(component, name):
+        for values, attributes in _parts(component):
             values = values.reshape(estimate.shape)
             label = _label(attributes, name, variables)
             forms = correlation_forms(dict.fromkeys(dims, attributes.pop("form")))
@@ -80,40 +74,19 @@ def from_xarray(data: xr.Dataset, name: str) -> Estimate:
     return Estimate(variable.values, tuple(components), *remarks)
 
 
-def _parts(component: Component, name: str) -> Iterator[tuple[Array, dict[str, Any]]]:
+def _parts(component: Component) -> Iterator[tuple[Array, dict[str, Any]]]:
     """Yield values and attributes of the uncertainty variables of a component."""
     if component.per_element:
         yield component.effects.diagonal(), {**_attributes(component.cause, 0), "form": _RANDOM}
         return
-    component = _compact(component, name)
-    for error in range(component.cause.errors):
-        attributes = {**_attributes(component.cause, error), "form": _SYSTEMATIC}
-        yield component.effects[:, error], attributes
-
-
-def _compact(component: Component, name: str) -> Component:
-    """Return the component with at most as many errors as values."""
-    size, errors = component.effects.shape
-    if errors > max(size, _FEW) and size > _MANY:
+    effects, errors = component.effects, component.cause.errors
+    if errors > _MOST_ERRORS:
         raise ValueError(
-            f"component {component.cause.name}: {errors} errors in {size} values, expected "
-            f"{_MANY} values or fewer where values share errors of their own"
+            f"component {component.cause.name}: {errors} errors that values share, expected "
+            f"{_MOST_ERRORS} or fewer in a file"
         )
-    effects = component.effects
-    effects = effects.toarray() if sparse.issparse(effects) else effects
-    if errors <= max(size, _FEW):
-        return Component(component.cause, effects)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        freedom = np.nanmin(component.variance**2 / component.fourth_moment)
-    cause = replace(
-        component.cause,
-        identity=f"{component.cause.identity} of {name}",
-        errors=size,
-        degrees_of_freedom=float(freedom) if freedom > 0 else np.inf,
-        pooled=True,
-        parts=(),
-    )
-    return Component(cause, np.asarray(np.linalg.qr(effects.T, mode="r")).T.copy())
+    for error, column in enumerate((effects.toarray() if sparse.issparse(effects) else effects).T):
+        yield column, {**_attributes(component.cause, error), "form": _SYSTEMATIC}
 
 
 def _attributes(cause: Cause, error: int) -> dict[str, Any]:

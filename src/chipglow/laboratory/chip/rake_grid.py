@@ -160,16 +160,6 @@ class RakeGrid:
             )
         return notes
 
-    def up_to(self, columns: int) -> "RakeGrid":
-        """Return the first squares along the face."""
-        return replace(
-            self,
-            along=self.along[:columns],
-            estimate=self.estimate[:, :, :columns],
-            standard_deviation=self.standard_deviation[:, :, :columns],
-            count=self.count[:, :, :columns],
-        )
-
     def corners(self) -> Array:
         """Return the corners of the squares in m, shape (m + 1, n + 1, 2)."""
         return _corners(self.tool, self.size, self.depth.size, self.along.size)

@@ -307,13 +307,13 @@ def _compare_grid(
     if grids[0].times.size < _FEW:
         notes.warnings.append(_few_frames("measured", grids[0].times.size))
     columns = min(grid.along.size for grid in grids)
-    base, *others = (grid.up_to(columns) for grid in grids)
+    base, *others = grids
     readings = [
-        _assumed(one.item, grid.frame_estimate, stated)
+        _assumed(one.item, grid.frame_estimate[:, :columns], stated)
         for one, grid in zip(files[1:], others, strict=True)
     ]
-    own = _measured_squares(files[0].item, base, stated)
-    return Readings("rake face", base.along, own, tuple(readings), base.depth)
+    own = _measured_squares(files[0].item, base, stated)[:, :columns]
+    return Readings("rake face", base.along[:columns], own, tuple(readings), base.depth)
 
 
 def _measured_squares(

@@ -1,7 +1,7 @@
 """Figure of measured and simulated temperatures and their difference (the paper's 7 and 9)."""
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import COLOURS, GREY
-from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, Readings
+from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Estimate
 
@@ -41,8 +41,6 @@ def draw_comparison(comparison: Comparison) -> Figure:
             below.set_xlabel(label)
             _draw_values(above, place, readings, comparison.labels)
             _draw_differences(below, place, readings)
-            if grid is not None and place is grid.distance:
-                _draw_deeper(below, grid)
         panels[0, 0].set_ylabel("radiance temperature / °C")
         panels[1, 0].set_ylabel("simulated − measured / K")
         handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -66,20 +64,6 @@ def _draw_values(
         values = reading.values - ZERO_CELSIUS
         axes.plot(x, values, color=_colour(i), label=label)
         drawing.shade(axes, x, values, COVERAGE * reading.standard_uncertainty, _colour(i))
-
-
-def _draw_deeper(axes: Axes, grid: Readings) -> None:
-    """Draw the differences of the rows behind the first, without bars."""
-    assert grid.depth is not None
-    rows = grid.depth.size
-    for row in range(1, rows):
-        for i, reading in enumerate(grid.simulated):
-            away = reading.values[row] - grid.measured.values[row]
-            style: dict[str, Any] = {"color": _colour(i), "alpha": 0.6 * (1 - row / rows) + 0.1}
-            axes.plot(1e6 * grid.distance, away, linewidth=0.8, linestyle="--", **style)
-    if rows > 1:
-        deepest = 1e6 * float(grid.depth[-1])
-        axes.set_title(f"dashed: deeper rows, to {deepest:.3g} µm", fontsize="small")
 
 
 def _draw_differences(axes: Axes, place: Array, readings: Sequence[Estimate]) -> None:

@@ -160,33 +160,21 @@ def _constant(row: xr.Dataset) -> EmissivityLine:
     return EmissivityLine.measured(name, str(row["feature"].values), heating, estimate, spread)
 
 
-def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = None) -> MapSurface:
-    """Read an emissivity map as a surface.
+def read_emissivity_map(path: str | os.PathLike[str]) -> MapSurface:
+    """Read the emissivity map of a file of `write_emissivity` as a surface.
 
-    Parameters
-    ----------
-    path : path-like
-        A file of `write_emissivity`.
-    reference : float, optional
-        Take the map of the nearest true temperature in K. By default every pixel of several maps
-        has a straight line over the temperature.
-
-    Returns
-    -------
-    MapSurface
-        Emissivities limited to 0 to 1, with the mean standard uncertainty of the pixels.
+    Every pixel of several maps has a straight line over the temperature. Emissivities are limited
+    to 0 to 1; their uncertainty is the mean of the maps'.
     """
 
     def surface(data: xr.Dataset) -> MapSurface:
-        temperatures = data["reference"].values
-        if reference is not None:
-            data = data.isel(reference=[int(np.abs(temperatures - reference).argmin())])
-        values = data["emissivity"].values.astype(np.float64)
+        kelvins, values = data["reference"].values, data["emissivity"].values.astype(np.float64)
         spread = data["standard_uncertainty"].values.astype(np.float64).mean(axis=0)
         x, y, pitch = data["x"].values, data["y"].values, float(data.attrs["pitch"])
         raster = Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
-        away = data["reference"].values - data["reference"].values.mean()
-        middle, scatter = float(data["reference"].values.mean()), float((away**2).sum())
+        middle = float(kelvins.mean())
+        away = kelvins - middle
+        scatter = float((away**2).sum())
         slopes = np.tensordot(away, values, axes=1) / scatter if scatter else None
         mean = np.clip(values.mean(axis=0), 0.0, 1.0)
         return MapSurface(mean, raster, 0.0, slopes, middle, spread, origin=_origin(data))

@@ -22,7 +22,6 @@ from chipglow.laboratory.psf.knife_edge import (
     psf_kernel as psf_kernel,
 )
 from chipglow.laboratory.psf.psf_fit import ModelFit as ModelFit
-from chipglow.laboratory.psf.radial_psf import RadialPSF as RadialPSF
 from chipglow.laboratory.psf.size_of_source import (
     ApertureImage as ApertureImage,
     aperture_image as aperture_image,

@@ -144,6 +144,8 @@ def sentences(found: KnifeEdge) -> list[str]:
         f"The optics' point spread function is {width} um wide (full width at half maximum, with "
         f"its standard uncertainty; {found.best.model.name}: {_parameters(found.best)})."
     ]
+    if found.oval:
+        lines[0] += f" Across the edges alone it is known to {found.edge_uncertainty * 1e6:.2g} um."
     lines += _directions(found)
     if (text := _study_section(found)) is not None:
         lines.append(f"For a study's camera: psf_order: optics, psf: {text}")

@@ -109,14 +109,6 @@ def write_psf(
         data = data.assign(_fit_variables(fit.model.name.replace(" ", "_"), fit, weight))
     for number, edge in enumerate(knife.edges, 1):
         data = data.assign(_edge_variables(f"edge{number}", edge))
-    radial, encircled = knife.radial, knife.radial.encircled
-    data = data.assign(
-        radius=("ring", radial.radius, {"units": "m"}),
-        density=("ring", radial.density, {"units": "m-2"}),
-        encircled_radius=("ring_edge", radial.edges, {"units": "m"}),
-        encircled=("ring_edge", encircled.values, {"units": "1"}),
-        encircled_uncertainty=("ring_edge", encircled.standard_uncertainty, {"units": "1"}),
-    )
     write_dataset(data, path)
 
 
@@ -126,7 +118,6 @@ def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Vari
         "parameters": ", ".join(fit.model.parameters),
         "fwhm": fit.fwhm,
         "fwhm_uncertainty": fit.fwhm_uncertainty,
-        "aicc": fit.aicc,
         "bic": fit.bic,
         "weight": weight,
         "reduced_chi_squared": fit.reduced_chi_squared,

@@ -4,16 +4,15 @@ All is done on radiance. Light is spread and added up by the optics, so that rad
 with the point spread function; temperature, a bent function of it, is not.
 """
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from math import degrees, exp, sqrt
-from typing import Final, Literal
+from math import cosh, degrees, exp, hypot, log, sqrt
+from typing import Final
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
 from scipy.special import chdtri
 
@@ -34,26 +33,30 @@ from chipglow.laboratory.psf.psf_fit import (
 from chipglow.laboratory.psf.psf_models import (
     AnnularModel,
     DefocusedDiscModel,
+    DefocusedRingModel,
     EllipticalModel,
     GaussianModel,
     GaussianTailModel,
     MoffatModel,
     PSFModel,
 )
-from chipglow.laboratory.psf.radial_psf import FIT, RadialPSF, kernel_component, radial_psf
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
 from chipglow.quantities import Array
 from chipglow.text import Notes
+from chipglow.uncertainty import Cause, Component
 from chipglow.uncertainty.estimate import factor
 
-RADIAL: Final = "radial"
-"""Name of the point spread function without a model."""
+FIT: Final = "psf fit"
+"""Name of the component that the noise of the images makes."""
 
 MODEL: Final = "psf model"
 """Name of the component that the choice among the models makes."""
 
-UNEXPLAINED: Final = "psf unexplained"
-"""Name of the component that is made by what no model explains."""
+OVAL: Final = "psf oval"
+"""Name of the component of an oval that the edges do not show."""
+
+_MOST_OVAL: Final = 2.0
+"""Ratio of the axes of such an oval, at most."""
 
 _ROUGHLY: Final = 1e-6
 _NOISE_ALONE: Final = 1.6
@@ -64,13 +67,10 @@ _NOTHING: Final = 5e-4
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
 _ALIGNED: Final = np.pi / 9
-_NUMBERS: Final = {1: "one orientation", 2: "two orientations"}
-_SEED: Final = 12233
-_SUBSAMPLES: Final = 9
 _SAMPLES_PER_WIDTH: Final = 10
 _NO_WEIGHT: Final = 1e-6
 
-_Kernel = Callable[[PointSpreadFunction], Array]
+_Kernel = Callable[..., Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,18 +102,11 @@ class KnifeEdge:
     """
     apertures: ApertureSignals | None
     """Signals of apertures that were fitted with the edges."""
+    oval: float
+    """Relative standard uncertainty of the width by an oval of up to 2:1 that the edges do not
+    show; 0 from three orientations on.
+    """
     notes: Notes
-
-    @cached_property
-    def radial(self) -> RadialPSF:
-        """A round point spread function without a model."""
-        return radial_psf(
-            self.best,
-            [edge.pixels for edge in self.edges],
-            [edge.curves for edge in self.edges],
-            self.apertures,
-            np.random.default_rng(_SEED),
-        )
 
     @property
     def best(self) -> ModelFit:
@@ -122,7 +115,9 @@ class KnifeEdge:
 
     @property
     def weights(self) -> tuple[float, ...]:
-        """Probability of each model by the Bayesian criterion."""
+        """Probability of each model by the Bayesian criterion; all are alike where none fits."""
+        if self.unexplained:
+            return (1 / len(self.fits),) * len(self.fits)
         likely = [exp(-min(fit.bic - self.best.bic, 700.0) / 2) for fit in self.fits]
         return tuple(value / sum(likely) for value in likely)
 
@@ -133,15 +128,18 @@ class KnifeEdge:
 
     @property
     def fwhm_uncertainty(self) -> float:
-        """Its standard uncertainty in m.
+        """Its standard uncertainty in m."""
+        return hypot(self.edge_uncertainty, self.oval * self.fwhm)
 
-        With the spread of the models by their weights and, where the best leaves more than noise
-        explains, with how much wider or narrower the point spread function is without a model.
+    @property
+    def edge_uncertainty(self) -> float:
+        """Standard uncertainty of the width across the edges in m, with the spread of the models.
+
+        An oval that the edges do not show is not in it.
         """
         pairs = zip(self.weights, self.fits, strict=True)
         spread = sum(weight * (fit.fwhm - self.fwhm) ** 2 for weight, fit in pairs)
-        wider = self.radial.wider if self.unexplained else 0.0
-        return sqrt(self.best.fwhm_uncertainty**2 + spread + wider**2)
+        return sqrt(self.best.fwhm_uncertainty**2 + spread)
 
     @property
     def unexplained(self) -> bool:
@@ -158,7 +156,6 @@ class KnifeEdge:
                 "model": fit.model.name,
                 "fwhm_um": 1e6 * fit.fwhm,
                 "fwhm_uncertainty_um": 1e6 * fit.fwhm_uncertainty,
-                "aicc": fit.aicc - self.best.aicc,
                 "bic": fit.bic - self.best.bic,
                 "weight": weight,
                 "reduced_chi_squared": fit.reduced_chi_squared,
@@ -175,20 +172,12 @@ class KnifeEdge:
         for fit in self.fits:
             if fit.model.name == name:
                 return fit
-        known = ", ".join([*(fit.model.name for fit in self.fits), RADIAL])
+        known = ", ".join(fit.model.name for fit in self.fits)
         raise ValueError(f"model: {name!r} was not fitted, expected one of {known}")
 
-    def psf(
-        self, part: Literal["optics", "system"] = "optics", model: str | None = None
-    ) -> PointSpreadFunction:
-        """Return the point spread function, for ``Camera(psf=...)``."""
-        if part not in ("optics", "system"):
-            raise ValueError(f"part: {part!r}, expected optics or system")
-        if model == RADIAL:
-            optics: PointSpreadFunction = self.radial.psf()
-        else:
-            optics = (self.best if model is None else self.fit(model)).psf()
-        return optics if part == "optics" else _with_pixel(optics, self.edges[0].image.footprint)
+    def psf(self, model: str | None = None) -> PointSpreadFunction:
+        """Return the optics' point spread function, for ``Camera(psf=...)``."""
+        return (self.best if model is None else self.fit(model)).psf()
 
 
 def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
@@ -237,7 +226,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     edges = [pixels for pixels, _ in read]
     notes = sum((said for _, said in read), Notes())
     signals = aperture_signals(apertures, images[0].footprint) if apertures else None
-    models = _models(images, edges, notes)
+    models, oval = _models(images, edges, notes)
     notes += Notes([text for image in images for text in image.notes.assumed])
     first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
     if min(fit.reduced_chi_squared for fit in first) > _NOISE_ALONE:
@@ -256,18 +245,24 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     notes.warnings.extend(_fit_warnings(best, results))
     if signals is not None:
         notes.warnings.extend(_aperture_warnings(best, signals))
-    return KnifeEdge(results, tuple(fits), signals, notes)
+    return KnifeEdge(results, tuple(fits), signals, oval, notes)
 
 
 def _models(
     images: Sequence[EdgeImage], edges: Sequence[EdgePixels], notes: Notes
-) -> list[PSFModel]:
-    """Return the models that the images can distinguish; note what they assume."""
+) -> tuple[list[PSFModel], float]:
+    """Return the models that the images can distinguish, and how uncertain an oval makes them.
+
+    A limit of a rectangular distribution: of two edges along rows and columns an oblique oval of
+    axes in the ratio r makes the mean width cosh(ln r)^(1/2) times too large, of one orientation
+    any oval makes it up to r^(1/2) times too large or too small.
+    """
     models: list[PSFModel] = [
         GaussianModel(),
         GaussianTailModel(),
         MoffatModel(),
         DefocusedDiscModel(),
+        DefocusedRingModel(),
     ]
     wavelength = images[0].wavelength
     if wavelength is None:
@@ -283,19 +278,17 @@ def _models(
     directions = orientations(edges)
     tilts = [abs(EdgeLine(direction, 0.0).tilt) for direction in directions]
     if len(directions) >= 3:
-        models.append(EllipticalModel(tilted=True))
-    elif len(directions) == 2 and max(tilts) < _ALIGNED:
+        return [*models, EllipticalModel(tilted=True)], 0.0
+    shape, limit, more = "oval", log(_MOST_OVAL) / 2, "edges of three orientations"
+    if len(directions) == 2 and max(tilts) < _ALIGNED:
         models.append(EllipticalModel(tilted=False))
-        notes.assumed.append(
-            "An oval point spread function has its axes along rows and columns: edges of two "
-            "orientations do not show one that lies oblique; an edge at 45 deg would."
-        )
-    else:
-        notes.assumed.append(
-            f"The point spread function is round: edges of {_NUMBERS[len(directions)]} are given, "
-            "which do not show an oval one; edges of three orientations would."
-        )
-    return models
+        shape, limit, more = "oblique oval", log(cosh(log(_MOST_OVAL))) / 2, "an edge at 45 deg"
+    oval = limit / sqrt(3)
+    notes.assumed.append(
+        f"The edges do not show an {shape} point spread function of up to {_MOST_OVAL:g}:1, which "
+        f"makes {100 * oval:.2g} % of the width uncertain; {more} would."
+    )
+    return models, oval
 
 
 def _result(
@@ -367,7 +360,7 @@ def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
             f"No model fits: the best, {best.model.name}, leaves "
             f"{sqrt(best.reduced_chi_squared):.2g} times the noise in the means at a distance, "
             f"{100 * left:.2g} % of the step near the edge; uncertainties are enlarged by it, "
-            "and the point spread function without a model (radial) may be nearer."
+            "and all models count alike."
         )
     return warnings
 
@@ -393,41 +386,33 @@ def _left(edge: EdgeResult) -> float:
     return float(np.sqrt(np.mean(edge.curves["esf_residual"].values[near] ** 2)))
 
 
-def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
-    """Return the kernel of optics and a square pixel."""
-    spacing = footprint / _SUBSAMPLES
-    kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)
-    # A mean over squares of sum 1 leaves rounding below 0 where there is no light.
-    weights = np.maximum(uniform_filter(kernel, _SUBSAMPLES, mode="constant"), 0)
-    return MeasuredPSF(weights, spacing, includes=("footprint",))
-
-
 def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     """Return the kernel of the optics with the components of its uncertainty.
 
-    `FIT` has an error for each direction of the covariance of the model's parameters; of the one
-    without a model it is that of `RadialPSF`. `MODEL` has one for each other model: its difference
-    by the root of its weight. `UNEXPLAINED`, where the best model leaves more than noise does, is
-    the difference of the point spread function without a model. They are the parts of
-    `KnifeEdge.fwhm_uncertainty`.
+    `FIT` has an error for each direction of the covariance of the model's parameters. `MODEL` has
+    one for each other model: its difference by the root of its weight. `OVAL` is a kernel of
+    another size. They are the parts of `KnifeEdge.fwhm_uncertainty`.
     """
-    psf = knife.psf(model=model)
-    if model == RADIAL:
-        assert isinstance(psf, MeasuredPSF)
-        return psf
     fit = knife.best if model is None else knife.fit(model)
+    psf = fit.psf()
     spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
     middle = normalised(psf.kernel(spacing))
 
-    def kernel(other: PointSpreadFunction) -> Array:
-        return _of_side(normalised(other.kernel(spacing)), len(middle))
+    def kernel(other: PointSpreadFunction, wider: float = 1.0) -> Array:
+        return _of_side(normalised(other.kernel(spacing / wider)), len(middle))
 
     parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: _of_the_model(knife, fit, kernel)}
-    if knife.unexplained:
-        radial = knife.radial
-        parts[UNEXPLAINED] = [kernel(radial.psf()) - kernel(radial.model_psf())]
-    components = [kernel_component(name, effects) for name, effects in parts.items() if effects]
+    if knife.oval:
+        parts[OVAL] = [(kernel(psf, 1 + knife.oval) - kernel(psf, 1 - knife.oval)) / 2]
+    components = [_component(name, effects) for name, effects in parts.items() if effects]
     return MeasuredPSF(middle, spacing, tuple(components))
+
+
+def _component(name: str, effects: Sequence[Array]) -> Component:
+    """Return errors of a kernel, which are the same in another run."""
+    columns = np.stack([one.ravel() for one in effects], axis=1)
+    identity = hashlib.sha256(columns.tobytes()).hexdigest()[:16]
+    return Component(Cause(name, identity, len(effects)), columns)
 
 
 def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:

@@ -133,12 +133,6 @@ class ModelFit:
         return self.vector.size
 
     @property
-    def aicc(self) -> float:
-        """Akaike's information criterion with its correction for few values."""
-        n, k = self.count, self.free + 1
-        return n * log(self.chi_square / n) + 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
-
-    @property
     def bic(self) -> float:
         """The Bayesian information criterion."""
         return self.count * log(self.chi_square / self.count) + (self.free + 1) * log(self.count)

@@ -34,6 +34,8 @@ _EVEN_DISC: Final = 30.0
 _MOFFAT_NODES: Final = np.geomspace(1e-7, 60.0, 1000)
 """Arguments of the transfer function: it is 1 under and 0 over them."""
 _MOST_WIDTHS: Final = 60.0
+_RADII: Final = 201
+"""Radii among which the largest density is looked for."""
 
 
 class PSFModel(ABC):
@@ -79,13 +81,19 @@ class PSFModel(ABC):
         raise NotImplementedError
 
     def fwhm(self, values: Array) -> float:
-        """Return the full width at half maximum of the optics' point spread function in m."""
-        zero = np.zeros(())
-        half = float(self.density(values, zero, zero)) / 2
-        reach, _ = self.sampling(values)
-        return 2 * float(
-            brentq(lambda r: float(self.density(values, np.array(r), zero)) - half, 0.0, reach)
-        )
+        """Return the full width at half maximum of the optics' point spread function in m.
+
+        It is twice the largest radius with half of the largest density: a ring may be dark within.
+        """
+        radii = np.linspace(0.0, self.sampling(values)[0], _RADII)
+        density = self.density(values, radii, np.zeros(()))
+        half = float(density.max()) / 2
+        last = int(np.flatnonzero(density >= half)[-1])
+
+        def excess(radius: float) -> float:
+            return float(self.density(values, np.array(radius), np.zeros(()))) - half
+
+        return 2 * float(brentq(excess, radii[last], radii[last + 1]))
 
     def psf(self, values: Array) -> PointSpreadFunction:
         """Return the optics' point spread function, for a camera of order ``optics``."""
@@ -254,15 +262,42 @@ class DefocusedDiscModel(PSFModel):
         return disc_transfer(values[0] / 2 * frequency) * _gaussian_transfer(values[1], frequency)
 
     def density(self, values: Array, x: Array, y: Array) -> Array:
-        """Return the light that the blur puts on a point: the noncentral chi-squared."""
-        disc, sigma, radius = values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y)
-        if disc > _EVEN_DISC * sigma:
-            return np.asarray(ndtr((disc - radius) / sigma))
-        return np.asarray(chndtr((disc / sigma) ** 2, 2.0, (radius / sigma) ** 2))
+        return _blurred_disc(values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y))
 
     def sampling(self, values: Array) -> tuple[float, float]:
         radius, sigma = float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
         return radius + 5 * sigma, max(min(radius / 8, sigma), radius / 40)
+
+
+@dataclass(frozen=True)
+class DefocusedRingModel(PSFModel):
+    """An even ring, as a mirror objective out of focus makes it, blurred by a Gaussian."""
+
+    name = "defocused ring"
+    parameters = ("disc_diameter", "blur_fwhm", "obscured_area")
+    shapes = (1.0, 0.2, 0.2), (1.0, 0.2, 0.6), (1.0, 0.6, 0.2)
+    lowest, highest = (0.1, 0.02, 0.0), (inf, inf, 0.9)
+
+    def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
+        radius, area = values[0] / 2, values[2]
+        inner = disc_transfer(radius * sqrt(max(area, 0.0)) * frequency)
+        ring = (disc_transfer(radius * frequency) - area * inner) / (1 - area)
+        return np.asarray(ring * _gaussian_transfer(values[1], frequency))
+
+    def density(self, values: Array, x: Array, y: Array) -> Array:
+        outer, sigma, radius = values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y)
+        inner = max(outer * sqrt(max(values[2], 0.0)), 1e-3 * outer)
+        return _blurred_disc(outer, sigma, radius) - _blurred_disc(inner, sigma, radius)
+
+    def sampling(self, values: Array) -> tuple[float, float]:
+        return DefocusedDiscModel().sampling(values)
+
+
+def _blurred_disc(disc: float, sigma: float, radius: Array) -> Array:
+    """Return the light that a blur puts on points of a disc: the noncentral chi-squared."""
+    if disc > _EVEN_DISC * sigma:
+        return np.asarray(ndtr((disc - radius) / sigma))
+    return np.asarray(chndtr((disc / sigma) ** 2, 2.0, (radius / sigma) ** 2))
 
 
 @dataclass(frozen=True)

@@ -29,41 +29,21 @@ _PENALTIES: Final = (-6.0, 9.0)
 
 @dataclass(frozen=True)
 class TimeAlignment:
-    """How the visible camera's clock goes by the infrared camera's.
-
-    Visible time = infrared time + `offset` + `drift` (infrared time - `reference`).
-    """
+    """Offset of the visible camera's clock: visible time = infrared time + `offset`."""
 
     offset: float
-    """In s, at the reference."""
-    drift: float
-    """In s/s; 0 where it was not asked for."""
-    reference: float
-    """In s of the infrared camera's clock."""
-    covariance: Array
-    """Covariance of offset and drift, shape (2, 2)."""
+    """In s."""
+    uncertainty: float
+    """Standard uncertainty of the offset in s."""
     correlation: float
     """Of both signals as they lie on each other."""
     degrees_of_freedom: float
     warnings: tuple[str, ...] = ()
     """Why it cannot be trusted, a sentence each."""
 
-    def visible_time(self, infrared_time: Array) -> Array:
-        """Return the times of the visible camera's clock in s."""
-        return infrared_time + self.offset + self.drift * (infrared_time - self.reference)
-
-    def uncertainty(self, infrared_time: Array) -> Array:
-        """Return the standard uncertainty of `visible_time` in s."""
-        slope = np.stack([np.ones_like(infrared_time), infrared_time - self.reference], axis=-1)
-        return np.asarray(np.sqrt(((slope @ self.covariance) * slope).sum(axis=-1)))
-
 
 def align_times(
-    infrared_times: Array,
-    infrared_signal: Array,
-    visible_times: Array,
-    visible_signal: Array,
-    drift: bool = False,
+    infrared_times: Array, infrared_signal: Array, visible_times: Array, visible_signal: Array
 ) -> TimeAlignment:
     """Find the offset of two clocks from one signal that both cameras saw.
 
@@ -74,8 +54,6 @@ def align_times(
     infrared_signal, visible_signal : ndarray
         A number a frame that shows the same event: the position of the chip's edge, or the mean
         brightness of a region. One may fall where the other rises.
-    drift : bool
-        Whether one clock may be faster than the other.
 
     Raises
     ------
@@ -101,7 +79,7 @@ def align_times(
     target = (infrared_signal - infrared_signal.mean()) / infrared_signal.std()
     offsets, correlations = _correlations(infrared_times, target, visible_times, spline)
     best = int(np.abs(correlations).argmax())
-    found = _refined(infrared_times, target, spline, float(offsets[best]), drift)
+    found = _refined(infrared_times, target, spline, float(offsets[best]))
     warnings = (
         *_chance(found.correlation, found.degrees_of_freedom, len(offsets)),
         *_rivals(offsets, correlations, best, len(target)),
@@ -116,31 +94,16 @@ def simultaneous_frames(
     visible_times: Array,
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
-    """Return the visible frames that were exposed within each infrared integration.
+    """Return the numbers of the visible frames that were exposed within each integration.
 
-    Parameters
-    ----------
-    alignment : TimeAlignment
-        The clocks.
-    infrared_times : ndarray
-        When each integration began in s, shape (n,).
-    integration_time : float
-        In s.
-    visible_times : ndarray
-        When each visible exposure began in s, shape (m,).
-    visible_exposure : float
-        In s.
-
-    Returns
-    -------
-    list of ndarray
-        For each infrared frame the numbers of the visible frames, from 0; empty if none.
+    Times are when integrations and exposures began in s.
     """
-    begin = alignment.visible_time(infrared_times)
-    end = alignment.visible_time(infrared_times + integration_time)
+    begins = infrared_times + alignment.offset
     return [
-        np.flatnonzero((visible_times < last) & (visible_times + visible_exposure > first))
-        for first, last in zip(begin, end, strict=True)
+        np.flatnonzero(
+            (visible_times < begin + integration_time) & (visible_times + visible_exposure > begin)
+        )
+        for begin in begins
     ]
 
 
@@ -228,32 +191,23 @@ def _correlation(target: Array, values: Array) -> Array:
     return np.where(enough & (size > 0), product / np.maximum(size, 1e-300), 0.0)
 
 
-def _refined(
-    times: Array, target: Array, spline: CubicSpline, begin: float, drift: bool
-) -> TimeAlignment:
+def _refined(times: Array, target: Array, spline: CubicSpline, begin: float) -> TimeAlignment:
     """Return the clocks near an offset, by least squares."""
-    known, reference = np.isfinite(spline(times + begin)), float(times.mean())
-    times, target = times[known], target[known]
-    since = times - reference
+    known = np.isfinite(spline(times + begin))
+    times, target = times[known] + begin, target[known]
     unit = float(np.median(np.diff(spline.x)))
-    # Parameters are offset and drift as shifts by visible frames, the drift's at the end.
-    scale = unit / np.array([1.0, max(float(np.abs(since).max()), 1e-300)])[: 1 + drift]
 
-    def placed(shift: Array) -> Array:
-        moved = times + begin + np.polynomial.polynomial.polyval(since, scale * shift)
-        return np.asarray(spline(np.clip(moved, spline.x[0], spline.x[-1])))
+    def placed(shift: float) -> Array:
+        return np.asarray(spline(np.clip(times + unit * shift, spline.x[0], spline.x[-1])))
 
-    slope, level = np.polyfit(spline(times + begin), target, 1)
-    start = np.concatenate([[level, slope], np.zeros(scale.size)])
-    fit = least_squares(lambda p: p[0] + p[1] * placed(p[2:]) - target, start, x_scale="jac")
-    freedom = max(times.size - start.size, 1)
-    slopes = np.linalg.pinv(fit.jac.T @ fit.jac)[2:, 2:] * np.outer(scale, scale)
-    covariance, shift = np.zeros((2, 2)), np.zeros(2)
-    covariance[: scale.size, : scale.size] = float(fit.fun @ fit.fun) / freedom * slopes
-    shift[: scale.size] = scale * fit.x[2:]
+    slope, level = np.polyfit(placed(0.0), target, 1)
+    start = [level, slope, 0.0]
+    fit = least_squares(lambda p: p[0] + p[1] * placed(p[2]) - target, start, x_scale="jac")
+    freedom = max(times.size - len(start), 1)
+    variance = float(fit.fun @ fit.fun) / freedom * np.linalg.pinv(fit.jac.T @ fit.jac)[2, 2]
     correlation = float(np.corrcoef(target, target + fit.fun)[0, 1]) * float(np.sign(fit.x[1]))
-    offset, rate = shift.tolist()
-    return TimeAlignment(begin + offset, rate, reference, covariance, correlation, freedom)
+    offset = begin + unit * float(fit.x[2])
+    return TimeAlignment(offset, unit * float(np.sqrt(variance)), correlation, freedom)
 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
