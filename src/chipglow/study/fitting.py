@@ -148,7 +148,7 @@ def _place(raster: Raster) -> str:
 
 
 def left_to_the_paper(study: Study) -> Iterator[str]:
-    """Yield what is the paper's in a study that is another, a sentence for each section."""
+    """Yield the omitted settings, which have the paper's values, one sentence per section."""
     if study.is_papers:
         return
     without, plan = dict(_HOW_FINELY), study.analysis
@@ -162,10 +162,10 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
     for name, fields in without.items():
         left = list(_unset(getattr(study, name), fields, ""))
         if left:
-            yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
+            yield f"The paper's values of omitted settings of {name}: {', '.join(left)}."
     if of_a_cut and "psf_widths" not in plan.given:
         low, *_, high = (LENGTH.text(width) for width in study.plan.psf_widths)
-        yield f"PSF widths from {low} to {high} go round the camera's own (analysis.psf_widths)."
+        yield f"PSF widths from {low} to {high} are chosen around the camera's own (analysis.psf_widths)."
 
 
 def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
