@@ -65,14 +65,14 @@ _NOISE: Final = {
 """A detector with this noise and steps too fine to matter."""
 
 _SLACK: Final = 1e-7
-"""How far outside the image a position may be in m: links round to this."""
+"""Tolerance of a position outside the image in m: links round to this."""
 
 
 @dataclass(frozen=True)
 class ShownStudy(Study):
     """A study of an open scene, and what the page shows of it."""
 
-    start: Annotated[float, Parameter("When the exposure begins.", INSTANT)] = 0.0
+    start: Annotated[float, Parameter("Start of the exposure.", INSTANT)] = 0.0
     scene_image: Annotated[str, Parameter("Image of the scene.")] = "temperature"
     error_image: Annotated[str, Parameter("Image of the error.")] = "total"
 

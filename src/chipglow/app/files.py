@@ -1,4 +1,4 @@
-"""What the page saves and draws with Matplotlib: study, measurement, the whole chip."""
+"""Files of the page and pictures by Matplotlib: study, measurement, the whole chip."""
 
 from io import BytesIO
 from pathlib import Path

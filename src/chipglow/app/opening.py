@@ -1,4 +1,4 @@
-"""What the app opens: a scene, a folder of results, a measurement, or the bundled scene."""
+"""Inputs of the app: a scene, a folder of results, a measurement, or the bundled scene."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -80,7 +80,7 @@ def open_scene_object(scene: Scene, study: Study | None, name: str) -> SceneMode
 
 
 class OpenFiles:
-    """What the command opened, and what was uploaded since: the key of an upload is its name."""
+    """The command's input and the uploads; the key of an upload is its name."""
 
     def __init__(self, first: Model) -> None:
         self._folder = TemporaryDirectory(prefix="chipglow-app-")

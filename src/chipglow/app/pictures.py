@@ -355,7 +355,7 @@ Model: TypeAlias = SceneModel | MeasurementModel
 
 
 def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
-    """Return a spline scene with at most `count` samples a frame; others as they are."""
+    """Return a spline scene with at most `count` samples per frame; others as they are."""
     step = ceil(sqrt(scene.raster.rows * scene.raster.columns / count))
     if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
         return scene

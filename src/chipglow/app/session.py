@@ -78,7 +78,7 @@ Notify: TypeAlias = Callable[..., None]
 
 
 class Session:
-    """The state of one user, by default that of the study."""
+    """The state of one user, by default the study's."""
 
     def __init__(self, opened: Model, notify: Notify) -> None:
         self.model = replace(opened)

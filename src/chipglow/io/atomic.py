@@ -1,4 +1,4 @@
-"""Output that is there whole or not at all."""
+"""Output that is written completely or not at all."""
 
 import ctypes
 import errno
@@ -18,7 +18,7 @@ MANIFEST: Final = ".chipglow-files"
 """File in a folder of results that lists the files that chipglow wrote there, one a line."""
 
 TOKEN: Final = "[0-9a-f]" * 8
-"""Pattern of what makes temporary names differ."""
+"""Pattern of the random part of temporary names."""
 
 _OF_THE_SYSTEM: Final = {MANIFEST, ".DS_Store", "Thumbs.db", "desktop.ini"}
 _NO_ROOM: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -148,7 +148,7 @@ def errors_name(path: Path, temporary: Path) -> Iterator[None]:
 
 @contextmanager
 def _temporary(path: Path, create: Callable[[Path], None]) -> Iterator[Path]:
-    """Create a file or folder beside `path` and hold it; it is removed, if it is still there.
+    """Create a file or folder next to `path` and hold it; it is removed if it still exists.
 
     Those whose process ended before it could do so are removed at the beginning.
     """

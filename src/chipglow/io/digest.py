@@ -18,10 +18,10 @@ from chipglow.io.sources import SourceError
 from chipglow.text import check_own_data
 
 PATIENCE: Final = 30.0
-"""How long HDF5 may take to find its way through the smallest file, in s; it takes 0.2 s."""
+"""Time limit of HDF5 for the smallest file in s; it takes 0.2 s."""
 
 PATIENCE_PER_BYTE: Final = 1e-6
-"""How much longer for each byte, in s; it reads 200 MB/s."""
+"""Additional time limit per byte in s; HDF5 reads 200 MB/s."""
 
 _MARK: Final = b"\nchipglow sha256:"
 _LENGTH: Final = len(_MARK) + sha256().digest_size
@@ -31,7 +31,7 @@ _BLOCK: Final = 1 << 20
 class HDF5Sink(FileIO):
     """A file that HDF5 writes, which keeps its first error for `check` to raise.
 
-    HDF5 loses the errors of what it writes late, and a process that closes an HDF5 file on a full
+    HDF5 loses errors of delayed writes, and a process that closes an HDF5 file on a full
     disk can crash. Here HDF5 sees no error.
     """
 

@@ -1,4 +1,4 @@
-"""What the description of an import says: where fields are, what they mean, where to sample."""
+"""The description of an import: fields, their meaning, and the samples."""
 
 import re
 from collections.abc import Iterable
@@ -54,7 +54,7 @@ class ImportDescription(Part):
     kind: Annotated[  # type: ignore[misc]
         Literal["movie", "mesh", "points", "grid"] | None,
         Parameter(
-            "What the source is; none: the file's name says it.",
+            "Kind of the source; none: by the file name.",
             allowed="movie, mesh, points, grid",
         ),
     ] = None  # type: ignore[assignment]
@@ -66,7 +66,7 @@ class ImportDescription(Part):
             "velocity: V}",
         ),
     ] = field(default_factory=dict)
-    units: Annotated[Units, Parameter("Units of the source: SI if nothing is said.")] = field(
+    units: Annotated[Units, Parameter("Units of the source: SI by default.")] = field(
         default_factory=Units
     )
     interval: Annotated[
@@ -75,16 +75,14 @@ class ImportDescription(Part):
     placement: Annotated[Placement, Parameter("How the source's axes lie in the scene.")] = field(
         default_factory=Placement
     )
-    field_of_view: Annotated[View, Parameter("Where the scene is sampled.")] = field(
-        default_factory=View
-    )
+    field_of_view: Annotated[View, Parameter("Samples of the scene.")] = field(default_factory=View)
     tool: Annotated[
         ToolSection | None,
         Parameter("The tool's outline with its tip at the origin: what is in it is tool."),
     ] = None
-    completion: Annotated[Completion, Parameter("What stands in for what the source lacks.")] = (
-        field(default_factory=Completion)
-    )
+    completion: Annotated[
+        Completion, Parameter("Substitutes for fields that the source lacks.")
+    ] = field(default_factory=Completion)
     mesh: Annotated[MeshSource, Parameter("More of a mesh.")] = field(default_factory=MeshSource)
     movie: Annotated[MovieSource, Parameter("More of a movie.")] = field(
         default_factory=MovieSource
@@ -187,7 +185,7 @@ def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescr
     Raises
     ------
     DescriptionError
-        If the file is no YAML or the import is not possible.
+        If the file is not YAML or the import is impossible.
     OSError
         If the file cannot be read.
     """

@@ -1,4 +1,4 @@
-"""From a source of fields to a scene's file, frame by frame."""
+"""From a source of fields to a scene file, frame by frame."""
 
 import json
 import os
@@ -24,7 +24,7 @@ from chipglow.scene.completion import Completion, complete
 from chipglow.text import Notes
 
 SAMPLES_ACROSS: Final = 900
-"""Samples along the longer side of a scene, if nothing is said: those of the paper's scene."""
+"""Samples along the longer side of a scene by default: as many as in the paper's scene."""
 
 MOST_SAMPLES: Final = 100_000_000
 """Most samples of a frame."""
@@ -36,7 +36,7 @@ _SMALLEST, _LARGEST = 5e-6, 0.05
 
 @dataclass(frozen=True)
 class View(Part):
-    """Where the scene is sampled; what is not said is as in the source."""
+    """Samples of the scene; by default as in the source."""
 
     left: Annotated[float | None, Parameter("Left edge.", POSITION)] = None
     right: Annotated[float | None, Parameter("Right edge.", POSITION)] = None
@@ -102,7 +102,7 @@ def _metres(extent: Extent) -> str:
 
 @dataclass(frozen=True)
 class Import:
-    """What to read, and what to make of it."""
+    """A source and the description of its import."""
 
     source: Source
     view: View = field(default_factory=View)
@@ -115,7 +115,7 @@ class Import:
 
 @dataclass(frozen=True)
 class Prospect:
-    """What an import will make: what is in the source, where it is sampled, what is assumed."""
+    """Result of a survey: contents of the source, samples and assumptions."""
 
     survey: Survey
     raster: Raster
@@ -156,20 +156,20 @@ def import_scene(
     looked: Prospect | None = None,
     resume: UnfinishedScene | None = None,
 ) -> Prospect:
-    """Read a source into a scene's file; no more than a few frames are in memory.
+    """Read a source into a scene file; no more than a few frames are in memory.
 
     Parameters
     ----------
     wanted : Import
-        What to read.
+        The source.
     path : path-like
         The file to write; it appears when it is whole.
     progress : callable, optional
         Told the fraction that is done, 0 to 1.
     looked : Prospect, optional
-        What `prospect` said, if it was asked before.
+        Result of an earlier `prospect`.
     resume : UnfinishedScene, optional
-        What `kept_import` found of an earlier import of the same, to go on from there.
+        Result of `kept_import`, to continue an earlier import of the same source.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def read_scene(source: Import | Source) -> Scene:
     Parameters
     ----------
     source : Import or Source
-        What to read; all frames have to fit into memory. Of a bare source all is read, and what it
+        The source; all frames must fit into memory. Of a bare source all is read, and what it
         lacks is completed as `Completion` has it by default.
 
     Raises
@@ -287,7 +287,7 @@ def _not_kelvin(wanted: Import, value: float, place: str) -> SourceError:
 def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
     """Refuse what no import could take: no temperature at all, or what is none in kelvin.
 
-    If only a part of the source is in view, the least temperature need not be.
+    If only a part of the source is in view, the lowest temperature need not be.
     """
     if survey.temperatures is None:
         return
@@ -312,7 +312,7 @@ def _holds_all(raster: Raster, survey: Survey) -> bool:
 
 
 def _doubtful_size(survey: Survey) -> tuple[str, ...]:
-    """Return a sentence if the source is larger or smaller than what a microscope sees."""
+    """Return a sentence if the source is larger or smaller than a microscope's field of view."""
     left, right, bottom, top = survey.extent
     size = max(right - left, top - bottom)
     if _SMALLEST <= size <= _LARGEST:
@@ -330,6 +330,6 @@ def _check_times(survey: Survey) -> None:
 
 
 def _key(wanted: Import, looked: Prospect) -> str:
-    """Return what makes two imports the same."""
+    """Return the inputs by which two imports are equal."""
     raster = vars(looked.raster)
     return json.dumps({**wanted.description, "raster": raster}, sort_keys=True, default=str)

@@ -23,7 +23,7 @@ def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) ->
     Parameters
     ----------
     measurement : Measurement
-        What to write.
+        The measurement.
     path : path-like
         The file to write; one that is there is replaced at the end. It loses nothing.
     """
@@ -60,7 +60,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
 
 
 def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str) -> Made:
-    """Return what `made_of` makes of the data of a NetCDF-4 file.
+    """Return the result of `made_of` for the data of a NetCDF-4 file.
 
     If that fails, the error says that the file is not `what`, and `kind` was expected.
     """

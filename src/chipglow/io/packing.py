@@ -30,7 +30,7 @@ def chunk_of(values: NDArray[Any]) -> bytes:
 
 
 def read_chunk(dataset: h5py.Dataset, index: int) -> NDArray[Any]:
-    """Read ``dataset[index]``; what is no chunk with `COMPRESSION` is left to HDF5."""
+    """Read ``dataset[index]``; chunks without `COMPRESSION` are left to HDF5."""
     shape = dataset.shape[1:]
     settings = dataset.id.get_create_plist()
     filters = tuple(settings.get_filter(i)[0] for i in range(settings.get_nfilters()))

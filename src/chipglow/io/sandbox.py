@@ -16,7 +16,7 @@ from chipglow.io.sources.source import Source, SourceError, Survey, damaged
 from chipglow.scene import Raster, SampledFrame
 
 MEMORY: Final = 2 * 1024**3
-"""What a reader may take for itself, in bytes."""
+"""Memory limit of a reader, in bytes."""
 
 PATIENCE: Final = 600.0
 """Maximum time in s for one answer.
@@ -110,7 +110,7 @@ class Isolated(Source):
     patience: float = PATIENCE
 
     def survey(self) -> Survey:
-        """Look at what is there; see `Source.survey`."""
+        """Survey the source; see `Source.survey`."""
         with self._sandbox.answers(partial(_survey, self.source)) as answers:
             survey: Survey = next(answers)
         return survey
@@ -152,7 +152,7 @@ def _send(stream: IO[bytes], answer: Any) -> None:
 
 
 def failure(name: str, error: Exception) -> Exception:
-    """Return the error that the parent raises for what a reader raised."""
+    """Return the error that the parent raises for an error of a reader."""
     if isinstance(error, FileNotFoundError):
         text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         return FileNotFoundError(text)

@@ -135,7 +135,7 @@ class SceneWriter:
         self._spool.append(frame.time, map(chunk_of, self._kept(frame)))
 
     def checkpoint(self, state: Mapping[str, NDArray[Any]], progress: float) -> Path:
-        """Keep the frames so far, with a state to go on from, even if the process is killed."""
+        """Keep the frames so far, with a state to continue from, even if the process is killed."""
         return self._spool.checkpoint(state, progress)
 
     def forces(
@@ -155,7 +155,7 @@ class SceneWriter:
         }
 
     def overview(self, frame: Frame, raster: Raster) -> None:
-        """Write the whole chip at one time, with samples of its own."""
+        """Write the whole chip at one time, with separate samples."""
         check_frame(frame)
         self._overview = frame, raster
 
@@ -351,7 +351,7 @@ def _telling(path: Path, name: str, index: int) -> Iterator[None]:
 
 
 def open_scene(path: str | os.PathLike[str]) -> StoredScene:
-    """Open a scene's file; frames are read when they are asked for.
+    """Open a scene file; frames are read on demand.
 
     Parameters
     ----------
@@ -411,7 +411,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = F
     Parameters
     ----------
     scene : Scene
-        What to write; read and written frame by frame.
+        The scene; read and written frame by frame.
     path : path-like
         The file to write; one that is there is replaced at the end.
     samples : bool

@@ -67,7 +67,7 @@ def create(file: h5netcdf.File, lattice: Lattice) -> None:
             "ambient": lattice.ambient,
         }),
         (LIMITS, ("limited", "side"), (FILLED_SPLINE, 2), {
-            "long_name": "least and greatest value of a sample of the workpiece",
+            "long_name": "smallest and largest value of a sample of the workpiece",
         }),
     ):  # fmt: skip
         file.create_variable(

@@ -1,6 +1,6 @@
-"""Frames of a scene that is being written, and the state to go on from if its writer is ended.
+"""Frames of a scene that is being written, and the state to continue from if its writer is stopped.
 
-Beside the scene's file lie ``.NAME.TOKEN.part`` with the compressed chunks of its frames one after
+Next to the scene file lie ``.NAME.TOKEN.part`` with the compressed chunks of its frames one after
 the other, and after a checkpoint ``.NAME.TOKEN.npz`` with their times, their ends and the state.
 """
 
@@ -50,7 +50,7 @@ class UnfinishedScene:
 
     @property
     def size(self) -> int:
-        """Size of what is left in bytes."""
+        """Size of the remaining files in bytes."""
         return sum(file.stat().st_size for file in self._files() if file.exists())
 
     def remove(self) -> None:

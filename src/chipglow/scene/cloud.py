@@ -1,4 +1,4 @@
-"""Fields of scattered points, as of SPH or the material point method, on a raster.
+"""Fields of scattered points, such as of SPH or the material point method, on a raster.
 
 A sample is the mean of the first-order expansions of the points around it, so linear fields are
 exact, on the free surface too. Weights are quadratic B-splines: values reach 1.1 spacings from a
@@ -137,7 +137,7 @@ def _scatter_kind(
 def _neighbours(
     places: NDArray[np.float64], layers: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Numbers of the nearest points, shape (points, neighbours), and distance of the nearest."""
+    """Indices of the nearest points, shape (points, neighbours), and distance of the nearest."""
     # Where points lie behind one another, more of the nearest are in one place.
     count = min(_NEIGHBOURS * layers, _MOST_NEIGHBOURS, len(places) - 1)
     neighbours = np.empty((len(places), count), np.int32)
@@ -153,7 +153,7 @@ def _neighbours(
 
 
 def _coarseness(neighbours: NDArray[np.int32], nearest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much wider than on a lattice the weights must be, by the disorder around each point.
+    """Return the factor on the width of the weights by the disorder around each point.
 
     It is how much the distance of the nearest point varies among the neighbours, by its mean: 0 on
     a lattice, 0.52 for points at random.

@@ -26,14 +26,14 @@ from chipglow.scene.regions import in_polygon
 from chipglow.scene.tool import Tool
 
 STRAIN_OF_CHIP: Final = 1.0
-"""Plastic strain of the region that is said to be chip, where a source has no strain."""
+"""Plastic strain of the chip's region, if a source has no strain."""
 
 _Corner: TypeAlias = tuple[Position, Position]
 _VELOCITY: Final = frozenset(("velocity_x", "velocity_y"))
 _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
 _MOST_FILLED: Final = 0.5
 _FLOW_FRAMES: Final = 5
-"""The optical flow is that over so many frames: from one to the next little moves."""
+"""Number of frames over which the optical flow is computed: little moves from one to the next."""
 
 _FLOW_SAMPLES: Final = 320
 """Most samples across a picture of which the optical flow is computed: it takes seconds else."""
@@ -41,7 +41,7 @@ _FLOW_SAMPLES: Final = 320
 
 @dataclass(frozen=True)
 class Completion(Part):
-    """What stands in for what the source does not have.
+    """Substitutes for fields that the source lacks.
 
     Its ``tool`` is an outline: samples in it are tool, whatever the source says.
     """
@@ -96,7 +96,7 @@ class Completion(Part):
 
     @property
     def memory(self) -> int:
-        """How many frames before one it depends on."""
+        """Number of earlier frames on which a frame depends."""
         return max(self.rate_frames, _FLOW_FRAMES)
 
     def fields(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
@@ -126,7 +126,7 @@ class Completion(Part):
         if "plastic_strain_rate" not in known and self._has_rate(known, frames):
             yield "Plastic strain rate: from the change of the strain along the motion."
         elif "plastic_strain_rate" not in known:
-            yield "Plastic strain rate: none, so the shear band has no emissivity of its own."
+            yield "Plastic strain rate: none, so the shear band has the emissivity of the chip."
 
     def _velocity_text(self, known: set[str], frames: int) -> str:
         if not self._has_velocity(known):
@@ -280,7 +280,7 @@ def _velocity(
 
 
 def _pattern(frame: SampledFrame) -> NDArray[np.float32]:
-    """What the optical flow follows: the logarithm of the strain, or the temperature."""
+    """Return the field that the optical flow follows: logarithm of strain, or temperature."""
     strain = _elsewhere(frame.fields.get("plastic_strain", frame.fields["temperature"] * 0.0))
     if strain.max() > strain.min():
         return np.log1p(np.maximum(strain, 0.0))

@@ -40,7 +40,7 @@ FILLED: Final = 255
 
 
 class Material(IntEnum):
-    """What a sample of the scene shows."""
+    """Content of a sample of the scene."""
 
     VOID = 0
     WORKPIECE = 1
@@ -51,7 +51,7 @@ class Material(IntEnum):
 class Frame:
     """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
 
-    What a scene does not have, or was not asked for, is None. A scene without material is
+    Fields that a scene lacks, or that were not requested, are None. A scene without material is
     workpiece everywhere. `splines` is what the fields were sampled from, where they were.
     """
 

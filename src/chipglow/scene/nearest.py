@@ -26,7 +26,7 @@ def nearest(known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> tuple[NDArra
 
 
 def fill(values: NDArray[Any], known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> None:
-    """Give wanted samples the value of the nearest known one, if there is any, in place."""
+    """Give wanted samples the value of the nearest known one in place."""
     if wanted.any() and known.any():
         values[wanted] = values[nearest(known, wanted)]
 
@@ -34,7 +34,7 @@ def fill(values: NDArray[Any], known: NDArray[np.bool_], wanted: NDArray[np.bool
 def extended(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Values with all that are not known taken from the nearest that is, shape (y, x).
 
-    Of wide regions it is quicker than `fill`.
+    For wide regions it is quicker than `fill`.
     """
     if known.all() or not known.any():
         return np.where(known, values, np.float32(0.0))

@@ -1,4 +1,4 @@
-"""What a notebook shows of frames on a grid: a line of text, and a picture."""
+"""Text and picture of frames on a grid in a notebook."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -101,7 +101,7 @@ class Region:
             object.__setattr__(self, "feature", self.name)
 
     def mask(self, raster: Raster) -> NDArray[np.bool_]:
-        """Tell which pixels have their middle in the region, shape (y, x)."""
+        """Return which pixels have their centre in the region, shape (y, x)."""
         self._check_inside(raster)
         columns, rows = np.arange(raster.columns) + 0.5, np.arange(raster.rows) + 0.5
         x, y = (columns, rows) if self.unit == "pixel" else (raster.x, raster.y)
@@ -150,7 +150,7 @@ def areas(regions: Sequence[Region], raster: Raster) -> tuple[Area, ...]:
     Parameters
     ----------
     regions : sequence of Region
-        The regions, each with a name of its own.
+        The regions, with different names.
     raster : Raster
         The image's pixels.
 

@@ -115,7 +115,7 @@ class Scene:
         Parameters
         ----------
         raster : Raster
-            Where the samples are.
+            The samples.
         times : array_like
             Times of the frames in s, shape (time,).
         fields : mapping
@@ -205,7 +205,7 @@ class Scene:
 
     @property
     def longest_block(self) -> range:
-        """The longest of the `blocks`, the first of those that are alike."""
+        """The longest of the `blocks`, the first of equal ones."""
         return max(self.blocks, key=len)
 
     @cached_property
@@ -215,7 +215,7 @@ class Scene:
 
     @property
     def tool(self) -> Tool | None:
-        """The tool's outline, if the scene says it."""
+        """The tool's outline, if the scene states it."""
         return stored_tool(self.data.attrs)
 
     @property
@@ -401,7 +401,7 @@ def _check_unit(name: str, values: xr.DataArray, unit: str) -> None:
 
 
 def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
-    # Least and greatest show NaN and infinity too, in half the time of looking for them.
+    # Minimum and maximum show NaN and infinity too, in half the time of a search.
     lowest, highest = float(values.min()), float(values.max())
     if not (isfinite(lowest) and isfinite(highest)):
         raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")

@@ -115,7 +115,7 @@ class Lattice:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Of the coefficients of a frame: fields, rows and columns."""
+        """Shape of the coefficients of a frame: fields, rows and columns."""
         return len(SPLINE_FIELDS), self.rows, self.columns
 
 
@@ -135,7 +135,7 @@ class SplineFrame:
     nodes: NDArray[np.float32]
     """Coefficients of `SPLINE_FIELDS`, float32 of shape `lattice.shape`."""
     limits: NDArray[np.float32]
-    """Least and greatest value of the fields before ``filled``, which splines can overshoot:
+    """Smallest and largest value of the fields before ``filled``, which splines can overshoot:
     float32 of shape (fields, 2)."""
 
     def frame(self, names: Collection[str] | None = None) -> Frame:

@@ -145,7 +145,7 @@ def _right_of(start: float, end: float, curved: bool) -> NDArray[np.float64]:
 class Chamfer(Part):
     """A chamfer of the cutting edge: a flat land between the faces, a T-land, a negative land.
 
-    The land's own rake angle is the rake angle less the chamfer's angle.
+    The land's rake angle is the rake angle minus the chamfer's angle.
     """
 
     width: Annotated[

@@ -158,7 +158,7 @@ def _check_points(line: NDArray[np.float64]) -> None:
 
 
 def _straight_end(line: NDArray[np.float64]) -> int:
-    """Number of the last point of the straight stretch that begins at the first point."""
+    """Index of the last point of the straight stretch that begins at the first point."""
     for end in range(2, len(line)):
         along = line[end] - line[0]
         away = line[1:end] - line[0]

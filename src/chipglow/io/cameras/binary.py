@@ -1,4 +1,4 @@
-"""What the readers of cameras' own formats share: bytes that are there, and frames chosen."""
+"""Base of the readers of proprietary camera formats: bytes of a file, and selected frames."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -101,7 +101,7 @@ class CameraFile(ABC):
     complete : int
         Number of whole frames.
     quantity : str
-        What was measured.
+        The measured quantity.
     dtype : dtype
         Type of the samples.
     """

@@ -1,6 +1,6 @@
 """Files of FLIR's cameras: FFF, SEQ and CSQ, and JPEG with the same records inside.
 
-The layout is that of ExifTool's documentation of FLIR's tags.
+The layout follows ExifTool's documentation of FLIR's tags.
 """
 
 from dataclasses import dataclass

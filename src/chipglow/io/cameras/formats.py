@@ -31,7 +31,7 @@ class CameraFormat:
     Parameters
     ----------
     description : str
-        What it is, for people.
+        A description.
     suffixes : tuple of str
         Endings of such files' names.
     begins : callable, optional
@@ -65,7 +65,7 @@ def _starts(*beginnings: bytes) -> Begins:
 
 
 def _is_hcc(head: bytes) -> bool:
-    """Whether a file begins with TC and a version that is no letter."""
+    """Whether a file begins with TC and a version that is not a letter."""
     return head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32
 
 
@@ -88,7 +88,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     ),
     "hcc": CameraFormat("Telops HCC", (".hcc",), _is_hcc, Hcc.recording),
     "cine": CameraFormat("Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording),
-    "tiff": _array("TIFF, a stack or a file a frame", (".tif", ".tiff"), _starts(*_TIFF)),
+    "tiff": _array("TIFF, a stack or one file per frame", (".tif", ".tiff"), _starts(*_TIFF)),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
     "npz": _array("NumPy arrays, zipped", (".npz",)),
     "mat": _hdf5("MATLAB, versions 5 to 7.3", (".mat",), _starts(b"MATLAB ")),
@@ -99,7 +99,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
         lambda head: _HDF5 in (head[:8], head[512:520]),
     ),
     "zarr": _array("Zarr, a folder or zipped", (".zarr", ".zip")),
-    "csv": _array("table of numbers in text, a file a frame", (".csv", ".txt", ".dat")),
+    "csv": _array("table of numbers in text, one file per frame", (".csv", ".txt", ".dat")),
 }
 
 
@@ -143,26 +143,26 @@ def read_recording(
     dataset: str | None = None,
     axes: Sequence[str] | None = None,
 ) -> Recording:
-    """Read frames of a camera's file.
+    """Read frames of a camera file.
 
     Parameters
     ----------
     path : str or Path
-        The file. Of TIFF and tables also a pattern with ``*``: a file a frame.
+        The file. For TIFF and tables also a pattern with ``*``: one file per frame.
     frames : slice, optional
         Which frames to read, all by default; the others are not read.
     format : str, optional
         One of `camera_formats`; found by the file's content and name by default.
     quantity : {"counts", "radiance", "temperature"}, optional
-        What was measured, for files that do not say it.
+        Measured quantity, for files that do not state it.
     unit : {"counts", "W/m2/sr", "K", "degC"}, optional
-        Unit of the samples, for files that do not say it.
+        Unit of the samples, for files that do not state it.
     interval : float, optional
-        Time between frames in s, for files that do not say it or say it wrong.
+        Time between frames in s, for files that omit it or are wrong.
     dataset : str, optional
         Which array of the file, if it has several.
     axes : sequence of str, optional
-        What its axes are: ``time``, ``y`` and ``x`` in their order.
+        Axes: ``time``, ``y`` and ``x`` in their order.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Files of Telops' cameras, HCC: a header and 16-bit samples a frame."""
+"""Files of Telops' cameras, HCC: a header and 16-bit samples per frame."""
 
 from math import ceil, log2
 from pathlib import Path
@@ -162,7 +162,7 @@ def write_hcc(path: str | Path, recording: Recording) -> None:
     path : str or Path
         The file; it is whole or not there.
     recording : Recording
-        What to write. Its saturation is kept if it is one less than a power of two, less one:
+        The recording. Its saturation is kept if it is one less than a power of two, less one:
         16 382 counts are 14 bits.
 
     Raises

@@ -1,4 +1,4 @@
-"""Frames in files of arrays, which do not say what was measured: the user does."""
+"""Frames in files of arrays, whose quantity and unit the user states."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
@@ -75,7 +75,7 @@ class Stated:
 
 
 def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:
-    """Read frames of an array in a file, or, by a pattern with ``*``, of a file a frame.
+    """Read frames of an array in a file, or, by a pattern with ``*``, of one file per frame.
 
     `kind` is the ending of the names of such files; the file's own may be another.
     """

@@ -336,7 +336,7 @@ def _tiff(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     for number, series in enumerate(every):
         if series.dtype.kind in _KINDS:
             if "S" in series.axes:
-                raise SourceError(f"{path}: has colours, expected one number a sample")
+                raise SourceError(f"{path}: has colours, expected one number per sample")
             dims = tuple({"Y": "y", "X": "x"}.get(axis, "time") for axis in series.axes)
             name = f"series_{number + 1}" if number else ""
             yield FileArray(name, tuple(series.shape), _tiff_reader(path, series), dims)
@@ -344,7 +344,7 @@ def _tiff(path: Path, stack: ExitStack) -> Iterator[FileArray]:
 
 @contextmanager
 def _errors_logged(name: str) -> Iterator[list[str]]:
-    """Collect what a library logs as an error, where it goes on with what is left of a file."""
+    """Collect errors that a library logs while it continues with the rest of a file."""
     said: list[str] = []
     handler = logging.Handler(logging.ERROR)
     handler.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]

@@ -1,4 +1,4 @@
-"""Points over time, as of SPH and of the material point method."""
+"""Points over time, such as of SPH and the material point method."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -37,7 +37,7 @@ class CloudSource(Source, Part):
     """Points over time.
 
     ``files`` are a file with a column or list of times, or a path with ``*``: each file is then a
-    frame. ``names`` are those of fields in the files by their names in a scene; also of ``x``,
+    frame. ``names`` maps names in a scene to names in the files; also of ``x``,
     ``y``, ``z``, ``time``, ``part`` and ``volume``; those not named are guessed. An ``interval`` in
     s replaces times in the files, and ``units`` that are not SI those that a file states.
     """
@@ -278,7 +278,7 @@ def _field_columns(source: CloudSource, path: str, labels: Sequence[str]) -> dic
 
 
 def _extra_columns(source: CloudSource, table: PointTable) -> dict[str, str]:
-    """Return the columns that are no fields of a scene, by what they are."""
+    """Return the columns other than the fields of a scene, by their meaning."""
     found: dict[str, str] = {}
     for name in _EXTRA:
         given = source.names.get(name)

@@ -148,7 +148,7 @@ class ColourScale:
         above = np.minimum(np.arange(count) + reach, count - 1)
         below = np.maximum(np.arange(count) - reach, 0)
         chord = self.labs[above] - self.labs[below]
-        # Where the colour stands still it is known to a rounding of 8 bits.
+        # A constant colour is known within the rounding of 8 bits.
         length = np.maximum(np.linalg.norm(chord, axis=1), 0.1)
         change = _lab_per_colour(self.colours[self._runs[0]])
         along = (np.einsum("nij,ni->nj", change, chord / length[:, None]) ** 2).sum(axis=1)
@@ -159,7 +159,7 @@ class ColourScale:
     def invert(self, picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return values and distances of a picture's colours, shape (y, x), float32.
 
-        A value is that of the nearest place on the scale; its distance is the CIE L*a*b*
+        A value is taken from the nearest place on the scale; its distance is the CIE L*a*b*
         difference of 1976. Each of the 2^24 colours is projected onto the scale only once.
         """
         red, green, blue = np.moveaxis(picture.astype(np.int32), -1, 0)
@@ -187,7 +187,7 @@ class ColourUncertainty:
     legend: float = 0.0
     """By the ends of a legend, which are known to a pixel."""
     lines: float = 0.0
-    """By lines and text, under which values are those of pixels beside them."""
+    """By lines and text, under which values come from neighbouring pixels."""
 
     @property
     def total(self) -> float:

@@ -64,7 +64,7 @@ OTHER_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     ),
     "volume": ("volume", "vol", "particle_volume"),
 }  # fmt: skip
-"""The same of coordinates and of what is no field of a scene."""
+"""The same for coordinates and other columns."""
 
 
 def simple(name: str) -> str:
@@ -137,13 +137,13 @@ class Units(Part):
     velocity: Annotated[
         Annotated[InstanceOf[Unit], *_unit("velocity", "m/s")] | None,
         Parameter(
-            "Unit of velocities; none: made of length and time.",
+            "Unit of velocities; none: from length and time.",
             allowed="none, m/s, mm/s, m/min, ...",
         ),
     ] = None
     strain_rate: Annotated[
         Annotated[InstanceOf[Unit], *_unit("strain_rate", "1/s")] | None,
-        Parameter("Unit of strain rates; none: made of the time.", allowed="none, 1/s, 1/ms, ..."),
+        Parameter("Unit of strain rates; none: from the time.", allowed="none, 1/s, 1/ms, ..."),
     ] = None
 
     def of(self, name: str) -> Unit:

@@ -52,7 +52,7 @@ _LARGEST_BLOCK: Final = 64_000_000
 class GridSource(Source, Part):
     """Fields on a regular grid over time.
 
-    ``names`` are those of fields in the file by their names in a scene; also of ``material``
+    ``names`` maps names in a scene to names in the file; also of ``material``
     (0 void, 1 workpiece, 2 tool), ``time``, ``x`` and ``y``; those not named are guessed. An
     ``interval`` in s replaces times in the file, and ``units`` that are not SI those that a file
     states.
@@ -63,7 +63,7 @@ class GridSource(Source, Part):
     files: Annotated[
         FileBeside | dict[str, FileBeside] | None,
         Parameter(
-            "Files by the names of fields, in the place of source.",
+            "Files by the names of fields, instead of source.",
             allowed="none, or {temperature: T.npy, plastic_strain: strain.npy}",
         ),
     ] = None

@@ -116,7 +116,7 @@ def coordinate(
     else:
         names = OTHER_NAMES[axis]
         match = [one for one in lists if one.short == dim or simple(one.short) in names]
-        # Of several names the surest: t may be a number of another kind.
+        # The most specific of several names: t may be another number.
         match.sort(key=lambda one: simple(one.short) == "t")
     if not match:
         return None

@@ -33,7 +33,7 @@ LEAST_EXPLAINED: Final = 0.7
 
 
 def find_legend(picture: Picture) -> Box | None:
-    """Return the longest bar of one colour across and many along; None if there is none."""
+    """Return the longest bar of one colour across and many along; None without one."""
     upright = _upright_bars(picture)
     lying = ((top, left, bottom, right) for left, top, right, bottom in _upright_bars(
         picture.transpose(1, 0, 2)
@@ -56,7 +56,7 @@ def find_legend(picture: Picture) -> Box | None:
 
 
 def is_cut(picture: Picture, box: Box) -> bool:
-    """Whether the colours go on beyond an end of a legend as they are there."""
+    """Whether the colours continue beyond an end of a legend."""
     along, first, last = _along(picture, box)
     return _goes_on(along[last:], along[first:last][::-1]) or _goes_on(
         along[:first][::-1], along[first:last]

@@ -36,7 +36,7 @@ class _Deck:
 class AbaqusReader(MeshReader):
     """Input files with tables of the same name, or one input file with a table for each frame.
 
-    Beside ``chip.inp`` lie ``chip.csv``, or ``chip_1.csv``, ``chip_2.csv`` and so on. A table's
+    Next to ``chip.inp`` lie ``chip.csv``, or ``chip_1.csv``, ``chip_2.csv`` and so on. A table's
     first column, ``node`` or ``element``, holds Abaqus's labels, the others are fields; lines of
     the same element are its integration points and are averaged. ``COOR1`` to ``COOR3`` are the
     nodes' positions, ``U1`` to ``U3`` are added to those of the input file. The names of tables of
@@ -91,7 +91,7 @@ def _read_deck(file: Path) -> _Deck:
         rows = filter(None, map(_words, lines))
         keyword, options = _keyword(head)
         instances += keyword == "INSTANCE"
-        # Nodes of the assembly itself are points of reference with labels of their own.
+        # Nodes of the assembly itself are reference points with separate labels.
         if keyword in _ASSEMBLY:
             outside = keyword in ("ASSEMBLY", "END INSTANCE")
         if keyword == "INCLUDE" or instances > 1:
@@ -190,7 +190,7 @@ def _read_table(file: Path) -> "pd.DataFrame":
     import pandas as pd
 
     with reading(file, "a table of numbers"):
-        # An empty cell, or a row that is cut short, is no number.
+        # An empty cell, or a truncated row, is not a number.
         table = pd.read_csv(
             file, index_col=0, skipinitialspace=True, encoding_errors="replace", dtype=np.float64,
             keep_default_na=False, na_values=["nan", "NaN"],

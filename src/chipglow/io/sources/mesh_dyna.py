@@ -61,7 +61,7 @@ def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
 
 def _of_nodes(arrays: Mapping[str, Any]) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
     initial = arrays["node_coordinates"]
-    # What lasso calls displacement is where the nodes are.
+    # lasso's displacement is the position of the nodes.
     points = arrays["node_displacement"][0] if "node_displacement" in arrays else initial
     of_nodes = {}
     for name in ("temperature", "velocity"):

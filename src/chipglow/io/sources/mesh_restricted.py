@@ -86,7 +86,7 @@ def _with_own(
 
 
 def _fields_by_block(ours: str, frames: Frames, names: Sequence[str]) -> dict[Any, str]:
-    """Return the field of each block, if two blocks or more have one of their own."""
+    """Return the field of each block, if two blocks or more have one."""
     for stem in COMMON_NAMES[ours]:
         fields = {simple(name): name for name in names if simple(name).startswith(f"{stem}_")}
         chosen = {}

@@ -68,7 +68,7 @@ class VtkReader(MeshReader):
             assert self.times is not None
             with reading_vtk(file):
                 data = _at_time(self._opened, number, self.times[number])
-        # What a reader left half done may crash what comes next.
+        # The state of an unfinished reader may crash the next one.
         with reading_vtk(file):
             blocks = tuple(_blocks(file, data, ()))
         if kind_of(file) == "XDMF":
@@ -98,7 +98,7 @@ def reading_vtk(file: Path) -> Iterator[None]:
 
 
 def _error_in(output: str | bytes) -> str:
-    # VTK gives bytes for what is no UTF-8.
+    # VTK gives bytes for text that is not UTF-8.
     text = output.decode(errors="replace") if isinstance(output, bytes) else output
     found = re.search(r"ERROR[^\n]*\n(?:[^\n]*?\): )?(.+?)(?:\n\n|\Z)", text, re.DOTALL)
     return found.group(1) if found else ""

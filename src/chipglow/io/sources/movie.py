@@ -403,7 +403,7 @@ class MovieSource(Source, Part):
                 tuple(colour for colour in colours if np.abs(tool - colour).max() > 16)
                 for colours in (found, values)
             )
-        # What is as cold as the scale shows may as well be nothing; what is hotter may not.
+        # Pixels at the cold end of the scale may be background; hotter ones are not.
         coldest = scale.values[0] + _LOWEST * (scale.values[-1] - scale.values[0])
         hotter = [colour for colour in values if place_of(scale, colour)[0] > coldest]
         if hotter and not found:

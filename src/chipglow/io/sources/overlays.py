@@ -1,4 +1,4 @@
-"""What a picture of a field shows: values, background, tool, and lines and text drawn over them."""
+"""Contents of a picture of a field: values, background, tool, and lines and text over them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Colour = tuple[int, int, int]
 """Red, green and blue of 0 to 255."""
 
 MARK_TOLERANCE: Final = 10.0
-"""How far a colour may be from that of the background or the tool, in CIE L*a*b*."""
+"""Tolerance of the colours of background and tool, in CIE L*a*b*."""
 
 _GREY: Final = 10.0
 _FEWEST_FILLED: Final = 0.01
@@ -47,7 +47,7 @@ class FieldPicture:
     quality: NDArray[np.uint8]
     """See `chipglow.scene.QUALITY`."""
     seen: NDArray[np.bool_]
-    """Whether the value is that of the pixel's own colour."""
+    """Whether the value belongs to the pixel's colour."""
     distance: NDArray[np.float32]
     """Distance from the scale in CIE L*a*b*."""
 
@@ -68,7 +68,7 @@ class FieldReader:
     limit: float
     """Distance from the scale in CIE L*a*b* beyond which a colour is a line or text."""
     legend: Box | None = None
-    """Where the scale was read."""
+    """Place at which the scale was read."""
 
     def __post_init__(self) -> None:
         for name, colours in (("background", self.background), ("tool_colour", self._tools)):
@@ -83,7 +83,7 @@ class FieldReader:
     def read(self, picture: Picture) -> FieldPicture:
         """Return values, material and quality of a picture.
 
-        Pixels of what is drawn over the field take the material and the value of the nearest pixel
+        Pixels of lines and text take the material and the value of the nearest pixel
         that shows them; in the tool, of the nearest one in the tool.
         """
         values, distance = self.scale.invert(picture)

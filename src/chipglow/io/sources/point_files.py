@@ -35,7 +35,7 @@ class PointTable:
 
     path: str
     columns: Mapping[str, NDArray[Any]]
-    """Numbers of the points by name, shape (points,) each."""
+    """Values of the points by name, shape (points,) each."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Units that the file states, by the names of the columns."""
     wrong: Mapping[str, str] = field(default_factory=dict)

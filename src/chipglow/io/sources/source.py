@@ -1,4 +1,4 @@
-"""What every reader of fields offers: a survey, and frames sampled on a raster."""
+"""Interface of all readers of fields: a survey, and frames sampled on a raster."""
 
 import re
 from abc import ABC, abstractmethod
@@ -143,7 +143,7 @@ def even_times(count: int, interval: float | None, notes: Notes) -> NDArray[np.f
 
 
 def span_of(values: ArrayLike) -> tuple[float, float]:
-    """Return the smallest and the largest finite value; NaN if there is none."""
+    """Return the smallest and the largest finite value; NaN without one."""
     numbers = np.asarray(values, np.float64)
     known = numbers[np.isfinite(numbers)]
     return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)

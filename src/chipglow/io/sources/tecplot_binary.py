@@ -33,7 +33,7 @@ _KINDS: Final = (
 _FACES: Final = {"TRIANGLE": 3, "QUADRILATERAL": 4, "TETRAHEDRON": 4, "BRICK": 6}
 _NUMBERS: Final = {1: "f4", 2: "f8", 3: "i4", 4: "i2", 5: "u1"}
 _NEIGHBOURS: Final = {0: 3, 2: 4}
-"""Numbers of a connection of faces by its mode; those from one face to many vary."""
+"""Count of numbers in a connection of faces, by its mode."""
 _LONGEST_TEXT: Final = 32_000
 _STATIC: Final = -1
 _ALONE: Final = -1

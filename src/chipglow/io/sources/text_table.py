@@ -25,7 +25,7 @@ class TextTable:
 
     path: Path
     first: str
-    """Its first line that is no comment."""
+    """Its first line apart from comments."""
     separator: str
     decimal: str
 
@@ -105,7 +105,7 @@ def _without_comment(line: str) -> str:
 
 
 def lines_of_text(path: Path) -> int:
-    """Return the number of lines before the first one of numbers alone; 0 if there is none."""
+    """Return the number of lines before the first one of numbers alone; 0 without one."""
     with path.open(encoding="utf-8-sig") as stream:
         for number in range(_MOST_COMMENTS):
             line = stream.readline(_LONGEST_LINE)
@@ -117,7 +117,7 @@ def lines_of_text(path: Path) -> int:
 
 
 def _two_lines(path: Path, skipped: int) -> tuple[str, str]:
-    """Return the first two lines that are no comments, of those behind the skipped ones."""
+    """Return the first two lines apart from comments, after the skipped ones."""
     lines: list[str] = []
     with path.open(encoding="utf-8-sig") as stream:
         for _ in range(skipped):

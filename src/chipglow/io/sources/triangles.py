@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.scene import Raster
 
 NOTHING: Final = -1
-"""Number of the element where there is none."""
+"""Element number of samples without an element."""
 
 FARTHEST: Final = 1e100
 """Samples from the corner that a node may be away; beyond, products of lengths would overflow."""
@@ -24,9 +24,9 @@ class Rasterised:
     """The fields and elements of a mesh at the samples of a raster."""
 
     fields: NDArray[np.float32]
-    """Those of nodes, then of elements, float32 of shape (fields, y, x); NaN without an element."""
+    """Fields of nodes, then of elements, float32 (fields, y, x); NaN without an element."""
     element: NDArray[np.int32]
-    """Number of the triangle at each sample, int32 of shape (y, x); `NOTHING` without one."""
+    """Index of the triangle at each sample, int32 of shape (y, x); `NOTHING` without one."""
 
 
 def rasterise(
