@@ -443,3 +443,17 @@ def test_noise_that_is_alike_makes_no_set_of_two_the_best(known, count, least, m
         claims += _confidences(found, sets)[best] >= SURE
     # Without the frames' own patterns 84 % are called so; binomial: 6 of 60 +- 2.3.
     assert least <= claims / 60 <= most
+
+
+def test_e_n_holds_as_often_as_it_says():
+    """Noise between 12 frames: |t| of 11 degrees of freedom is up to 2 in 93 % of cases."""
+    truth = np.full(RASTER.shape, 700.0)
+    generator = np.random.default_rng(8)
+    noisy = measured([truth + 6.0 * generator.standard_normal(truth.shape) for _ in range(12)])
+    result = compare(noisy, {"true": frames(truth)}, TOOL, CURVE, StatedUncertainties(position=0.0))
+    assert result.grid is not None
+    e_n = normalised_error(result.grid.measured, result.grid.simulated[0])
+    known = e_n[np.isfinite(e_n)]
+    # The standard deviation of the fraction of 80 squares is 3 %.
+    assert known.size > 70
+    assert (known <= 1).mean() == pytest.approx(0.93, abs=0.08)

@@ -264,3 +264,16 @@ def test_time_step_follows_the_fastest_point():
     state.points["vx"][7] = 700.0
     with pytest.raises(SolverError, match=r"speed of 700 m/s, over the \d+ m/s of sound.* at 0.00"):
         state.choose_steps()
+
+
+def test_friction_of_a_block_on_the_rake_face():
+    """A block pressed on the face by its own motion: tangential force is μ times normal force."""
+    coefficient = 0.3
+    block = pressed_on_a_face(friction=coefficient)
+    block.advance(10)
+    normal, tangential = -block.force
+    assert normal > 1e3
+    assert tangential == pytest.approx(coefficient * normal, rel=1e-9, abs=1e-9 * normal)
+    work = coefficient * normal * 10 * block.step.time_step * 4.0
+    # The light nodes at the face slow down first: the slip is up to a tenth under 4 m/s.
+    assert 0.9 * work <= block.heat.sum() <= work

@@ -565,3 +565,18 @@ def test_wrong_files_and_regions_are_one_error():
             read_emissivity_map(name)
     with pytest.raises(FileNotFoundError, match=r"none\.nc"):
         read_emissivity_map("none.nc")
+
+
+def test_propagation_is_that_of_monte_carlo():
+    # All at once, uncertainties of a poor laboratory: 5 K, 5 K reflected, 4 K camera.
+    means, spreads = np.array([TRUTH, 293.0, 0.0]), np.array([5.0, 5.0, 4.0])
+    row = of_whole(measured(table_1()), Heating(*means[:2], *spreads))
+    drawn = np.random.default_rng(3).normal(means, spreads, (200_000, 3))
+    drawn[:, 2] += BAND.temperature(measured(table_1()).radiance[0].mean())
+    hot, cold, seen = BAND.radiance(drawn.T)
+    found = (seen - cold) / (hot - cold)
+    # The standard deviation of 200 000 draws is known to 0.16 %; terms of higher order and the
+    # camera's error at the mean radiance in the place of each pixel's take 1 %.
+    assert row.estimate.standard_uncertainty == pytest.approx(found.std(), rel=0.015)
+    low, high = np.quantile(found, (0.025, 0.975))
+    assert high - low == pytest.approx(2 * row.estimate.expanded_uncertainty(), rel=0.02)

@@ -1,14 +1,16 @@
 """The knife edge: what made a synthetic edge is returned within its stated uncertainty."""
 
 from dataclasses import replace
-from math import cos, degrees, exp, radians, sqrt
+from math import cos, degrees, exp, pi, radians, sqrt
 
 import numpy as np
 import pytest
+from scipy.special import j0
 from synthetic_edge import (
     FWHM_PER_SIGMA,
     PITCH,
     WAVELENGTH,
+    annular_density,
     annular_edge,
     blurred_disc_edge,
     disc_edge,
@@ -450,3 +452,15 @@ def test_images_and_apertures_that_are_not_there_are_errors():
         knife_edge([edge], [replace(hole, diameter=20e-6, name="hole"), *others])
     with pytest.raises(ValueError, match=r"hole: diameter is -1\.0 m, expected over 0"):
         aperture_image(measurement_of(hole.radiance * 100), -1.0, "hole")
+
+
+def test_the_annular_transfer_function_is_the_transform_of_the_closed_form():
+    model, values, _ = truth_of("annular")
+    unit = WAVELENGTH / (2 * pi * MIRROR[0])
+    v = np.linspace(1e-6, 3000.0, 300001)
+    light = annular_density(v, MIRROR[1]) * v
+    for frequency in (0.2e5, 0.6e5, 1.1e5):
+        transform = np.trapezoid(light * j0(2 * pi * frequency * unit * v), v)
+        expected = transform * (1 - MIRROR[1] ** 2) / 2
+        found = model.transfer(values, np.array([frequency]), 0.0)
+        assert found[0] == pytest.approx(expected, abs=1e-4)

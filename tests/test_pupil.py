@@ -1,6 +1,6 @@
 """Point spread functions of a pupil against closed forms and an independent Hankel transform."""
 
-from math import exp, pi, sqrt
+from math import acos, exp, pi, sqrt
 
 import numpy as np
 import pytest
@@ -214,3 +214,11 @@ def test_an_f_number_is_a_numerical_aperture():
     assert airy.wavelength == pytest.approx(4.45e-6)
     with pytest.raises(ValueError, match="magnification: is missing"):
         Pupil(f_number=2.5).of_camera(MWIR, None)
+
+
+def test_transfer_of_a_clear_pupil():
+    for nu in (0.0, 0.2, 0.77, 1.0):
+        expected = 2 / pi * (acos(nu) - nu * sqrt(1 - nu**2))
+        assert annular_transfer(np.array([nu]), 0.0)[0] == pytest.approx(expected, abs=1e-14)
+        found = pupil().transfer(np.array([nu * CUTOFF * (1 - 1e-6)]), np.array([0.0]))
+        assert found[0] == pytest.approx(expected, abs=1e-5)

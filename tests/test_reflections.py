@@ -368,3 +368,9 @@ def test_several_surfaces_are_seen_as_each_alone():
 
 
 # ---- in a study
+
+
+def test_view_factor_of_opposite_strips():
+    exchange = Exchange(*lines([[1, 0.7], [0, 0.7]], [[0, 0], [1, 0]]))
+    expected = np.hypot(1, 0.7) - 0.7  # within two of 2048 rays
+    np.testing.assert_allclose(exchange.view_factors[[0, 1], [1, 0]], expected, atol=1e-3)

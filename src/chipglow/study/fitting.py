@@ -165,7 +165,7 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
             yield f"The paper's values of omitted settings of {name}: {', '.join(left)}."
     if of_a_cut and "psf_widths" not in plan.given:
         low, *_, high = (LENGTH.text(width) for width in study.plan.psf_widths)
-        yield f"PSF widths from {low} to {high} are chosen around the camera's own (analysis.psf_widths)."
+        yield f"PSF widths from {low} to {high}, around the camera's own (analysis.psf_widths)."
 
 
 def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
