@@ -221,26 +221,17 @@ def hdf5(folder):
     return folder / "points.h5", {}
 
 
-def vtk(folder, suffix="vtp", kind="PolyData", **options):
+def vtp(folder):
     pv = pytest.importorskip("pyvista")
     for number, time in enumerate(TIMES):
         table = columns_at(time)
         cloud = pv.PolyData(np.column_stack([table["x"], table["y"], 0 * table["x"]]))
         cloud["temperature"] = table["temperature"]
-        mesh = cloud if kind == "PolyData" else cloud.cast_to_unstructured_grid()
-        mesh.save(folder / f"p{number}.{suffix}", **options)
-    return folder / f"p*.{suffix}", {"interval": 1e-6}
+        cloud.save(folder / f"p{number}.vtp")
+    return folder / "p*.vtp", {"interval": 1e-6}
 
 
-def vtu(folder):
-    return vtk(folder, "vtu", "UnstructuredGrid")
-
-
-def vtk_legacy(folder):
-    return vtk(folder, "vtk", binary=False)
-
-
-FORMATS = [csv_files, csv_with_times, npz, npy_structured, hdf5, vtk, vtu, vtk_legacy]
+FORMATS = [csv_files, csv_with_times, npz, npy_structured, hdf5, vtp]
 
 
 @pytest.mark.parametrize("write", FORMATS, ids=lambda write: write.__name__)

@@ -97,12 +97,6 @@ def matlab73(folder, values):
     return folder / "all.mat", {"axes": ("y", "x", "time")}
 
 
-def tiff(folder, values):
-    tifffile = pytest.importorskip("tifffile")
-    tifffile.imwrite(folder / "T.tif", values, photometric="minisblack")
-    return folder / "T.tif", {}
-
-
 def tiff_of_libtiff(folder, values):
     pytest.importorskip("tifffile")
     pictures = [Image.fromarray(frame) for frame in values]
@@ -124,7 +118,7 @@ def csv_semicolons(folder, values):
     return folder / "T_*.csv", {}
 
 
-FORMATS = [npz_fortran, hdf5, netcdf4, matlab73, tiff, tiff_of_libtiff, csv, csv_semicolons]
+FORMATS = [npz_fortran, hdf5, netcdf4, matlab73, tiff_of_libtiff, csv, csv_semicolons]
 """Those of test_import_formats.py are further ones."""
 
 
@@ -520,13 +514,6 @@ def test_a_file_that_matlab_wrote():
 def test_damaged_files_of_matlab(name):
     path = of_scipy(f"matlab/tests/data/{name}.mat")
     refused(GridSource(path, spacing=1.0), f"{name}.mat")
-
-
-def test_a_file_that_ncgen_wrote():
-    """NetCDF's own example, written by its tool; its times are in hours."""
-    path = of_scipy("tests/data/example_1.nc")
-    names = {"temperature": "rh", "y": "lat", "x": "lon"}
-    refused(GridSource(path, names=names), "unknown unit")
 
 
 def test_csv_frames_of_different_size(tmp_path):

@@ -120,17 +120,6 @@ def test_quadratic_elements_are_not_taken_for_linear(tmp_path, kind):
     assert np.abs(found - expected)[inside].max() <= 2000.0 / 128 + 1e-3
 
 
-def test_lagrange_elements_are_subdivided(tmp_path):
-    points = np.array([(i, j, 0.0) for j in range(4) for i in range(4)]) / 3.0
-    order = [0, 3, 15, 12, 1, 2, 7, 11, 13, 14, 4, 8, 5, 6, 9, 10]
-    grid = pv.UnstructuredGrid([16, *range(16)], [70], points[order])
-    grid.point_data["temperature"] = 300.0 + points[order][:, 0] ** 3 * 100.0
-    grid.save(tmp_path / "cubic.vtu")
-    raster = Raster(0.0, 1.0, 0.02, 50, 50)
-    found = only_frame(MeshSource(tmp_path / "cubic.vtu"), raster).fields["temperature"]
-    np.testing.assert_allclose(found, np.broadcast_to(300 + raster.x**3 * 100, found.shape), atol=3)
-
-
 @pytest.mark.parametrize("position", [0.0, 1e-4, 1.7e-4, 3e-4])
 def test_a_cut_through_a_solid_mesh_is_exact(tmp_path, position):
     grid_of(depth=3e-4).save(tmp_path / "solid.vtu")

@@ -12,6 +12,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
+from test_preview import assert_same_frames
 
 from chipglow.cutting import (
     CuttingConditions,
@@ -88,13 +89,7 @@ def test_a_run_goes_on_from_any_checkpoint_with_the_same_bits():
     for checkpoint in (checkpoints[0], checkpoints[len(checkpoints) // 2], checkpoints[-1]):
         rest, again = simulate(resume=checkpoint)
         assert len(rest) == sum(frame.time > checkpoint.time for frame in frames)
-        for frame, expected in zip(rest, frames[len(frames) - len(rest) :], strict=True):
-            for name, values in vars(expected).items():
-                if name != "splines":
-                    np.testing.assert_array_equal(getattr(frame, name), values, strict=True)
-            for name in ("nodes", "limits"):
-                here, there = (getattr(one.splines, name) for one in (frame, expected))
-                np.testing.assert_array_equal(here, there, strict=True)
+        assert_same_frames(rest, frames[len(frames) - len(rest) :])
         for name in ("time", "cutting", "thrust"):
             np.testing.assert_array_equal(getattr(again, name), getattr(history, name))
         for name, values in vars(history.energy).items():
@@ -185,18 +180,19 @@ def stop_after(intervals, error, monkeypatch):
     monkeypatch.setattr(CuttingSimulation, "run", run)
 
 
-def test_a_cut_that_is_stopped_goes_on_only_if_told_to(cache, unbroken, monkeypatch):
+def stopped(study, intervals):
+    """Cut until a checkpoint is handed over, and fail there."""
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(StopError):
+        stop_after(intervals, StopError(), patch)
+        cut(study)
+
+
+def test_a_cut_that_is_stopped_goes_on_only_if_told_to(cache, unbroken):
     study = load_study("study.yaml")
-    with monkeypatch.context() as patch:
-        stop_after(9, StopError(), patch)
-        with pytest.raises(StopError):
-            cut(study)
+    stopped(study, 9)
     kept = kept_progress(study)
     assert kept == pytest.approx(9 / 48)
-    with monkeypatch.context() as patch:
-        stop_after(3, StopError(), patch)  # a new run that got less far deletes nothing
-        with pytest.raises(StopError):
-            cut(study)
+    stopped(study, 3)  # a new run that got less far deletes nothing
     assert kept_progress(study) == kept
     seen = []
     path = cut(study, lambda _, fraction: seen.append(fraction))
@@ -204,22 +200,16 @@ def test_a_cut_that_is_stopped_goes_on_only_if_told_to(cache, unbroken, monkeypa
     assert_same_scene(path, unbroken)
     assert list(cache.iterdir()) == [path]
     path.unlink()
-    with monkeypatch.context() as patch:
-        stop_after(30, StopError(), patch)
-        with pytest.raises(StopError):
-            cut(study)
+    stopped(study, 30)
     seen.clear()
     assert_same_scene(cut(study, lambda _, fraction: seen.append(fraction), resume=True), unbroken)
     assert seen[1] == pytest.approx(31 / 48)
     assert list(cache.iterdir()) == [path]
 
 
-def test_a_broken_checkpoint_is_as_none(cache, unbroken, monkeypatch):
+def test_a_broken_checkpoint_is_as_none(cache, unbroken):
     study = load_study("study.yaml")
-    with monkeypatch.context() as patch:
-        stop_after(30, StopError(), patch)
-        with pytest.raises(StopError):
-            cut(study)
+    stopped(study, 30)
     (left,) = unfinished_scenes(running.scene_path(running._inputs(study)))
     os.truncate(left.checkpoint, 1000)
     assert kept_progress(study) == 0
@@ -238,7 +228,7 @@ def test_after_ctrl_c_the_last_state_is_named(cache, monkeypatch):
     assert result.exit_code == 130
     lines = [line for line in result.output.splitlines() if line.startswith("chipglow: ")]
     assert len(lines) == 1
-    assert re.search(r"the state at 2\.50 us is kept in .*: --resume goes on from", lines[0])
+    assert re.search(r"the state at 2\.50 us is kept in .*: --resume continues from", lines[0])
 
 
 def test_the_movie_of_a_cut_that_goes_on_shows_what_is_still_to_come(cache, unbroken, monkeypatch):
