@@ -75,8 +75,8 @@ class MeshSource(Source, Part):
     section: Annotated[
         float | Literal["facing"] | None,
         Parameter(
-            "Solid elements: position of the cut along the axis of depth, such as 0 mm; facing: the "
-            "surface that faces the camera, which looks at the scene's x and y from the front.",
+            "Solid elements: position of the cut along the axis of depth, such as 0 mm; facing: "
+            "the surface that faces the camera, which looks at the scene's x and y from the front.",
             POSITION,
         ),
     ] = None
