@@ -199,7 +199,7 @@ def test_the_description_that_init_writes_says_every_field_and_is_read_back(arra
     assert result.exit_code == 0, result.output
     assert load_import(path) == ImportDescription()
     assert "# Units of the source" in path.read_text()
-    assert "# What the source is" in path.read_text()
+    assert "# Kind of the source" in path.read_text()
     path.write_text(path.read_text().replace("source: none", "source: cut.npz", 1))
     assert load_import(path).source == str(arrays)
 
