@@ -162,10 +162,9 @@ def _print_fit(fit: "lab.PointFit | lab.DotFit | lab.ImageFit") -> None:
     screen = current()
     if isinstance(fit, lab.ImageFit):
         screen.say(
-            f"Mutual information: {fit.information:.3f} bits per pixel; score of the placement "
-            f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
-            f"{fit.by_chance.max():.3g}.",
-            {"mutual_information_bits": fit.information, "placement_score": fit.placement},
+            f"Score of the placement: {fit.placement:.3g}, of {fit.by_chance.size} unrelated "
+            f"images at most {fit.by_chance.max():.3g}.",
+            {"placement_score": fit.placement},
         )
         return
     points = fit.points if isinstance(fit, lab.DotFit) else fit

@@ -39,19 +39,10 @@ class Arrangement:
         return int(((pixels > self.margin) & (pixels < last)).all(axis=1).sum())
 
 
-@dataclass(frozen=True)
-class DotMatch:
-    """Which dots are the same."""
-
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-    """Numbers of the dots in both images that belong together, shape (n,)."""
-    warnings: tuple[str, ...]
-    """Why it cannot be trusted, a sentence each."""
-
-
-def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
-    """Match dots by their arrangement.
+def match_dots(
+    first: Arrangement, second: Arrangement
+) -> tuple[NDArray[np.int64], tuple[str, ...]]:
+    """Return the numbers of dots that are the same, shape (2, n), and why that may be wrong.
 
     Each pair of neighbours in the one is put on each in the other, not mirrored, turned by up to
     30 degrees, the image's width half to twice as wide; the best of these placements are fitted by
@@ -76,7 +67,7 @@ def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
             f"image and {len(second.pixels)} in the visible picture match, expected one target in "
             "both, not mirrored, turned by up to 30 degrees"
         )
-    return DotMatch(best.pairs[0], best.pairs[1], _rivals(best, judged, first.pixels, spacing))
+    return best.pairs, _rivals(best, judged, first.pixels, spacing)
 
 
 @dataclass(frozen=True)

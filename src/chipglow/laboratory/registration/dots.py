@@ -104,21 +104,21 @@ def fit_dots(
     have in common: light and blurred skirts that are not quite as the fit takes them.
     """
     dots = find_dots(infrared, "infrared image"), find_dots(visible, "visible picture")
-    match = match_dots(
+    (first, second), warnings = match_dots(
         Arrangement(dots[0].pixels, infrared.shape, _ROOM * dots[0].radius),
         Arrangement(dots[1].pixels, visible.shape, _ROOM * dots[1].radius),
     )
-    columns, rows = dots[0].pixels[match.first].T
+    columns, rows = dots[0].pixels[first].T
     positions = np.stack(
         [raster.x[0] + columns * raster.spacing, raster.y[0] - rows * raster.spacing], axis=1
     )
-    pixels = dots[1].pixels[match.second]
+    pixels = dots[1].pixels[second]
     fit = fit_points(positions, pixels, model, picked=False)
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
-    variance = (scale * dots[0].uncertainty[match.first]) ** 2
-    expected = float(np.sqrt((variance + dots[1].uncertainty[match.second] ** 2).mean()))
-    warnings = [*match.warnings, *_scattered(fit.scatter, expected)]
-    notes = fit.registration.notes + Notes([_NOT_MIRRORED], warnings)
+    variance = (scale * dots[0].uncertainty[first]) ** 2
+    expected = float(np.sqrt((variance + dots[1].uncertainty[second] ** 2).mean()))
+    warnings += _scattered(fit.scatter, expected)
+    notes = fit.registration.notes + Notes([_NOT_MIRRORED], list(warnings))
     covariance = fit.registration.covariance + _systematic(fit.registration, raster)
     found = replace(fit.registration, covariance=covariance, method="dots", notes=notes)
     return DotFit(replace(fit, registration=found), *dots)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import cos, hypot, log, radians, sin
+from math import cos, hypot, radians, sin
 from operator import itemgetter
 from typing import Final
 
@@ -60,8 +60,6 @@ class ImageFit:
     """A registration from the images themselves."""
 
     registration: Registration
-    information: float
-    """Mutual information of the images as they lie on each other, in bits a pixel."""
     placement: float
     """Mutual information times common edges of the best of many placements, at a quarter of the
     resolution.
@@ -134,7 +132,6 @@ def fit_images(
     ]
     return ImageFit(
         replace(found, notes=Notes([_NOT_MIRRORED], warnings)),
-        _information(fine, frame, matrix),
         score,
         chance,
     )
@@ -464,14 +461,6 @@ def _window(pixels: Array, shape: tuple[int, ...], fade: float) -> tuple[Array, 
 
 
 # The verdict
-
-
-def _information(level: _Level, frame: NormalisedFrame, matrix: Array) -> float:
-    """Return the mutual information in bits a sample."""
-    here, place = _seen(level, _pixels(level, frame, matrix))
-    cells = level.bins[here] * _BINS + level.codes[place]
-    joint = np.bincount(cells, None, _BINS**2).reshape(_BINS, _BINS) / here.sum()
-    return _shared(joint) / log(2)
 
 
 def _rivals(
