@@ -65,7 +65,7 @@ class HDF5Sink(FileIO):
 
 
 @uninterrupted()
-def write_hdf5(path: Path, write: Callable[[HDF5Sink], None]) -> None:
+def write_hdf5(path: Path, write: Callable[[HDF5Sink], object]) -> None:
     """Write an HDF5 file by a function of the file to write; it is whole or not there.
 
     HDF5 calls back into Python: an exception that a signal raises there could end the process.

@@ -37,8 +37,9 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
         for name, variable in data.variables.items()
         if variable.ndim and np.issubdtype(variable.dtype, np.number)
     }
-    bare = data.drop_encoding()
-    write_hdf5(Path(path), lambda sink: bare.to_netcdf(sink, engine="h5netcdf", encoding=encoding))
+    # HDF5 reads back what it wrote, which a full disk may not have taken: it writes to memory.
+    content = data.drop_encoding().to_netcdf(engine="h5netcdf", encoding=encoding)
+    write_hdf5(Path(path), lambda sink: sink.write(content))
 
 
 def is_measurement(path: str | os.PathLike[str]) -> bool:
