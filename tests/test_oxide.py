@@ -6,6 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 from chipglow.scene import Raster, Scene
 from chipglow.surface import (
+    OxideHistory,
     ParabolicOxide,
     UniformSurface,
 )
@@ -33,7 +34,7 @@ def scene(times, temperature, speed=0.0, material=1):
 
 
 def grown(made, index, oxide=OXIDE):
-    return oxide.history(made).thickness(made.frame(index))
+    return OxideHistory.of(made, oxide).thickness(made.frame(index))
 
 
 @given(st.floats(500.0, 1400.0), st.floats(1e-6, 1e-3), st.floats(0.0, 20e-9))

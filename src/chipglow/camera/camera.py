@@ -320,7 +320,7 @@ class Camera(Part):
             pixels = self.pixels(scene)
             image, within = self._both(exposure.mean_radiance, scene)
             images.append(self._show(image, pixels))
-            alike.append(self._show(within / self._own_light(scene), pixels))
+            alike.append(self._show(within / (1 - self.light_from_beyond(scene)), pixels))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
             warnings |= dict.fromkeys(exposure.warnings)
@@ -366,9 +366,11 @@ class Camera(Part):
             measured.data.attrs["warnings"] = "\n".join(known)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
+    @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
     def light_from_beyond(self, scene: Raster) -> Array:
         """Return the fraction of each pixel's light that comes from beyond a scene, (y, x)."""
-        return 1 - self._own_light(scene)
+        fraction = self._both(np.ones(scene.shape), scene)[1]
+        return np.where(fraction < 1 - _ROUNDING, 1 - fraction, 0.0)
 
     def form_image(self, radiance: Array, scene: Raster) -> Array:
         """Return the image of a radiance map on the pixels: optics, PSF and footprint.
@@ -425,12 +427,6 @@ class Camera(Part):
         for term in self.optics:
             image = term.on_pixels(image, pixels, self.band)
         return image
-
-    @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
-    def _own_light(self, scene: Raster) -> Array:
-        """Return the fraction of each pixel's light that comes from within the scene."""
-        _, fraction = self._both(np.ones(scene.shape), scene)
-        return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
 
     def _sensitive(self, scene: Raster) -> float:
         """Return the fraction of a pixel's square that it integrates, less after a footprint."""

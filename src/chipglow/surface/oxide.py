@@ -53,14 +53,10 @@ class Oxide(Modifier):
     def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:
         """Return the rate d(x²)/dt of the squared thickness in m²/s at temperatures in K."""
 
-    def history(self, scene: Scene) -> "OxideHistory":
-        """Follow the oxide on a scene's material; all frames are read once."""
-        return _history(scene, self)
-
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        history = self.history(scene)
+        history = OxideHistory.of(scene, self)
 
         def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             return self.of_thickness(emissivity, history.thickness(frame))
@@ -115,8 +111,9 @@ class OxideHistory:
     """Size of the cells in m."""
 
     @classmethod
+    @lru_cache(maxsize=1)
     def of(cls, scene: Scene, oxide: Oxide) -> "OxideHistory":
-        """Follow the material of a scene."""
+        """Follow the material of a scene; many surfaces share that of the last scene and oxide."""
         if not scene.has_material_coordinates:
             raise ValueError(
                 "oxide: the scene has no material coordinates, expected them, as a point's oxide "
@@ -169,12 +166,6 @@ class OxideHistory:
         total = np.bincount(cells, rate, count)
         mean = np.divide(total, number, out=np.full(count, np.nan), where=number > 0)
         return mean.reshape(self.grown.shape[1:])
-
-
-@lru_cache(maxsize=1)
-def _history(scene: Scene, oxide: Oxide) -> OxideHistory:
-    """Return the oxide's history on the scene that was looked at last: many surfaces share it."""
-    return OxideHistory.of(scene, oxide)
 
 
 def _reach(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
