@@ -37,7 +37,7 @@ from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
 
 BORDER_TOLERANCE: Final = 1.0
-"""Change in K of a pixel from which on it is said that the border of the scene matters."""
+"""Change in K of a pixel at which a warning about the border of the scene is given."""
 
 PAPER_LIMIT: Final = 573.15
 """Lower limit in K of the paper's camera."""
@@ -152,7 +152,7 @@ class Camera(Part):
     ] = None
     optics: Annotated[
         tuple[OpticsTerm, ...],
-        Parameter("What the optics do besides, a list in the order of the light."),
+        Parameter("Other effects of the optics, a list in the order of the light."),
     ] = ()
     detector: Annotated[
         Detector | None,
@@ -209,7 +209,7 @@ class Camera(Part):
     def paper(cls) -> "Camera":
         """Return the camera of the paper's simulation, as far as the paper states it.
 
-        It measures from 300 °C on. The blur is applied from pixel to pixel (`psf_order` is
+        It measures at or above 300 °C. The blur is applied from pixel to pixel (`psf_order` is
         ``detector``), as in its Figure 6; that changes temperatures by up to 7 K. The point spread
         function, which the paper prints as a picture only, is an assumption: see
         `AnnularAperturePSF`.
@@ -418,12 +418,12 @@ class Camera(Part):
             image = term.on_samples(image, scene, pixels, blurred)
         if self.psf is None or self.psf_order == "optics":
             return integrate(image, scene, pixels, self._sensitive(scene))
-        # Pixels that are not read out tell what is beyond those that are.
+        # Pixels that are not read out supply the radiance beyond the others.
         whole, own = whole_raster(scene, pixels)
         return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
     def _show(self, image: Array, pixels: Raster) -> Array:
-        """Return the radiance that the optics show for what the pixels received."""
+        """Return the radiance after the optics' effects on the received radiance."""
         for term in self.optics:
             image = term.on_pixels(image, pixels, self.band)
         return image
@@ -448,7 +448,7 @@ class Camera(Part):
         )
 
     def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
-        """Return radiance and flags that detector and calibration make of images (time, y, x).
+        """Return radiance and flags of images (time, y, x) after detector and calibration.
 
         Without a detector the images, with the lag of a thermal time constant, and None.
         """

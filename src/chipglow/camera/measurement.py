@@ -37,7 +37,7 @@ class Flag(IntFlag):
     DEAD = 4
     """The pixel does not answer to light."""
     REPLACED = 8
-    """The pixel does not answer to light; the value is that of its neighbours."""
+    """The pixel does not respond to light; its value is interpolated from neighbours."""
 
 
 UNUSABLE: Final = Flag.UNDER_RANGE | Flag.SATURATED | Flag.DEAD
@@ -57,7 +57,7 @@ class Measurement:
         ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper`` in m limit
         the band. ``response`` over ``wavelength`` in m is the relative spectral response, if it is
         not that of a box. ``calibration_errors`` over (``calibration_error``,
-        ``calibration_radiance``), in W/(m² sr), are effects as of `CalibrationErrors`.
+        ``calibration_radiance``), in W/(m² sr), are effects as in `CalibrationErrors`.
 
     Raises
     ------

@@ -29,7 +29,7 @@ class RatioMeasurement:
 
     @property
     def raster(self) -> Raster:
-        """Where the pixels are taken to look: the first channel's places."""
+        """Assumed positions of the pixels: the first channel's."""
         return self.first.raster
 
 
@@ -63,7 +63,7 @@ class RatioCamera(Part):
     ] = (0.0, 0.0)
     delay: Annotated[
         float,
-        Parameter("How much later than the first the second begins to integrate.", INSTANT),
+        Parameter("Delay of the second channel's integration.", INSTANT),
     ] = 0.0
 
     def __post_init__(self) -> None:

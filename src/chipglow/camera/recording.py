@@ -1,4 +1,4 @@
-"""Contents of a real camera's file, before a calibration makes a measurement of it."""
+"""Contents of a real camera file, before calibration."""
 
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, TypeAlias
@@ -57,7 +57,7 @@ class Recording:
     integration_time: float | None = None
     """In s."""
     saturation: float | None = None
-    """The greatest signal that is not saturated."""
+    """The largest signal that is not saturated."""
     band: Band | None = None
     pitch: float | None = None
     """Distance between pixels on the object in m."""

@@ -51,7 +51,7 @@ class Sums:
     """Sums over the sub-frames; see `Exposure`.
 
     `views` are numbers of the surface and of the band of every view, shape (view, 2); `tables` hold
-    radiance in every band from 200 K on and its change to the next value, (band, n, 2);
+    radiance in every band at 200 K and above, and its change to the next value, (band, n, 2);
     `environments` is the radiance of every view's surroundings in W/(m² sr). `mean`, `centre` and
     `peak` are of shape (view, y, x), `hottest` of (y, x).
     """
@@ -140,7 +140,7 @@ def _find(temperature, last, number, past):
     for i in range(temperature.size):
         position = (temperature[i] - np.float32(COLDEST)) * np.float32(STEPS_PER_KELVIN)
         inside = min(max(position, np.float32(0.0)), np.float32(last))
-        # What is not finite becomes the least integer, or any.
+        # A value that is not finite becomes the smallest integer, or any.
         number[i] = min(max(np.int32(inside), np.int32(0)), np.int32(last - 1))
         off = position - inside
         past[i] = inside - np.float32(number[i]) if off == np.float32(0.0) else np.float32(np.nan)

@@ -1,4 +1,4 @@
-"""What is cut and how: speed, feed, friction; when to look; how finely to compute."""
+"""Conditions of a cut: speed, feed, friction, output window, numerics."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -86,7 +86,7 @@ class Friction(Part):
 
 @dataclass(frozen=True)
 class Surroundings(Part):
-    """What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."""
+    """Surroundings to which free surfaces lose heat; none by default."""
 
     convection: Annotated[
         float,
@@ -108,7 +108,7 @@ class Surroundings(Part):
     temperature: Annotated[
         float,
         Parameter(
-            "Temperature of the air and of what the surfaces radiate to.",
+            "Temperature of air and surroundings.",
             TEMPERATURE,
             over=0.0,
             most=1500.0,
@@ -159,7 +159,7 @@ class OutputWindow(Part):
     band_duration: Annotated[
         float,
         Parameter(
-            "How long each of them is kept: the camera's integration_time or more.",
+            "Duration of each of them: the camera's integration_time or more.",
             TIME,
             least=1e-9,
             most=1e-3,
@@ -175,7 +175,7 @@ class OutputWindow(Part):
 
 @dataclass(frozen=True)
 class Numerics(Part):
-    """How finely the cut is computed.
+    """Cells, time steps and region of the computation.
 
     Cutting is slow against the speed of sound, so a heavier material moves alike and allows a
     longer time step; heat is not scaled. The computed region reaches `upstream`, `downstream`,

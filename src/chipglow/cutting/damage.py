@@ -16,7 +16,7 @@ TRIAXIALITIES: Final = (-1.5, 1.5)
 
 BAND_CELLS: Final = 2.0
 """Width in cells of the layer over which the solver spreads a failure: quadratic B-splines cannot
-resolve a narrower one. What this layer takes is the energy of the failed surface."""
+resolve a narrower one. The work in this layer is the energy of the failed surface."""
 
 BAND_LENGTHS: Final = 2.0
 """Width of that layer in lengths of a `NonlocalViscosity`."""
@@ -70,7 +70,7 @@ class JohnsonCookDamage(Part):
 
 @dataclass(frozen=True)
 class FittedDamage(Part):
-    """How well the numbers of a damage law that were fitted to measured cuts are known."""
+    """Uncertainty of the numbers of a damage law that were fitted to measured cuts."""
 
     numbers: Annotated[tuple[str, ...], Parameter("Fitted fields of `JohnsonCookDamage`.")]
     relative_covariance: Annotated[

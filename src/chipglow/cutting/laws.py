@@ -81,7 +81,7 @@ class HyperbolicTangent(JohnsonCook):
     σ = (A + B εⁿ / exp(εᵃ))(1 + C ln(ε̇/ε̇₀))(1 − θᵐ)(D + (1 − D) tanhˢ(1 / (ε + S)ᶜ)), with
     D = 1 − (T/T_melt)ᵈ, S = (T/T_melt)ᵇ and T in K: the hotter the material, the more it loses
     beyond some strain. With s = 1 it is Calamaz et al.'s, Int. J. Mach. Tools Manuf. 48, 275;
-    the exponent s is that of Sima and Özel (2010), Int. J. Mach. Tools Manuf. 50, 943.
+    the exponent s is by Sima and Özel (2010), Int. J. Mach. Tools Manuf. 50, 943.
     """
 
     kind = "tanh"

@@ -71,7 +71,7 @@ def material_names(kind: str | None = None) -> list[str]:
 
 
 def is_own_file(name: str) -> bool:
-    """Return whether a name is the path of a file of one's own, with or without a set."""
+    """Return whether a name is the path of a user's file, with or without a set."""
     match = _NAME.fullmatch(name)
     return match is not None and match[1].endswith((".yaml", ".yml"))
 
@@ -216,7 +216,7 @@ def _part(place: str, kind: Any, values: Any) -> Any:
 
 
 def _numbers(place: str, data: Mapping[str, Any]) -> Iterator[Property]:
-    """Yield all numbers below a place: they stand beside a source."""
+    """Yield all numbers below a place, which need a source."""
     for key, value in data.items():
         below = f"{place}.{key}".lstrip(".")
         source = str(data.get("source", "")).strip()

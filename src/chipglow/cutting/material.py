@@ -90,7 +90,7 @@ class NonlocalViscosity(Part):
 
 @dataclass(frozen=True)
 class WorkpieceMaterial(Part):
-    """What is cut; a density over the temperature is thermal expansion."""
+    """Material of the workpiece; a density over the temperature is thermal expansion."""
 
     name: Annotated[str, Parameter("Name, with the source of the numbers.")]
     density: Annotated[float | TemperatureTable, Parameter("Density.", DENSITY, over=0.0)]
@@ -110,7 +110,7 @@ class WorkpieceMaterial(Part):
         float | RateTable, Parameter("Fraction of work that is heat.", least=0.0, most=1.0)
     ] = 0.9
     fitted_damage: Annotated[
-        FittedDamage | None, Parameter("How well fitted numbers of the damage are known.")
+        FittedDamage | None, Parameter("Uncertainty of fitted numbers of the damage.")
     ] = None
     nonlocal_viscosity: Annotated[
         NonlocalViscosity | None, Parameter("Without it, shear bands are as narrow as the cell.")
@@ -180,14 +180,14 @@ class WorkpieceMaterial(Part):
 
     @property
     def melting_temperature(self) -> float:
-        """Of the flow-stress law in K, or else of the damage, or else the end of the tables."""
+        """Melting point in K of the flow-stress law, the damage, or the end of the tables."""
         of_damage = getattr(self.damage, "melting_temperature", TABLE_HOTTEST)
         return float(getattr(self.flow_stress, "melting_temperature", of_damage))
 
 
 @dataclass(frozen=True)
 class ToolMaterial(Part):
-    """What cuts: rigid, but it conducts heat."""
+    """Material of the tool: rigid, but it conducts heat."""
 
     name: Annotated[str, Parameter("Name, with the source of the numbers.")]
     density: Annotated[float, Parameter("Density.", DENSITY, over=0.0)]

@@ -40,7 +40,7 @@ BATCH_CELLS = 16
 
 NODE_VALUES = ADDED
 MASS, MOMENTUM_X, MOMENTUM_Y, IMPULSE_X, IMPULSE_Y, FRICTION_LIMIT = range(6)
-"""What the points gather on a node: in kg/m; momentum and impulse of stress and contact in kg/s
+"""Sums of the points on a node: in kg/m; momentum and impulse of stress and contact in kg/s
 twice; limit of the friction impulse in N s/m. The last two values stay zero."""
 
 VELOCITY_VALUES = SUMMED
@@ -52,7 +52,7 @@ SUMS = 9
     FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS,
     EXPANSION_WORK, MODULI_LOSS,
 ) = range(SUMS)  # fmt: skip
-"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m); the last three
+"""Sums of a step: forces on the chip (N/m), and work per width of cut (J/m); the last three
 are the elastic energy that goes when the points of a cell share one dilation, that which comes when
 their volume without stress changes with the temperature, and that which goes when the moduli fall
 with it."""

@@ -36,7 +36,7 @@ around the point then; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 Trouble: TypeAlias = tuple[str, int]
-"""What is wrong, and the number of the point."""
+"""Return the kind of fault, and the index of the point."""
 
 
 class Grid(NamedTuple):
@@ -96,7 +96,7 @@ def find_trouble(points: Points) -> Trouble | None:
         values = points.view(np.float64).reshape(points.size, -1)
         total = values.sum()
     if not np.isfinite(total) and not (finite := np.isfinite(values)).all():
-        # What spread furthest was the first.
+        # The farthest point was the first.
         field = int((~finite).sum(axis=0).argmax())
         return f"{(POINT.names or ())[field]} is not finite", _innermost(points, ~finite[:, field])
     temperature = points["temperature"]

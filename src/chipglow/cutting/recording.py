@@ -1,4 +1,4 @@
-"""What is recorded of a cut: frames of a window and of later bands, energies, checkpoints."""
+"""Records of a cut: frames of a window and of later bands, energies, checkpoints."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -41,7 +41,7 @@ class Preview:
 class Valleys:
     """Valleys of a force that comes in value by value, an `interval` in s apart.
 
-    A valley is the least of the force, smoothed over 5 µs, between two rises of 5 % of its mean.
+    A valley is the minimum of the force, smoothed over 5 µs, between two rises of 5 % of its mean.
     """
 
     def __init__(self, interval: float) -> None:
@@ -208,7 +208,7 @@ class Checkpoint:
 
 
 def capture(state: Any, records: NDArray[np.float64], progress: float) -> Checkpoint:
-    """Return the state as it is, in its own arrays, which change when it goes on."""
+    """Return the state in its own arrays, which change when the simulation continues."""
     arrays = {name: np.asarray(getattr(state, name)) for name in (*_ARRAYS, *_NUMBERS)}
     arrays |= {"points": state.points[: state.count], "records": records}
     return Checkpoint(arrays, progress)

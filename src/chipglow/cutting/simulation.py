@@ -148,15 +148,15 @@ class CuttingSimulation:
     tool : Tool
         Outline of the tool.
     workpiece : WorkpieceMaterial
-        What is cut.
+        The workpiece's material.
     tool_material : ToolMaterial
-        What the tool is made of.
+        The tool's material.
     friction : Friction
         Friction and heat in the contact.
     numerics : Numerics
-        How finely it is computed.
+        Cells, time steps and region.
     surroundings : Surroundings
-        What free surfaces lose heat to.
+        Surroundings to which free surfaces lose heat.
     tool_temperature : float or ToolBody, optional
         The tool's temperature in K when the cut begins. A body: the temperature of a tool that has
         been cutting for long, by the flow of heat through this body. None: as cold as the
@@ -246,7 +246,7 @@ class CuttingSimulation:
 
     @property
     def resolution_warnings(self) -> tuple[str, ...]:
-        """Lengths of the cut that fewer than `CELLS_NEEDED` cells resolve, a sentence each."""
+        """Sentences on lengths that fewer than `CELLS_NEEDED` cells resolve."""
         lengths = (("feed", self.conditions.feed), ("edge radius", self.tool.corner_radius))
         return unresolved(dict(lengths), self.numerics.cell)
 
@@ -347,7 +347,7 @@ class CuttingSimulation:
 
 
 class _State:
-    """What changes while the simulation runs."""
+    """State of a running simulation."""
 
     def __init__(self, simulation: CuttingSimulation, interval: float) -> None:
         conditions, numerics = simulation.conditions, simulation.numerics

@@ -1,4 +1,4 @@
-"""The temperature of a tool that has been cutting for long: conduction from contact to holder.
+"""The temperature of a tool at steady state: conduction from contact to holder.
 
 Near the edge it is conduction in the plane of the cut; with the distance r from the edge the heat
 spreads to one side of the cut as well (the chip forms at the tool's imaged side), so that it flows
@@ -28,7 +28,7 @@ _FACING: Final = 0.2
 
 @dataclass(frozen=True)
 class ToolBody(Part):
-    """What the heat of a tool that has been cutting for long flows through."""
+    """Body through which the heat of a steady tool flows."""
 
     width: Annotated[
         float, Parameter("Width of cut; the paper's discs are 3 mm thick.", LENGTH, over=0.0)
@@ -60,7 +60,7 @@ class SteadyTool:
 
     grid: Grid
     fraction: Field
-    """Of each node's square that the tool fills, shape (columns, rows)."""
+    """Fraction of each node's square that the tool fills, shape (columns, rows)."""
     temperature: Field
     """In K, shape (columns, rows)."""
     rounds: tuple[float, ...]

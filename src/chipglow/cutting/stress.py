@@ -99,7 +99,7 @@ def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # typ
         plastic = bound > 0.0
         far += 1 if moving and plastic and abs(change) > _SMALL_CHANGE else 0
         better = tried * exponential(min(max(change, -3.0), 3.0))
-        # What flows slower than the slowest rate flows as the trial stress says.
+        # Below the slowest rate the trial stress determines the flow.
         better = better if moving else min(slowest, bound)
         largest = max(b[TRIAL + k], 0.0) / stiffness
         b[INCREMENT + k] = min(better, largest) if plastic else 0.0

@@ -33,7 +33,7 @@ _SHIFT: Final = 46
 """Low bits of a radiance that lie between two nodes of the inverse: 64 nodes to a power of two."""
 
 _POWERS: Final = 128
-"""Powers of two below the greatest radiance that the inverse's table reaches at most."""
+"""Powers of two below the largest radiance that the inverse's table covers at most."""
 
 _BLOCK: Final = 1024
 _KERNEL: Final[Any] = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -58,7 +58,7 @@ class RatioThermometer(Part):
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest temperature in K that can be measured."""
+        """Smallest and largest temperature in K that can be measured."""
         known = self._temperatures[self._rising]
         return float(known[0]), float(known[-1])
 

@@ -32,14 +32,14 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 
 
 class Textures(NamedTuple):
-    """Textures of several surfaces that move alike, for `blend_row`."""
+    """Textures of several surfaces with the same motion, for `blend_row`."""
 
     scale: np.float32
     """Nodes per m."""
     maps: NDArray[np.float32]
     """`padded` deviates of workpiece, chip and shear band, shape (feature, seed, nodes)."""
     seed_numbers: NDArray[np.int64]
-    """Number of each surface's seed."""
+    """Index of each surface's seed."""
     linear: NDArray[np.float32]
     """Mean and standard deviation, shape (surface, feature, 2); NaN where the table holds."""
     tables: NDArray[np.float32]

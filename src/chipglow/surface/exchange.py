@@ -139,7 +139,7 @@ class Exchange:
 
 @njit(cache=True)
 def _trace(starts, ends, element, places, sines, bounces):  # type: ignore[no-untyped-def]
-    """What the rays of an element meet in turn, shape (ray, bounce); −1: nothing."""
+    """Elements met by the rays of an element in turn, shape (ray, bounce); −1: none."""
     hits = np.empty((len(sines), bounces), np.int16)
     for r in range(len(sines)):
         hits[r] = _trace_one(starts, ends, element, places[r], sines[r], bounces)
@@ -148,7 +148,7 @@ def _trace(starts, ends, element, places, sines, bounces):  # type: ignore[no-un
 
 @njit(cache=True)
 def _trace_one(starts, ends, element, place, sine, bounces):  # type: ignore[no-untyped-def]
-    """What one ray meets in turn: from a place on an element, 0 to 1, at an angle's sine."""
+    """Elements met by one ray: from a place on an element, 0 to 1, at an angle's sine."""
     path = np.full(bounces, _OPEN, np.int16)
     cosine = np.sqrt(max(1.0 - sine * sine, 0.0))
     ux, uy = ends[element, 0] - starts[element, 0], ends[element, 1] - starts[element, 1]

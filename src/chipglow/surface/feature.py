@@ -70,7 +70,7 @@ class FeatureSurface(Surface, Part):
         ),
     ] = "material"
     seed: Annotated[
-        int, Parameter("Seed of the textures; each feature has a stream of its own.", least=0)
+        int, Parameter("Seed of the textures; each feature has a separate stream.", least=0)
     ] = 2010
     restore_standard_deviation: Annotated[
         bool,
@@ -140,7 +140,7 @@ class FeatureSurface(Surface, Part):
 
 
 PAPER_ORIGIN: Final = Origin((3.8e-6, 5.1e-6), "AISI 1045")
-"""Where the emissivities of the paper's Table 1 come from."""
+"""Origin of the emissivities of the paper's Table 1."""
 
 CHIP_1: Final = FeatureSurface(
     chip=Emissivity(0.42, 0.07), shear_band=Emissivity(0.53, 0.05), origin=PAPER_ORIGIN
@@ -241,13 +241,13 @@ class Features:
 
 @dataclass(frozen=True, eq=False)
 class EmissivityStack:
-    """Fields of one scene together: features that move alike are looked up at once."""
+    """Fields of one scene together: features with the same motion are looked up at once."""
 
     fields: Sequence[EmissivityField]
 
     @cached_property
     def features(self) -> Features | None:
-        """The features under all fields, if they move alike."""
+        """The features under all fields, if they have the same motion."""
         bare = [field.bare for field in self.fields if isinstance(field.bare, Features)]
         if len(bare) < len(self.fields) or not all(one.moves_like(bare[0]) for one in bare):
             return None
@@ -260,7 +260,7 @@ class EmissivityStack:
 
     @property
     def needed(self) -> frozenset[str] | None:
-        """Fields of a frame that are read beside temperature and material; None: all."""
+        """Fields of a frame that are read in addition to temperature and material; None: all."""
         sets = [field.fields for field in self.fields]
         known = [one for one in sets if one is not None]
         return frozenset().union(*known) if len(known) == len(sets) else None
@@ -293,7 +293,7 @@ class FeatureTrends(Modifier):
     trends: Mapping[str, EmissivityTrend]
     """Lines by names of `FEATURES`; a feature without one is the same at all temperatures."""
     draw: int = 0
-    """Number of the draw of the lines' errors; 0 is without."""
+    """Index of the draw of the lines' errors; 0: without errors."""
 
     @property
     def description(self) -> str:

@@ -14,7 +14,7 @@ from chipglow.scene.regrid import Taps, taps
 from chipglow.surface.surface import UNKNOWN, EmissivityField, Origin, Surface
 
 _KNOWN: Final = 1e-9
-"""Least weight of known pixels with which a sample is known."""
+"""Smallest weight of known pixels with which a sample is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class MapSurface(Surface):
         Standard uncertainty of the emissivity, of which other draws (`redrawn`) are made; all of
         it is taken as one error of all pixels.
     draw : int
-        Number of the draw; 0 is without an error.
+        Index of the draw; 0: without an error.
     origin : Origin
         Band and metal of the measurement.
 

@@ -83,7 +83,7 @@ class _Sections(NamedTuple):
     samples: NDArray[np.intp]
     """Row, column, section and element of all samples beside the face, shape (4, sample)."""
     weight: NDArray[np.float64]
-    """How far each sample is on the way from its element to the next one, 0 to 1."""
+    """Position of each sample between its element and the next one, 0 to 1."""
 
 
 def _sections(raster: Raster, tool: Tool, elements: SideElements) -> _Sections:
@@ -130,7 +130,7 @@ class SideShape(Modifier):
     overhang: Annotated[
         float,
         Parameter(
-            "How far the tool's side stands out beyond the chip's; negative: the chip's does.",
+            "Distance of the tool's side beyond the chip's; negative: the chip's is beyond.",
             POSITION,
         ),
     ] = 0.0
@@ -335,7 +335,7 @@ def _samples_at(
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return rows and columns of the samples at depths from points of the rake face.
 
-    Beyond the scene's border it goes on as at it.
+    Beyond the scene's border it continues as at the border.
     """
     points = foot[:, None] + depths[:, None] * np.array(tool.rake_normal)
     rows = np.floor((raster.top - points[..., 1]) / raster.spacing).astype(np.intp)

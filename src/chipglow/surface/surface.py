@@ -118,7 +118,7 @@ class Surface(Part, ABC):
 
     @property
     def effects(self) -> Mapping[str, str]:
-        """What a measurement states of the surface, by the names of its effects, in SI."""
+        """Attributes of a measurement about the surface, by the names of its effects, in SI."""
         return {"emissivity": repr(self)}
 
     def modified(self, *modifiers: "Modifier") -> "Surface":
@@ -126,7 +126,7 @@ class Surface(Part, ABC):
         return ModifiedSurface(self, modifiers) if modifiers else self
 
     def redrawn(self, number: int) -> Self:
-        """Return the surface with draw `number` of what is random in it; itself for 0 or none."""
+        """Return the surface with random draw `number`; itself for 0 or without randomness."""
         return self
 
     def without_texture(self) -> Self:
@@ -135,7 +135,7 @@ class Surface(Part, ABC):
 
 
 class Modifier(Part, ABC):
-    """What modifies the emissivity of a surface: oxide, an angle, a spectrum, reflections.
+    """A modifier of the emissivity of a surface: oxide, an angle, a spectrum, reflections.
 
     A class that adds `change`.
     """
@@ -150,7 +150,7 @@ class Modifier(Part, ABC):
 
     @property
     def description(self) -> str:
-        """What a measurement states of it, in SI."""
+        """Attributes of a measurement about it, in SI."""
         return repr(self)
 
     @abstractmethod
@@ -174,7 +174,7 @@ class Modifier(Part, ABC):
         """
 
     def redrawn(self, number: int) -> Self:
-        """Return the modifier with draw `number` of what is random in it."""
+        """Return the modifier with random draw `number`."""
         return self
 
 
@@ -191,7 +191,7 @@ class ModifiedSurface(Surface):
 
     @property
     def origin(self) -> Origin:  # type: ignore[override]
-        """That of the bare surface; of any band if a modifier converts it."""
+        """Band of the bare surface; any band if a modifier converts it."""
         spectral = any(one.effect == "spectral" for one in self.modifiers)
         return replace(self.bare.origin, band=None) if spectral else self.bare.origin
 

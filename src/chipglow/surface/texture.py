@@ -16,7 +16,7 @@ from scipy.special import betainccinv, betaincinv, ndtr
 from chipglow.quantities import Array, Parameter, Part
 
 REACH: Final = 8.0
-"""Normal deviates from −8 to 8 are told apart; those beyond count as these."""
+"""Normal deviates are limited to −8 to 8."""
 
 STEPS: Final = 32
 """Entries of a table for each unit of the deviate."""
@@ -66,7 +66,7 @@ class Emissivity(Part):
 
     @property
     def line(self) -> tuple[float, float]:
-        """Emissivity at a deviate of 0 and its change with the deviate; NaN if it is no line."""
+        """Emissivity at a deviate of 0 and its change with the deviate; NaN if it is not a line."""
         return self.mean, self.standard_deviation if self.is_normal else float("nan")
 
 

@@ -23,17 +23,17 @@ class Cause:
     """
 
     name: str
-    """What it is, such as ``"calibration"``. Budgets have a line for each name."""
+    """Its name, such as ``"calibration"``. Budgets have a line for each name."""
     identity: str = ""
     """Tells causes of one name apart whose errors are independent."""
     errors: int = 1
-    """How many independent errors it has: 1 of a systematic one, the number of pixels of noise."""
+    """Number of independent errors: 1 for a systematic one, the number of pixels for noise."""
     degrees_of_freedom: float = inf
-    """Of the standard uncertainty of these errors; infinite if it is exactly known."""
+    """Degrees of freedom of the standard uncertainty; infinite if it is exactly known."""
     pooled: bool = True
     """Whether one estimate with these degrees of freedom serves all errors (JCGM 100:2008, H.3)."""
     parts: tuple[str, ...] = ()
-    """Names of the errors in budgets, if each is to have a line of its own."""
+    """Names of the errors in budgets, if each has a separate line."""
 
     def __post_init__(self) -> None:
         rules = {
@@ -56,7 +56,7 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, str]:
-        """Name and identity: what makes the cause."""
+        """Name and identity of the cause."""
         return self.name, self.identity
 
 
@@ -96,7 +96,7 @@ class Component:
 
     @property
     def per_element(self) -> bool:
-        """Whether every value has an error of its own, and that alone."""
+        """Whether every value has one separate error."""
         size, errors = self.effects.shape
         if not sparse.issparse(self.effects) or size != errors or self.effects.nnz != size:
             return False

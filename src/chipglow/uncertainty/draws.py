@@ -45,7 +45,7 @@ def draw(
                 )
             check_same(causes.setdefault(cause.key, cause), cause)
             used.setdefault(cause.key, []).append(_used(component.effects))
-    # Of an image's noise, only that of the pixels which are there is drawn.
+    # Only the noise of the given pixels of an image is drawn.
     numbers = {key: np.unique(np.concatenate(parts)) for key, parts in used.items()}
     errors = {
         key: _errors(replace(cause, errors=numbers[key].size, parts=()), count, generator)

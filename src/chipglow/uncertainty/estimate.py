@@ -29,14 +29,14 @@ class Estimate:
     Parameters
     ----------
     values : array_like
-        Of any shape; NaN where there is none.
+        Values of any shape; NaN if unknown.
     components : iterable of Component
         Independent of each other.
     unevaluated : iterable of str
         Causes that play a part, but of which nothing is known here: they are in the budget without
         a number and not in the uncertainty.
     warnings : iterable of str
-        Why the values may be wrong beyond their uncertainty, a sentence each. Whatever is
+        Doubts about the values beyond their uncertainty, as sentences. Whatever is
         computed of the estimate has them too.
 
     Notes
@@ -215,7 +215,7 @@ class Estimate:
         return replace(self, components=kept)
 
     def effect(self, name: str) -> Array:
-        """Return the signed effect of the systematic component of a name; 0 if there is none."""
+        """Return the signed effect of the systematic component of a name; 0 without one."""
         found = [one for one in self.components if one.cause.name == name]
         if len(found) == 1 and found[0].cause.errors == 1:
             return np.asarray(found[0].effects, np.float64).reshape(self.shape)

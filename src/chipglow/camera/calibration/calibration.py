@@ -20,7 +20,7 @@ from chipglow.uncertainty import Cause, Component, Estimate
 from chipglow.uncertainty.estimate import factor
 
 CALIBRATION: Final = "calibration"
-"""Name of the component of uncertainty that a calibration makes."""
+"""Name of the component of uncertainty due to a calibration."""
 
 _CHECKED: Final = 101
 _NODES: Final = 513
@@ -86,7 +86,7 @@ class Calibration(ABC):
     description: ClassVar[str]
     band: Band
     lowest: float = 0.0
-    """Radiance temperature in K from which on it holds."""
+    """Lowest valid radiance temperature in K."""
     highest: float = inf
     """Radiance temperature in K up to which it holds."""
     integration_time: float | None = None
@@ -94,11 +94,11 @@ class Calibration(ABC):
     range_name: str | None = None
     """The camera's measuring range for which it holds, as its maker calls it."""
     warnings: tuple[str, ...] = ()
-    """Why it may not be relied on, a sentence each."""
+    """Warnings, as sentences."""
 
     @abstractmethod
     def radiance(self, counts: ArrayLike) -> Array:
-        """Return the in-band radiance in W/(m² sr) of counts; NaN where there is none."""
+        """Return the in-band radiance in W/(m² sr) of counts; NaN if unknown."""
 
     @property
     def errors(self) -> CalibrationErrors | None:

@@ -21,7 +21,7 @@ _LEAST_FALL: Final = 0.5
 def residual_warnings(
     residuals: Array, design: Array, kelvins: Array, stated: bool, drifts: bool
 ) -> Iterator[str]:
-    """Yield what residuals say against a calibration, a sentence each.
+    """Yield doubts about a calibration from its residuals, as sentences.
 
     `residuals` (n,), in the order of the measurement, and `design` (n, parameters), the change of
     the points with the parameters, are over the standard uncertainties. Unless these are `stated`,
@@ -52,9 +52,9 @@ def residual_warnings(
 
 
 def alike(residuals: Array, design: Array) -> bool:
-    """Return whether residuals of successive points are more alike than chance makes them."""
+    """Return whether residuals of successive points are correlated beyond chance."""
     free = residuals.size - design.shape[1]
-    # What is far within the uncertainties does no harm, however alike it is.
+    # Residuals far within the uncertainties do no harm, even if correlated.
     if free < _LEAST_FREEDOM or float(residuals @ residuals) < _FAR_WITHIN * free:
         return False
     tests = (_serial_probability, _drift_probability)

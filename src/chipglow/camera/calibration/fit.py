@@ -34,7 +34,9 @@ class Blackbody(Part):
         float,
         Parameter("Its standard uncertainty, common to all points.", least=0.0, under=1.0),
     ] = 0.0
-    surroundings: Annotated[float, Parameter("What it reflects.", TEMPERATURE, over=0.0)] = 293.15
+    surroundings: Annotated[float, Parameter("Reflected temperature.", TEMPERATURE, over=0.0)] = (
+        293.15
+    )
 
     def radiance_temperatures(self, kelvins: Array, band: Band) -> Array:
         """Return the temperatures in K of the ideal blackbodies that radiate as much."""
@@ -69,7 +71,7 @@ class CalibrationFit(Generic[Kind]):
     residuals: Array
     """Counts minus those of the calibration, shape (n,)."""
     standard_uncertainties: Array
-    """Of the residuals in counts, the temperatures' included, shape (n,)."""
+    """Uncertainty of the residuals in counts, the temperatures' included, shape (n,)."""
     stated: bool
     """Whether the uncertainties were stated; otherwise they are the residuals' scatter."""
 

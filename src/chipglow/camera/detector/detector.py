@@ -16,7 +16,7 @@ from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 
 Correction: TypeAlias = Literal["two-point", "one-point", "none"]
-"""How the pixels are made alike: by frames of two flat-field sources, of one, or not at all."""
+"""Non-uniformity correction: by frames of two flat-field sources, of one, or none."""
 
 DARKER_SOURCE: Final = 0.1
 BRIGHTER_SOURCE: Final = 0.8
@@ -25,7 +25,7 @@ BRIGHTER_SOURCE: Final = 0.8
 
 @dataclass(frozen=True, kw_only=True)
 class Detector(Part):
-    """A detector, its digitiser, and how its pixels were made alike.
+    """A detector, its digitiser, and its non-uniformity correction.
 
     Light makes electrons by the `response`. The `terms` change them in the order of their `Stage`:
     light, dark, charge; then the full well limits them; transfer, read-out; then they are
@@ -47,12 +47,10 @@ class Detector(Part):
     bits: Annotated[int, Parameter("Bits of the digitiser.", least=1, most=32)] = 12
     terms: Annotated[
         tuple[Annotated[DetectorTerm, DETECTOR_TERMS], ...],
-        Parameter(
-            "What happens besides, a list; each acts in its own place between light and counts."
-        ),
+        Parameter("Other effects, a list; each acts at its stage between light and counts."),
     ] = ()
     correction: Annotated[
-        Correction, Parameter("How pixels are made alike: two-point, one-point or none.")
+        Correction, Parameter("Non-uniformity correction: two-point, one-point or none.")
     ] = "two-point"
     frames: Annotated[int, Parameter("Frames of each source for that.", least=2, most=10_000)] = 32
     cold: Annotated[
@@ -119,7 +117,7 @@ class Detector(Part):
 
     @property
     def saturation(self) -> int:
-        """The greatest count that is not saturated, as far as elements do not differ."""
+        """The largest count that is not saturated, if elements do not differ."""
         full = self.offset + self.conversion_gain * self.capacity
         return min(self._top, round(full)) - 1
 

@@ -23,7 +23,7 @@ from chipglow.quantities import Array
 from chipglow.quantities.units import COLDEST
 
 HALF: Final = 0.5
-"""Part of the capacity that is filled where the NETD is told."""
+"""Filled part of the capacity at which the NETD is stated."""
 
 _BEYOND: Final = 10.0
 """Capacities' light by which saturated frames are made."""
@@ -44,7 +44,7 @@ _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
 
 @dataclass(frozen=True, eq=False)
 class FlatFieldCalibration:
-    """A camera's conversion of its own detector's counts to radiance.
+    """A camera's conversion of its detector's counts to radiance.
 
     Pixels are made alike by the detector's `correction`. Two sources, blackbodies of known
     radiance, give the straight line from the median pixel's counts to radiance. So what remains in
@@ -59,7 +59,7 @@ class FlatFieldCalibration:
     bad: NDArray[np.bool_]
     """Pixels that do not answer as others do, or that the brighter source saturates, (y, x)."""
     saturated: Array
-    """Counts from which on each pixel is saturated, shape (y, x)."""
+    """Saturation of each pixel in counts, shape (y, x)."""
     sources: tuple[float, float]
     """Radiance of the darker and of the brighter source in W/(m² sr)."""
     levels: tuple[float, float]

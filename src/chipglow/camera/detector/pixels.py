@@ -10,7 +10,7 @@ from scipy.ndimage import label
 from chipglow.quantities import Array
 
 LEAST_FRAMES: Final = 8
-"""Frames from which the noise of a pixel can be told."""
+"""Number of frames from which the noise of a pixel is determined."""
 
 NOISE_LIMIT: Final = 5.0
 """Multiple of the median standard deviation over time from which on a pixel is noisy."""

@@ -73,7 +73,8 @@ class PhotonResponse(DetectorResponse):
         float, Parameter("Side of an element's square, on the detector.", LENGTH, over=0.0)
     ]
     f_number: Annotated[
-        float, Parameter("Of the cone of light at the detector, as of its cold stop.", least=0.5)
+        float,
+        Parameter("F-number of the light at the detector, such as of its cold stop.", least=0.5),
     ]
     transmittance: Annotated[
         float, Parameter("Fraction of the light that optics and filter pass.", over=0.0, most=1.0)
@@ -104,7 +105,7 @@ class PhotonResponse(DetectorResponse):
 @RESPONSES.part
 @dataclass(frozen=True)
 class EnergyResponse(DetectorResponse):
-    """A detector of which the response to radiance is known, as of a calibration."""
+    """A detector with a known response to radiance, such as from a calibration."""
 
     kind = "energy"
     example = "{kind: energy, per_radiance: 1.2e4}"

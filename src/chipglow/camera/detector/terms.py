@@ -40,7 +40,7 @@ class Stage(IntEnum):
     TRANSFER = 3
     """On the signal that is made of them."""
     READOUT = 4
-    """What reading adds; then come gain, offset and the digitiser."""
+    """Read-out noise; then come gain, offset and the digitiser."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Readout:
     keys: Sequence[int]
     """Seed of each frame's noise."""
     seed: int
-    """Of what is fixed in the detector."""
+    """Fixed pattern of the detector."""
     kind: str
     """Kind of the term, whose noise does not depend on what other terms there are."""
 
@@ -112,7 +112,8 @@ class GainPattern(DetectorTerm):
     example = "{kind: gain-pattern, standard_deviation: 0.02}"
     stage = Stage.LIGHT
     standard_deviation: Annotated[
-        float, Parameter("Of the elements' gains, as a fraction of their mean.", least=0.0)
+        float,
+        Parameter("Deviation of the elements' gains, as a fraction of their mean.", least=0.0),
     ]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
@@ -128,7 +129,7 @@ class DeadElements(DetectorTerm):
     kind = "dead-elements"
     example = "{kind: dead-elements, fraction: 0.002}"
     stage = Stage.LIGHT
-    fraction: Annotated[float, Parameter("Of all elements.", least=0.0, under=1.0)]
+    fraction: Annotated[float, Parameter("Fraction of all elements.", least=0.0, under=1.0)]
 
     def mask(self, shape: tuple[int, ...], seed: int) -> NDArray[np.bool_]:
         """Return the dead elements of a detector with this seed and shape (y, x)."""
@@ -151,7 +152,7 @@ class Lag(DetectorTerm):
     kind = "lag"
     example = "{kind: lag, fraction: 0.02}"
     stage = Stage.LIGHT
-    fraction: Annotated[float, Parameter("Of the frame before.", least=0.0, under=1.0)]
+    fraction: Annotated[float, Parameter("Fraction of the frame before.", least=0.0, under=1.0)]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
         return lagged(electrons, readout.times, readout.point.frame_time, self.fraction)
@@ -209,7 +210,7 @@ class ShotNoise(DetectorTerm):
 class NonLinearity(DetectorTerm):
     """A signal that falls short of a straight line: n becomes n (1 − f n / N), N the capacity.
 
-    Beyond the capacity it goes on as n (1 − f).
+    Beyond the capacity it continues as n (1 − f).
     """
 
     kind = "non-linearity"
@@ -217,9 +218,7 @@ class NonLinearity(DetectorTerm):
     stage = Stage.TRANSFER
     fraction: Annotated[
         float,
-        Parameter(
-            "By which the greatest signal falls short; under 0: beyond.", least=-0.4, most=0.4
-        ),
+        Parameter("Shortfall of the largest signal; negative: excess.", least=-0.4, most=0.4),
     ]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
@@ -236,7 +235,7 @@ class OffsetPattern(DetectorTerm):
     example = "{kind: offset-pattern, standard_deviation: 2000}"
     stage = Stage.READOUT
     standard_deviation: Annotated[
-        float, Parameter("Of the elements' offsets, in electrons.", least=0.0)
+        float, Parameter("Deviation of the elements' offsets, in electrons.", least=0.0)
     ]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
@@ -329,7 +328,7 @@ class EquivalentNoise(DetectorTerm):
         float, Parameter("Difference as large as the noise.", TEMPERATURE_DIFFERENCE, least=0.0)
     ]
     temperature: Annotated[
-        float, Parameter("Of the blackbody.", TEMPERATURE, least=200.0, most=6000.0)
+        float, Parameter("Temperature of the blackbody.", TEMPERATURE, least=200.0, most=6000.0)
     ] = 303.15
 
     def apply(self, electrons: Array, readout: Readout) -> Array:

@@ -126,7 +126,7 @@ class Vibration(BlurTerm):
     kind = "vibration"
     example = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
     amplitude: Annotated[
-        float, Parameter("Greatest displacement from the middle, on the scene.", LENGTH, over=0.0)
+        float, Parameter("Largest displacement from the centre, on the scene.", LENGTH, over=0.0)
     ]
     direction: Direction = 0.0
 
@@ -151,7 +151,7 @@ class BlurredPSF(PointSpreadFunction):
     Parameters
     ----------
     psf : PointSpreadFunction
-        That of the optics, or a measured one.
+        The blur of the optics, or a measured one.
     blurs : tuple of BlurTerm
         Further blurs; a ValueError if one is in the point spread function already.
 

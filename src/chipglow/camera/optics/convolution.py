@@ -16,7 +16,7 @@ from chipglow.scene import Raster
 from chipglow.surface.blend import in_blocks
 
 Beyond: TypeAlias = Literal["edge", "nothing"]
-"""What is taken to be beyond the edges of a field."""
+"""Assumption about the field beyond its edges."""
 
 _Grid: TypeAlias = tuple[Raster, Raster, float]
 """Samples and pixels of an image, and the pixels' fill factor."""
@@ -32,7 +32,7 @@ def blur(
 ) -> Array:
     """Return the image of a field of radiance (y, x) behind a point spread function.
 
-    Beyond its edges the field goes on with the value at the nearest edge, however far, or there is
+    Beyond its edges the field continues with the value at the nearest edge, or there is
     nothing. Nothing wraps around, and no tail of the point spread function is left out.
     """
     edge, nothing = blurs(radiance, psf, spacing)
@@ -40,7 +40,7 @@ def blur(
 
 
 def blurs(radiance: Array, psf: PointSpreadFunction, spacing: float) -> tuple[Array, Array]:
-    """Return both images by `blur`: of a field that goes on, and of one with nothing beyond."""
+    """Return both images by `blur`: of a field that continues, and of one with nothing beyond."""
     return _optics(psf, spacing, radiance.shape, None).images(radiance)
 
 
@@ -86,7 +86,7 @@ class _Strip:
         return cls(lit, fft.rfft(lines[lit], n=length), length, reach)
 
     def add(self, edge: Array, beyond: Literal["edge", "constant"], light: Array) -> None:
-        """Add the light of an edge that goes on at its ends, or not, to that of all lines."""
+        """Add the light of an edge that continues at its ends, or not, to the lines."""
         line = fft.rfft(np.pad(edge, self.reach, mode=beyond), n=self.length)
         sent = fft.irfft(line * self.spectrum, n=self.length, overwrite_x=True)
         light[self.lines] += sent[:, 2 * self.reach :][:, : edge.size]
@@ -106,12 +106,12 @@ class _Optics:
     edges: tuple[_Strip, ...]
 
     def images(self, field: Array) -> tuple[Array, Array]:
-        """Return the image of a field that goes on beyond its edges, or with nothing beyond."""
+        """Return the image of a field that continues beyond its edges, or with nothing beyond."""
         within = _sums(self.across, self._within(field).T).T
         left, right, top, bottom = self.edges
         beside = np.zeros((self.across.shape[0], field.shape[0]))
         over = np.zeros((self.down.shape[0], field.shape[1]))
-        # Above and below the field the left and the right edge go on as its corners.
+        # Above and below the field the left and the right edge continue as its corners.
         left.add(field[:, 0], "edge", beside)
         right.add(field[:, -1], "edge", beside)
         top.add(field[0], "constant", over)

@@ -41,7 +41,7 @@ def folded(kernel: Array, rows: int, columns: int) -> Array:
 
 
 def resized(kernel: Array, rows: int, columns: int) -> Array:
-    """Return a kernel cut or padded with zeros to so many squares on each side of the middle."""
+    """Return a kernel cut or padded with zeros to a number of squares around the centre."""
     for axis, reach in enumerate((rows, columns)):
         more = reach - kernel.shape[axis] // 2
         line = np.moveaxis(kernel, axis, 0)
@@ -127,8 +127,8 @@ def _between(before, first, last, after, t):  # type: ignore[no-untyped-def]
 
 
 def peak(weights: Array) -> tuple[int, int]:
-    """Return row and column of the greatest value; of equal ones, of that nearest their middle."""
-    # What differs by rounding alone is equal: the top of a disc is flat.
+    """Return row and column of the largest value; of equal ones, of the most central."""
+    # Values that differ by rounding alone are equal: the top of a disc is flat.
     places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
     from_middle = np.hypot(*(places - places.mean(axis=0)).T)
     row, column = places[int(np.argmin(from_middle))].tolist()

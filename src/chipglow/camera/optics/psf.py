@@ -133,7 +133,7 @@ class PointSpreadFunction(PSFChoice):
 class AnnularAperturePSF(PointSpreadFunction):
     """Diffraction of a reflecting microscope objective.
 
-    Its pupil is round with a round obstruction in its middle. The closed form, with v = 2π NA r / λ
+    Its pupil is round with a central round obstruction. The closed form, with v = 2π NA r / λ
     and the obscuration o, is [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² (Born and Wolf, Principles
     of Optics, 8.6.2). It holds no aberration and nothing of the detector. `fwhm` is its full width
     at half maximum in m.
@@ -181,7 +181,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         return folded(_with_the_rest(kernel, spacing), rows, columns)
 
     def _fractions(self, spacing: float, rows: int, columns: int) -> Array:
-        """Return fractions of the light on squares, so many up and down and to either side."""
+        """Return fractions of the light on squares around the centre."""
         # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
         count = 2 + ceil(3 * spacing / (pi * self._unit))
         side = spacing / self._unit

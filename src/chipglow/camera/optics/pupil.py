@@ -83,7 +83,7 @@ Obscuration = Annotated[
 Defocus = Annotated[
     float,
     Parameter(
-        "How far the surface is from the plane of best focus, away from the lens.",
+        "Distance of the surface from the plane of best focus, away from the lens.",
         POSITION,
         least=-0.01,
         most=0.01,
@@ -109,7 +109,7 @@ Aberrations = Annotated[
 SourceTemperature = Annotated[
     float,
     Parameter(
-        "Of the blackbody by whose spectrum and the response wavelengths count.",
+        "Temperature of the blackbody whose spectrum weights the wavelengths.",
         TEMPERATURE,
         least=200.0,
         most=6000.0,
@@ -270,7 +270,7 @@ class PupilPSF(PointSpreadFunction):
 
     @cached_property
     def _slope(self) -> float:
-        """Greatest slope of the path difference in m for one radius of the pupil."""
+        """Largest slope of the path difference in m for one radius of the pupil."""
         x = np.linspace(-1.0, 1.0, _FINEST_PUPIL + 1)
         difference = self._path(x, x[:, None])
         steep = np.hypot(*np.gradient(difference, x[1] - x[0]))
@@ -278,7 +278,7 @@ class PupilPSF(PointSpreadFunction):
 
     @property
     def _geometric(self) -> float:
-        """How far in m rays land from where they should."""
+        """Return the displacement of rays in the image in m."""
         return self._slope / self.numerical_aperture
 
     @cached_property

@@ -63,7 +63,7 @@ class OpticalElement(OpticsTerm):
     transmittance: Annotated[
         float, Parameter("Fraction of the light in the band that it passes.", over=0.0, most=1.0)
     ]
-    temperature: Annotated[float, Parameter("Of the element.", TEMPERATURE)] = 293.15
+    temperature: Annotated[float, Parameter("Temperature of the element.", TEMPERATURE)] = 293.15
     calibrated_at: Annotated[
         float | None,
         Parameter(
@@ -101,7 +101,7 @@ class Narcissus(OpticsTerm):
     )
     reflectance: Annotated[
         float,
-        Parameter("Of all surfaces, as a fraction of what the detector sees.", least=0.0, most=1.0),
+        Parameter("Reflection of all surfaces, as a fraction.", least=0.0, most=1.0),
     ]
     radius: Annotated[float, Parameter("Where half of it is left, on the scene.", LENGTH, over=0.0)]
     housing: Annotated[float, Parameter("Temperature of the housing.", TEMPERATURE)] = 293.15
@@ -216,7 +216,7 @@ class FieldBlur(OpticsTerm):
     kind = "field-blur"
     example = "{kind: field-blur, standard_deviation: 6 um, radius: 400 um}"
     standard_deviation: Annotated[
-        float, Parameter("Of the blur at the radius, on the scene.", LENGTH, least=0.0)
+        float, Parameter("Width of the blur at the radius, on the scene.", LENGTH, least=0.0)
     ]
     radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
 

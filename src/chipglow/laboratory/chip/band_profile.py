@@ -65,7 +65,7 @@ _FINE: Final = 4
 
 
 class Stage(StrEnum):
-    """How far a shear band has developed, by where it is (Heigel and Whitenton 2010, Figure 8)."""
+    """Development of a shear band by its position (Heigel and Whitenton 2010, Figure 8)."""
 
     DEVELOPING = "developing"
     """It has not come to the reference."""
@@ -181,12 +181,12 @@ def band_profile(
     tool : Tool, optional
         The tool, in the measurement's coordinates; the measurement's own by default.
     frames : sequence of int, optional
-        Numbers of the frames; all by default.
+        Indices of the frames; all by default.
     curve : ndarray, optional
         Corners of a polyline along which to read all frames, from the cutting edge outward, x and
         y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
     reference : int, optional
-        Number of the frame whose band is fully developed. By default the given curve is its place;
+        Index of the frame whose band is fully developed. By default the given curve is its place;
         without a curve, the frame in which the band that begins near the edge has the largest
         integral of its temperature over the camera's lower range limit.
     width : float, optional
@@ -195,7 +195,7 @@ def band_profile(
         Standard uncertainty of the curve's position in m, the same in x and y. By default that of
         one pixel: its side over the root of 12.
     uncertainty : ToolUncertainty, optional
-        How well the place of the tool is known, such as that of a `FoundTool`.
+        Uncertainty of the tool's position, such as of a `FoundTool`.
 
     Raises
     ------

@@ -57,7 +57,7 @@ def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeG
 
 
 def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
-    """Return the mean over the grid's frames of what is usable in K, or NaN."""
+    """Return the mean of usable values over the grid's frames in K, or NaN."""
     frames = np.isin(measurement.times, grid.times)
     values = measurement.radiance_temperature()[frames]
     known = np.isfinite(values)

@@ -32,7 +32,7 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
 
 
 def frame_mean(estimate: Estimate) -> Estimate:
-    """Compute the mean over the first axis of what is known; NaN where nothing is."""
+    """Return the mean of known values over the first axis; NaN without one."""
     known = np.isfinite(estimate.values)
 
     def mean(values: Array) -> Array:

@@ -50,7 +50,7 @@ class ChipScan:
 class ChipMetrics(Segmentation):
     """Segments and more of a chip; lengths in m, times in s, forces in N/m of width.
 
-    A ``…_standard_deviation`` is that of the values averaged, NaN for one value.
+    A ``…_standard_deviation`` describes the averaged values, NaN for one value.
     """
 
     frequency: float
@@ -94,7 +94,7 @@ class ChipMetrics(Segmentation):
     thrust_swing: float
     """Forces as in `CutHistory`; NaN without a force history."""
     scan: ChipScan
-    """Where and when the thickness was read. The thickness is NaN if the chip is cut by the
+    """Position and times of the thickness. The thickness is NaN if the chip is cut by the
     border of the view at every height at some time, or the scene is shorter than a period.
     """
 

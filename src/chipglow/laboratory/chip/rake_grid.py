@@ -38,7 +38,7 @@ PIXELS: Final = 3.0
 """Side of the paper's squares in pixels."""
 
 DEPTH: Final = 90e-6
-"""How far into the chip the grid reaches by default in m: five rows of 3 pixels of 6 um."""
+"""Default depth of the grid in the chip in m: five rows of 3 pixels of 6 um."""
 
 RAKE_BUDGET: Final = (CALIBRATION, *TOOL_BUDGET)
 """Lines of the budget of a square in one frame."""
@@ -184,12 +184,12 @@ def rake_grid(
     pixels : float
         Side of a square in pixels; the paper's 3 by default.
     depth : float
-        How far from the rake face into the chip the grid reaches in m: as many whole squares as
+        Depth of the grid in the chip from the rake face in m: as many whole squares as
         fit, at least one.
     frames : sequence of int, optional
-        Numbers of the frames; all by default.
+        Indices of the frames; all by default.
     uncertainty : ToolUncertainty, optional
-        How well the place of the tool is known, such as that of a `FoundTool`.
+        Uncertainty of the tool's position, such as of a `FoundTool`.
 
     Notes
     -----

@@ -63,7 +63,7 @@ class Instant:
     """The shear band during one exposure."""
 
     start: float
-    """When the exposure begins in s."""
+    """Start of the exposure in s."""
     band: ShearBand | None
     """Ridge of the strain rate's mean over the exposure; None if undefined."""
     temperatures: Array
@@ -92,7 +92,7 @@ class Segment:
     """A segment of the chip whose shear band is developed, and where its errors are read."""
 
     start: float
-    """When the exposure begins in s."""
+    """Start of the exposure in s."""
     frame: Frame
     """The scene in the middle of the exposure."""
     tool: Tool
@@ -107,7 +107,7 @@ class Segment:
 
     @property
     def moment(self) -> ShearBand:
-        """The band at one moment if there is one, else that over the exposure."""
+        """The band at one moment if known, else over the exposure."""
         return self.momentary_band or self.band
 
     @property

@@ -1,4 +1,4 @@
-"""What the histories of a cut show: segments, forces, and the inertia of the scaled mass."""
+"""Histories of a cut: segments, forces, and the inertia of the scaled mass."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -171,7 +171,7 @@ class Inertia:
 
     @property
     def warning(self) -> str:
-        """Warning of too much inertia; empty if there is none."""
+        """Warning of too much inertia, or an empty text."""
         fractions = (
             (self.kinetic_fraction, "kinetic energy reaches {} of the work"),
             (self.force_fraction, "momentum is worth {} of the cutting force"),

@@ -62,7 +62,7 @@ class ShearBand:
 
     @property
     def middle(self) -> int:
-        """Number of the point half-way along the curve, from where it begins."""
+        """Index of the point half-way along the curve, from its start."""
         return int(np.argmin(np.abs(self.ridge.distance - self.start - self.length / 2)))
 
     @property

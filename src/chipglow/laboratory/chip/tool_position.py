@@ -1,4 +1,4 @@
-"""Uncertainty of the place of a tool, and of what is read by the tool."""
+"""Uncertainty of the position of a tool, and of readings relative to it."""
 
 import hashlib
 from collections.abc import Iterable
@@ -36,11 +36,14 @@ def tool_of(measurement: Measurement, given: Tool | None = None) -> Tool:
 class ToolUncertainty(Part):
     """Standard uncertainties of the place of a tool, independent of each other."""
 
-    along: Annotated[float, Parameter("Of the tip along the rake face.", LENGTH, least=0.0)]
-    across: Annotated[
-        float, Parameter("Of the rake face across itself, at `pivot`.", LENGTH, least=0.0)
+    along: Annotated[
+        float, Parameter("Uncertainty of the tip along the rake face.", LENGTH, least=0.0)
     ]
-    angle: Annotated[float, Parameter("Of the rake angle.", ANGLE, least=0.0)] = 0.0
+    across: Annotated[
+        float,
+        Parameter("Uncertainty of the rake face across itself, at `pivot`.", LENGTH, least=0.0),
+    ]
+    angle: Annotated[float, Parameter("Uncertainty of the rake angle.", ANGLE, least=0.0)] = 0.0
     pivot: Annotated[
         float,
         Parameter(

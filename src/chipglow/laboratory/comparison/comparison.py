@@ -67,7 +67,7 @@ class Readings:
     """Distance up the rake face, or from the cutting edge along the band, in m, shape (n,)."""
     measured: Estimate
     simulated: tuple[Estimate, ...]
-    """Of the shape of `measured`: (n,), or (m, n) with a depth."""
+    """Positions in the shape of `measured`: (n,), or (m, n) with a depth."""
     depth: Array | None = None
     """Depth in the chip in m, shape (m,); None along the band."""
 
@@ -177,13 +177,13 @@ class StatedUncertainties(Part):
     temperature: Annotated[
         float,
         Parameter(
-            "Of the measured radiance temperature, common to all values.",
+            "Uncertainty of the measured radiance temperature, common to all values.",
             TEMPERATURE_DIFFERENCE,
             least=0.0,
         ),
     ] = 0.0
     emissivity: Annotated[
-        float, Parameter("Of the emissivities that the simulations assume, relative.", least=0.0)
+        float, Parameter("Relative uncertainty of the emissivities in the simulations.", least=0.0)
     ] = 0.0
     position: Annotated[
         float | None,
@@ -195,7 +195,8 @@ class StatedUncertainties(Part):
         ),
     ] = None
     tool: Annotated[
-        ToolUncertainty | None, Parameter("Of the tool's place, common to all measured values.")
+        ToolUncertainty | None,
+        Parameter("Uncertainty of the tool's position, common to all measured values."),
     ] = None
 
 
@@ -224,7 +225,7 @@ def compare(
     stated : StatedUncertainties, optional
         Uncertainties that the files do not state.
     reference : int, optional
-        Number of the measured frame whose band is fully developed; see `band_profile`.
+        Index of the measured frame whose band is fully developed; see `band_profile`.
 
     Notes
     -----

@@ -234,7 +234,7 @@ class EmissivityMapFile(SurfaceFile):
 
     kind: ClassVar[str] = "map"
     example: ClassVar[str] = "{kind: map, file: emissivity.nc}  what chipglow emissivity writes"
-    file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
+    file: Annotated[FileBeside, Parameter("Output file of chipglow emissivity.")]
 
     def surface(self) -> MapSurface:
         """See `SurfaceFile.surface`."""
@@ -248,7 +248,7 @@ class MeasuredEmissivity(SurfaceFile):
 
     kind: ClassVar[str] = "measured"
     example: ClassVar[str] = "{kind: measured, file: emissivity.nc, region: chip body}"
-    file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
+    file: Annotated[FileBeside, Parameter("Output file of chipglow emissivity.")]
     region: Annotated[str, Parameter("Name of a region in it.")]
 
     def surface(self) -> TrendSurface:
@@ -300,7 +300,7 @@ def measured_text(file: str | os.PathLike[str]) -> str:
 def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
     """Return measured areas by the features of a study: body, shear_band, workpiece, tool.
 
-    Of several areas of a feature the one of the same name counts.
+    With several areas of a feature the one of the same name counts.
     """
     number = Counter(area.feature for area in areas.values())
     found = {

@@ -33,7 +33,7 @@ class RegionEmissivities:
     """Each area over the temperature; empty for one heating."""
     notes: Notes = field(default_factory=Notes)
     metal: str = ""
-    """What the object is made of, if it is known."""
+    """Material of the object, if known."""
 
     @property
     def origin(self) -> Origin:

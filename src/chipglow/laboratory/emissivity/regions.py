@@ -48,7 +48,7 @@ class RegionSection(Part):
         tuple[PointField, PointField] | None, Parameter("Two opposite corners.")
     ] = None
     circle: Annotated[CircleSection | None, Parameter("Centre and radius.")] = None
-    feature: Annotated[str, Parameter("What it is a part of; by default its own name.")] = ""
+    feature: Annotated[str, Parameter("The feature to which it belongs; by default its name.")] = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -52,7 +52,7 @@ _STEPS: Final = 200
 def reflected_temperature(
     temperature: float = LABORATORY, standard_uncertainty: float = 0.0
 ) -> Estimate:
-    """Return the temperature in K of what an object reflects, the paper's by default."""
+    """Return the temperature in K of the reflected surroundings, the paper's by default."""
     if not 0 < temperature < inf:
         raise ValueError(f"reflected: is {temperature!r} K, expected over 0 K")
     if not 0 <= standard_uncertainty < inf:
@@ -105,7 +105,7 @@ def true_temperature(
         (`EmissivityLine.constant`). A line of several temperatures is taken at the resulting
         temperature.
     surroundings : Estimate, optional
-        Temperature in K of what the area reflects (`reflected_temperature`). By default as in the
+        Temperature in K of the surroundings (`reflected_temperature`). By default as in the
         determination of the emissivity, with the same error, or the paper's 293 K.
     calibration : FittedCalibration, optional
         The camera's calibration with which both emissivity and area were measured: it states the
@@ -120,7 +120,7 @@ def true_temperature(
     uncertainty is propagated to first order (JCGM 100:2008, Equation 13). Emissivity and area have
     errors in common, which partly cancel: a camera that shows too little radiance makes the
     emissivity too small. Without `calibration` its errors are taken as uncorrelated.
-    With a line ε(T) the equation is solved for T, and all sensitivities are those of a constant
+    With a line ε(T) the equation is solved for T, and all sensitivities equal those of a constant
     emissivity over 1 + (dε/dT) (L − L_env) / (ε dL/dT).
     """
     check_same_pixels(measurements, "temperature")
@@ -365,7 +365,7 @@ def _emissivity_of_area(
 
 
 def _surroundings(emissivity: EmissivityLine) -> Estimate:
-    """Return the temperature in K of what is reflected, with the error that the emissivity has."""
+    """Return the reflected temperature in K, with the same error as in the emissivity."""
     if not emissivity.heatings:
         return reflected_temperature()
     heating = emissivity.heatings[0]

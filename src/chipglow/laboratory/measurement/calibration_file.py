@@ -63,7 +63,7 @@ class CalibrationDescription(Part):
     ]
     warnings: Annotated[
         tuple[str, ...],
-        Parameter("Why it may not be relied on, a sentence each; every measurement by it says so."),
+        Parameter("Warnings, as sentences; every measurement with this calibration repeats them."),
     ] = ()
     points: Annotated[
         tuple[PointRow, ...],

@@ -37,13 +37,13 @@ _MOST_SATURATED: Final = 0.05
 
 
 def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
-    """Read a measurement, or convert a camera's file to one.
+    """Read a measurement, or convert a camera file to one.
 
     Parameters
     ----------
     source : str or Path
-        A measurement's NetCDF file; a camera's file; or a YAML file (.yaml, .yml) that describes a
-        camera's file.
+        A NetCDF file of a measurement; a camera file; or a YAML file (.yaml, .yml) that describes a
+        camera file.
     settings : iterable of str
         Fields of the description, such as ``band=3.8-5.1 um``, which override a YAML file.
     """
@@ -119,7 +119,7 @@ def uniform_counts(
     """Return the mean counts of a recording of a blackbody, and by how many a part of it differs.
 
     Its pixels are corrected as those of a measurement with the same description. The difference
-    is that of the median of one of 4 x 4 blocks, 0 within four standard errors.
+    is computed for the median of one of 4 x 4 blocks, 0 within four standard errors.
     """
     description = load_description(source, settings)
     recording = load_recording(description)
@@ -218,7 +218,7 @@ def read_flat_fields(description: MeasurementDescription) -> FlatFields:
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:
     if camera_formats()[find_format(Path(file))].states_quantity:
-        # What the description says of the recording's file, this file says itself.
+        # This file states the settings that a description gives for a recording.
         return read_recording(file)
     return _read(description, file, every=True)
 

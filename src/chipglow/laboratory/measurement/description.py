@@ -83,16 +83,16 @@ class FlatFieldSection(Part):
 
 @dataclass(frozen=True)
 class MeasurementDescription(Part):
-    """A measurement of a camera's file: what it holds, how it lies, what is done with it."""
+    """A measurement from a camera file: contents, position, and conversion."""
 
     file: Annotated[
         FileBeside | None,
-        Parameter("The camera's file; of TIFF and tables also a pattern: frame_*.tif."),
+        Parameter("The camera file; for TIFF and tables also a pattern: frame_*.tif."),
     ] = None
     format: Annotated[
         str | None,
         Parameter(
-            "What the file is; none: known by its content.",
+            "Kind of the file; none: by its content.",
             allowed="none, flir, ptw, hcc, tiff, ...",
         ),
     ] = None
@@ -113,14 +113,14 @@ class MeasurementDescription(Part):
     quantity: Annotated[
         Literal["counts", "radiance", "temperature"] | None,
         Parameter(
-            "What the numbers are, for files that do not say it.",
+            "Quantity of the numbers, for files that do not state it.",
             allowed="none, counts, radiance, temperature",
         ),
     ] = None
     unit: Annotated[
         str | None,
         Parameter(
-            "Their unit, for files that do not say it.", allowed="none, counts, W/m2/sr, K, degC"
+            "Their unit, for files that do not state it.", allowed="none, counts, W/m2/sr, K, degC"
         ),
     ] = None
     interval: Annotated[
@@ -185,7 +185,7 @@ class MeasurementDescription(Part):
     object_parameters: Annotated[
         ObjectSection,
         Parameter(
-            "What the camera was set to for the object; none: as the file says. Of temperatures "
+            "The camera's settings for the object; none: from the file. Of temperatures "
             "it is taken back: chipglow takes radiance as the camera received it."
         ),
     ] = field(default_factory=ObjectSection)
@@ -222,24 +222,24 @@ class MeasurementDescription(Part):
         return replace(recording, **said)
 
     def listed_bad_pixels(self, shape: tuple[int, int]) -> NDArray[np.bool_] | None:
-        """Return the bad pixels of the table, if there is one, for an image of this shape."""
+        """Return the bad pixels of the table for an image of this shape; None without a table."""
         if self.bad_pixels in (None, "find"):
             return None
         return read_bad_pixels(Path(str(self.bad_pixels)), shape)
 
 
 def load_description(source: str | Path, settings: Iterable[str] = ()) -> MeasurementDescription:
-    """Read the description of a camera's file from YAML, or make one of the file itself."""
+    """Read the description of a camera file from YAML, or create one for the file itself."""
     return described_by(MeasurementDescription, Path(source), "file", settings)
 
 
 def measurement_text(description: MeasurementDescription) -> str:
-    """Return a description of a camera's file as YAML, every field with a comment."""
+    """Return a description of a camera file as YAML, every field with a comment."""
     return commented_yaml(_HEADER, description)
 
 
 _HEADER: Final = """\
-# A measurement of a camera's file. Make it with: chipglow convert FILE --out measurement.nc
+# A measurement from a camera file. Make it with: chipglow convert FILE --out measurement.nc
 # Quantities carry their unit, in any unit of their kind: 10 us, 6 um, 391 degC.
-# What is none is as the camera's file says.
+# Fields that are none are taken from the camera file.
 """

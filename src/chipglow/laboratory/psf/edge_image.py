@@ -45,9 +45,9 @@ class EdgeImage:
     wavelength: float | None
     """Middle of the camera's band in m."""
     name: str
-    """What it is called in messages."""
+    """Its name in messages."""
     unit: str = "W/(m² sr)"
-    """Of the radiance: counts where no calibration is needed."""
+    """Unit of the radiance: counts if no calibration is needed."""
     notes: Notes = field(default_factory=Notes)
 
     @property
@@ -71,7 +71,7 @@ def edge_image(
     measurement : Measurement
         One frame or several of the same edge.
     name : str
-        What it is called in messages.
+        Its name in messages.
     region : tuple of slice, optional
         Rows and columns that show the edge; all by default.
 
@@ -176,7 +176,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     image = replace(image, saturated=image.saturated | _piled_up(image))
     x, y = image.x - image.x.mean(), image.y - image.y.mean()
     try:
-        # Where an edge is can be seen on clipped pixels too.
+        # Clipped pixels show the position of an edge too.
         line, bend = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
         pixels = _pixels_of(image, x, y, line)
         quick = _quick_fit(pixels)

@@ -31,7 +31,7 @@ from chipglow.uncertainty import to_xarray
 def load_edge(
     source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
 ) -> EdgeImage:
-    """Read an image of an edge: a measurement, or a camera's file with or without a calibration.
+    """Read an image of an edge: a measurement, or a camera file with or without a calibration.
 
     Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
     calibration holds beyond its range, as the edge needs no temperature.
@@ -83,12 +83,12 @@ def write_psf(
     Parameters
     ----------
     knife : KnifeEdge
-        What was found.
+        The result of a fit.
     path : path-like
         The file to write, for ``psf: {kind: measured, file: ...}`` of a study's camera and for
         `MeasuredPSF.from_file`; one that is there is replaced at the end.
     psf : MeasuredPSF, optional
-        The kernel to write, with the components of its uncertainty; by default that of the best
+        The kernel to write, with the components of its uncertainty; by default of the best
         model, as `psf_kernel` makes it.
 
     Raises

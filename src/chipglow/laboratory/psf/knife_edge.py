@@ -75,11 +75,11 @@ _Kernel = Callable[..., Array]
 
 @dataclass(frozen=True, eq=False)
 class EdgeResult:
-    """What one image of an edge showed."""
+    """Results of one image of an edge."""
 
     image: EdgeImage
     pixels: EdgePixels
-    """Those of its pixels that were used; x and y from the image's middle."""
+    """Its pixels in use; x and y from the image's centre."""
     curves: xr.Dataset
     """Edge-spread, line-spread and modulation transfer function; see `edge_curves`."""
     noise: float
@@ -230,7 +230,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     notes += Notes([text for image in images for text in image.notes.assumed])
     first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
     if min(fit.reduced_chi_squared for fit in first) > _NOISE_ALONE:
-        # Where much is clipped there are several minima.
+        # Heavy clipping leads to several minima.
         first = [fit_model(model, edges, signals, None, _ROUGHLY, _TRIES) for model in models]
     found = min(first, key=lambda fit: fit.bic)
     edges = [with_noise(edge, found.predicted(k, edge)) for k, edge in enumerate(edges)]

@@ -55,7 +55,7 @@ class EdgePixels:
 
 @dataclass(frozen=True, eq=False)
 class ApertureSignals:
-    """What the camera reads in the middle of bright round apertures before one source."""
+    """Readings of the camera at the centre of bright round apertures before one source."""
 
     diameters: Array
     """In m, shape (n,)."""
@@ -77,7 +77,7 @@ class ApertureSignals:
 
     @cached_property
     def weights(self) -> Array:
-        """What makes signals of a transfer function, shape (aperture, frequency)."""
+        """Return the matrix from a transfer function to signals, shape (aperture, frequency)."""
         pairs = zip(self.diameters, self.radii, strict=True)
         return np.array(
             [disc_response(self.frequency, d, radii, self.footprint) for d, radii in pairs]
@@ -86,7 +86,7 @@ class ApertureSignals:
 
 @dataclass(frozen=True)
 class FittedEdge:
-    """What a fit found of one edge."""
+    """Results of a fit for one edge."""
 
     line: EdgeLine
     normal_uncertainty: float
@@ -266,7 +266,7 @@ class _Problem:
         scaled = jacobian * self.scales
         inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True)
         inverse = inverse * np.outer(self.scales, self.scales)
-        # What is left beyond the noise acts as more of it (Birge).
+        # Residuals beyond the noise count as more noise (Birge).
         noise = float(residual @ residual) / max(residual.size - vector.size, 1)
         covariance = inverse * max(reduced, 1.0) * noise
         values, places, source = self._split(vector)

@@ -21,7 +21,7 @@ _SAMPLES_PER_FOOTPRINT: Final = 8
 _PERIODS: Final = 64
 """Length of the table of an edge, in its largest distance.
 
-What wraps around of the tails of diffraction is then 3e-6 of the step. With 16 it would be 4e-5,
+The tails of diffraction that wrap around are then 3e-6 of the step. With 16 it would be 4e-5,
 which moves the width by a third of its standard uncertainty where noise is 1/2000 of the step.
 """
 _TAIL_ENERGY: Final = 0.9999
@@ -43,14 +43,14 @@ class PSFModel(ABC):
 
     name: str
     parameters: tuple[str, ...]
-    """Names of its parameters; `is_length` tells which are in m, others are pure numbers."""
+    """Names of its parameters; `is_length` marks those in m, others are pure numbers."""
 
     shapes: tuple[tuple[float, ...], ...] = ()
     """Parameters from which fits start; lengths over the full width at half maximum."""
     lowest: tuple[float, ...] = ()
     """Smallest parameters; lengths over the pitch."""
     highest: tuple[float, ...] = ()
-    """Largest parameters; lengths have limits of their own."""
+    """Largest parameters; lengths have separate limits."""
 
     def starts(self, fwhm: float) -> list[list[float]]:
         """Return parameters from which fits start, for about this width in m."""
@@ -133,7 +133,7 @@ class GaussianModel(PSFModel):
 class GaussianTailModel(PSFModel):
     """A round Gaussian and, for a fraction of the light, a tail exp(−r / length) / (2π length²).
 
-    The tail is that of stray light and of the size-of-source effect. Its transfer function is
+    The tail describes stray light and the size-of-source effect. Its transfer function is
     (1 + (2π length f)²)^(−3/2). Its parameter ``tail_ratio`` is the length over the core's width;
     it is 0.72 or more, with which the tail is as wide as the core: it can't be a sharp tip.
     """
@@ -162,7 +162,7 @@ class GaussianTailModel(PSFModel):
     def sampling(self, values: Array) -> tuple[float, float]:
         core, fraction, length = float(values[0]), float(values[1]), float(values[2] * values[0])
         reach = 2.0 * core
-        # Of the tail, (1 + r / length) exp(−r / length) is beyond r.
+        # The fraction (1 + r / length) exp(−r / length) of the tail is beyond r.
         while fraction * (1 + reach / length) * exp(-reach / length) > 1 - _TAIL_ENERGY:
             reach += 0.5 * length
         return reach, core / 8
@@ -380,7 +380,7 @@ def edge_response(
     line, edge = fft.irfft(np.stack([response, integral]), count) / step
     half = min(ceil(reach / step) + 2, count // 2 - 1)
     index = np.arange(-half, half + 1)
-    # The series is that of an edge less a ramp over the whole period.
+    # The series of an edge minus a ramp over the whole period.
     whole = 0.5 + edge[index] + index / count
     return EdgeResponse(CubicHermiteSpline(step * index, whole, line[index]), line[index])
 

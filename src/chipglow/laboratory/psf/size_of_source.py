@@ -27,7 +27,7 @@ class ApertureImage:
     y: Array
     """Positions of columns and rows in m."""
     name: str
-    """What it is called in messages."""
+    """Its name in messages."""
 
     def __post_init__(self) -> None:
         if not 0 < self.diameter < np.inf:
@@ -45,7 +45,7 @@ def aperture_image(measurement: Measurement, diameter: float, name: str) -> Aper
 def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
     """Read the middle pixels of apertures.
 
-    The middle is the centroid of what is brighter than half; the signal is the mean of the pixels
+    The centre is the centroid of pixels brighter than half; the signal is the mean of the pixels
     within a pitch of it, whose distances from the middle are kept.
     """
     if len({image.diameter for image in images}) < _LEAST_APERTURES:

@@ -25,13 +25,13 @@ _CONTRADICTED: Final = 2
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Where the dots of an image are."""
+    """Positions of the dots of an image."""
 
     pixels: Array
     """Columns and rows, shape (n, 2)."""
     shape: tuple[int, ...]
     margin: float
-    """How far from the image's border, in pixels, a dot is surely found."""
+    """Distance from the image's border, in pixels, at which a dot is surely found."""
 
     def shows(self, pixels: Array) -> int:
         """Return how many of these places are within the image's margin."""

@@ -51,9 +51,9 @@ class Dots:
     uncertainty: Array
     """Standard uncertainty of a column or a row in pixels, shape (n,)."""
     radius: float
-    """Of most of them, in pixels."""
+    """Diameter of most of them, in pixels."""
     bright: bool
-    """Whether they are brighter than what is around them."""
+    """Whether they are brighter than their surroundings."""
 
 
 @dataclass(frozen=True)
@@ -125,11 +125,11 @@ def fit_dots(
 
 
 def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
-    """Find the dots of a target, brighter or darker than what is around them.
+    """Find the dots of a target, brighter or darker than their surroundings.
 
     Extrema of the normalised Laplacian of Gaussians over place and size (Lindeberg, Int. J. Comput.
     Vision 30 (1998) 79) that are round: of these the group of like size, contrast and sign that
-    stands out most. The middle is that of a disc with a soft edge, in light that falls off
+    stands out most. The centre is fitted by a disc with a soft edge, in light that falls off
     to one side, by least squares, after the others are taken away; its uncertainty follows from
     the residuals and their correlation.
     """

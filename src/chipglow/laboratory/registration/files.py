@@ -38,7 +38,7 @@ _HEAD: Final = """\
 
 
 class _Fields(TypedDict):
-    """What the file states; no degrees of freedom are infinitely many."""
+    """Contents of the file; omitted degrees of freedom are infinite."""
 
     model: Model
     method: Method

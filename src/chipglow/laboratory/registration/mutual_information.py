@@ -1,4 +1,4 @@
-"""Registration of an infrared image and a visible picture by what they have in common."""
+"""Registration of an infrared image and a visible picture by their mutual information."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -54,7 +54,7 @@ class Registration:
     model: Model
     method: Method
     degrees_of_freedom: float = np.inf
-    """Of the covariance: Student's t with so many gives the intervals; infinite for mutual
+    """Degrees of freedom of the covariance: Student's t gives the intervals; infinite for mutual
     information.
     """
     notes: Notes = field(default_factory=Notes)
@@ -373,12 +373,12 @@ def _depth(matrix: Array, places: Array) -> Array:
 
 
 def mapped_places(matrix: Array, places: Array) -> Array:
-    """Return what a matrix makes of places, shape (..., 2)."""
+    """Return places mapped by a matrix, shape (..., 2)."""
     return (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
 
 
 def element_slopes(matrix: Array, places: Array) -> Array:
-    """Return the derivative of what a matrix maps places to by its elements, shape (..., 2, 9)."""
+    """Return the derivative of mapped places by the matrix elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]
     mapped = mapped_places(matrix, places)

@@ -36,10 +36,10 @@ class TimeAlignment:
     uncertainty: float
     """Standard uncertainty of the offset in s."""
     correlation: float
-    """Of both signals as they lie on each other."""
+    """Correlation of both signals after alignment."""
     degrees_of_freedom: float
     warnings: tuple[str, ...] = ()
-    """Why it cannot be trusted, a sentence each."""
+    """Warnings, as sentences."""
 
 
 def align_times(
@@ -66,8 +66,8 @@ def align_times(
     54 (2010) 1167), is put to the infrared times; the correlation of both is largest at the offset
     that is least squares for infrared = a + b visible(time). All offsets are tried, a third
     of a visible frame apart, at which at least half of the infrared frames have visible ones;
-    Gauss-Newton ends it. What the spline cannot follow, faster than the visible camera's frames,
-    goes into the residuals and with them into the uncertainty.
+    Gauss-Newton ends it. Changes faster than the visible camera's frames, which the spline cannot
+    follow, go into the residuals and with them into the uncertainty.
     """
     for name, times, values in (
         ("infrared", infrared_times, infrared_signal),
@@ -246,7 +246,7 @@ class RecordingAlignment:
     infrared_times: Array
     """When each infrared integration began in s, shape (n,)."""
     visible_frames: list[NDArray[np.int64]]
-    """Numbers of the visible frames that were exposed within each, from 0."""
+    """Indices of the visible frames that were exposed within each, from 0."""
     notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
