@@ -1,8 +1,11 @@
 """Style of figures: sizes, colours, images on micrometre axes."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -20,6 +23,11 @@ from chipglow.scene import Material, Raster, Scene, Tool
 
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
+
+_NARROW: Final = 4.2
+"""Width of a figure of stacked panels in inches: a telephone's screen."""
+
+_STACKED: Final = ContextVar("stacked", default=False)
 
 _LARGEST_IN_MICRONS: Final = 5e-3
 
@@ -47,9 +55,39 @@ def style() -> Any:
     return matplotlib.rc_context(_STYLE)
 
 
+@contextmanager
+def stacked() -> Iterator[None]:
+    """Stack the panels of the figures that are drawn within in one column."""
+    token = _STACKED.set(True)
+    try:
+        yield
+    finally:
+        _STACKED.reset(token)
+
+
+class _PanelFigure(Figure):
+    """A figure of the page, whose panels may be stacked."""
+
+    columns = 1
+
+    def subplots(self, nrows: int = 1, ncols: int = 1, **options: Any) -> Any:
+        self.columns = ncols
+        if ncols == 1 or not _STACKED.get():
+            return super().subplots(nrows, ncols, **options)
+        squeeze = options.pop("squeeze", True)
+        self.set_size_inches(_NARROW, self.get_figheight() * ncols)
+        panels = super().subplots(nrows * ncols, 1, squeeze=False, **options)
+        return panels.reshape(nrows, ncols).squeeze() if squeeze else panels.reshape(nrows, ncols)
+
+    def legend(self, *arguments: Any, **options: Any) -> Any:
+        if _STACKED.get():
+            options |= {"loc": "outside lower center", "ncols": 1}
+        return super().legend(*arguments, **options)
+
+
 def new_figure(height: float) -> Figure:
     """Return an empty figure of the page's width and a height in inches."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = _PanelFigure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -57,7 +95,7 @@ def new_figure(height: float) -> Figure:
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
     """Return an empty figure of the page's width for rows of images of a width in inches."""
     panel = panel_width * raster.rows / raster.columns
-    figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
+    figure = _PanelFigure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
     FigureCanvasAgg(figure)
     return figure
 
@@ -72,6 +110,13 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     figure.savefig(png, dpi=150)
     figure.savefig(svg, dpi=150, metadata={"Date": None})
     return png, svg
+
+
+def narrow_png(figure: Figure) -> bytes:
+    """Return the PNG of a figure of stacked panels at 100 dots per inch."""
+    file = BytesIO()
+    figure.savefig(file, dpi=100)
+    return file.getvalue()
 
 
 def data_url(png: bytes) -> str:

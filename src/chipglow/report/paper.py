@@ -78,8 +78,8 @@ def comparison(
 def position(draws: Distribution, paper: float, unit: str) -> str:
     """Return where a published value lies relative to the interval of a single frame."""
     if not isfinite(draws.interval[0]):
-        cause = " and one ".join(draws.missing) or "draw"
-        return f"Only one {cause} was drawn, which does not show whether the paper's value differs."
+        few = f"Only one {' and one '.join(draws.missing)} was" if draws.missing else "Too few were"
+        return f"{few} drawn to show whether the paper's value differs."
     low, high = (f"{end:.0f}".replace("-", "−") for end in draws.interval)
     within = "outside" if draws.differs_from(paper) else "within"
     return (

@@ -25,7 +25,7 @@ from chipglow.text import json_schema
 
 
 class FigureFile(NamedTuple):
-    """A figure as written: file name without ending, heading, figure of the paper, texts, PNG."""
+    """A figure as written: file name without ending, heading, figure of the paper, texts, PNGs."""
 
     name: str
     title: str
@@ -33,6 +33,7 @@ class FigureFile(NamedTuple):
     caption: str
     alt: str
     png: Path
+    narrow: str  # address of the picture with its panels stacked; empty for one column
 
 
 class Failure(NamedTuple):
@@ -177,5 +178,11 @@ def _figure(
         number, more = paper.FIGURES.get(name, ("", "")) if facts.is_compared else ("", "")
         file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
         png, _ = drawing.save(figure, folder, file)
+        narrow = ""
+        if getattr(figure, "columns", 1) > 1:
+            with drawing.stacked():
+                same = draw(facts)
+            assert same is not None
+            narrow = drawing.data_url(drawing.narrow_png(same))
     caption, alt = (facts.text(texts()["figures"][name][key]) for key in ("caption", "alt"))
-    return FigureFile(file, title, number, f"{caption} {more}".strip(), alt, png)
+    return FigureFile(file, title, number, f"{caption} {more}".strip(), alt, png, narrow)
