@@ -22,6 +22,7 @@ from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
+from chipglow.report.summary import summary
 from chipglow.scene import SceneError
 from chipglow.study import Study
 
@@ -313,6 +314,8 @@ def test_a_contact_that_reaches_the_border_is_a_least_length(result, monkeypatch
     assert row.cells["mean"] == f"more than {row.here:.0f} µm"
     assert row.cells["interval"] == "–"
     assert "continues beyond" in row.explanation
+    rows = {"errors": [], "cut": [row], "chip": [], "camera": []}
+    assert summary(rows, [], result, {}).lower_bounds == ["contact_length_um"]
 
 
 def test_the_summary_keeps_its_schema(folder):

@@ -91,6 +91,9 @@ class Summary(_Numbered):
     ]
     camera: Annotated[_Numbers, Field(description="Numbers of the detector, if present.")] = {}
     results: Annotated[_Numbers, Field(description="Means of the draws, and single numbers.")]
+    lower_bounds: Annotated[
+        list[str], Field(description="Results that continue beyond the border of the view.")
+    ] = []
     references: Annotated[
         _Numbers, Field(description="Mean reading of a camera without error, of each error.")
     ] = {}
@@ -136,6 +139,7 @@ def summary(
     return Summary(
         camera={row.key: row.here for row in rows["camera"]},
         results={row.key: row.here for row in results},
+        lower_bounds=[row.key for row in results if row.is_least],
         references={row.key: row.reference.mean for row in results if row.reference},
         draws={key: Scatter.of(draws) for key, draws in drawn.items()},
         causes={key: _causes(draws) for key, draws in drawn.items() if draws.draws > 1},
