@@ -45,7 +45,7 @@ cutting:
     spacing: {RASTER.spacing} m
     rows: {RASTER.rows}
     columns: {RASTER.columns}
-analysis: {{exposures: 3, psf_widths: [8 um, 12 um]}}
+analysis: {{exposures: 3, phases: 3, psf_widths: [8 um, 12 um]}}
 """
 
 
