@@ -308,6 +308,7 @@ def test_downloads_hold_what_is_shown(visit, tmp_path, model):
     page.wait_for_url("**open=*")
     page.get_by_text(saved.name, exact=True).wait_for()
     page.locator("#status", has_text=EXACT).wait_for()
+    number(page, "measured").wait_for()
     assert page.get_by_label("Pixel pitch").count() == 0
 
 
