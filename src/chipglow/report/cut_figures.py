@@ -1,6 +1,5 @@
 """Figures of a cut: heated chips and tool, rake face, dual spectrum, shear band, forces, chip."""
 
-from dataclasses import replace
 from typing import Any, Final
 
 import matplotlib
@@ -10,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import Analysis, Cut, HeatedObject, band_chart
+from chipglow.analysis import Analysis, Cut, HeatedObject
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
@@ -169,13 +168,9 @@ def bands(facts: Facts) -> Figure | None:
     if not facts.is_compared or not facts.bands:
         return None
     found = facts.papers_band
-    sweep = float(np.mean([band.sweep for band in facts.bands]))
-    widths, rises = np.geomspace(4e-6, 90e-6, 12), np.linspace(50.0, 500.0, 10)
     figure = drawing.new_figure(3.7)
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    for letter, axes, moved in zip("ab", panels, (sweep, found.sweep), strict=True):
-        band = replace(found, sweep=moved)
-        chart = band_chart(facts.analysis.camera, facts.band_emissivity, band, widths, rises)
+    for letter, axes, (moved, chart) in zip("ab", panels, facts.band_charts, strict=True):
         _draw_chart(axes, chart)
         axes.set_title(f"{letter}) travel of {1e6 * moved:.0f} µm in an exposure")
         axes.set_xlabel("width of the temperature profile / µm")

@@ -1,17 +1,20 @@
 """The values of an analysis that texts, expressions and figures of its report read."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property, partial
 from math import nan
 from typing import Any, Final
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import (
     Analysis,
     Headline,
     StraightBand,
+    band_chart,
     band_with,
     headlines,
     image_error,
@@ -116,6 +119,18 @@ class Facts:
         numbers[-1] /= 100.0
         beside = float(np.mean([band.beside for band in self.bands]))
         return band_with(self.analysis.camera, self.band_emissivity, beside, numbers)
+
+    @cached_property
+    def band_charts(self) -> tuple[tuple[float, xr.Dataset], ...]:
+        """Travel in m and chart of straight bands that move as ours do, and as the paper's."""
+        found, camera = self.papers_band, self.analysis.camera
+        widths, rises = np.geomspace(4e-6, 90e-6, 12), np.linspace(50.0, 500.0, 10)
+        ours = float(np.mean([band.sweep for band in self.bands]))
+        bands = [replace(found, sweep=sweep) for sweep in (ours, found.sweep)]
+        emissivity = self.band_emissivity
+        return tuple(
+            (band.sweep, band_chart(camera, emissivity, band, widths, rises)) for band in bands
+        )
 
     @cached_property
     def straight_readings(self) -> Array:
