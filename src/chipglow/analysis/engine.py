@@ -25,7 +25,7 @@ from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, R
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
-from chipglow.camera.exposure import sparse_frames
+from chipglow.camera.exposure import sparse_frames, surroundings_radiance
 from chipglow.laboratory.chip import (
     NoContactError,
     NoShearBandError,
@@ -420,7 +420,7 @@ def _corrected(camera: Camera, variables: Variables) -> Variables:
     number = [surfaces.index(name) for name in variables["seen_surface"][1]]
     set_to = assumed[number][:, None, None, None]
     band = camera.band
-    reflected = 0.0 if camera.reflected is None else band.radiance(camera.reflected)
+    reflected = surroundings_radiance(band, camera.reflected)
     measured = variables["measured"][1][..., 0]
     light = (band.radiance(np.nan_to_num(measured)) - (1 - set_to) * reflected) / set_to
     shown = np.where(

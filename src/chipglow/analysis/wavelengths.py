@@ -17,6 +17,7 @@ from chipglow.analysis.cut import Progress, find_cut, spread_starts
 from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
 from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera, Exposure, RatioCamera, expose, frame_weights
+from chipglow.camera.exposure import surroundings_radiance
 from chipglow.camera.ratio_camera import views_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
@@ -384,8 +385,7 @@ def _compared(
             thermometer.uncertainty(own),
         )
     else:
-        band, reflected = first.band, first.reflected
-        environment = 0.0 if reflected is None else float(band.radiance(reflected))
+        band, environment = first.band, surroundings_radiance(first.band, first.reflected)
         emissivity = (local[bands[0]][0] - environment) / (band.radiance(truth) - environment)
         at_centre, slope = at_centres(emissivity), band.slope(own)
         on_samples = partial(_by_emissivity, band, environment, emissivity)

@@ -44,6 +44,11 @@ class Exposure:
     """Why the surface may have another emissivity: `Origin.doubts`."""
 
 
+def surroundings_radiance(band: Band, reflected: float | None) -> float:
+    """Return the in-band radiance of surroundings at a temperature in K; 0 without them."""
+    return 0.0 if reflected is None else float(band.radiance(reflected))
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """A surface, laid on a scene, in a band, with the temperature in K of surroundings."""
@@ -55,7 +60,7 @@ class View:
     @property
     def environment(self) -> float:
         """Radiance of the surroundings in W/(m² sr)."""
-        return 0.0 if self.reflected is None else float(self.band.radiance(self.reflected))
+        return surroundings_radiance(self.band, self.reflected)
 
 
 def expose(
