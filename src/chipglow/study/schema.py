@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Annotated, Any, Self
 
-from chipglow.analysis import Plan, WavelengthPlan
+from chipglow.analysis import AttributionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
 from chipglow.quantities import FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
@@ -60,6 +60,11 @@ class Study(Part):
         field(default_factory=Plan)
     )
 
+    attribution: Annotated[
+        AttributionPlan | None,
+        Parameter("Effects among which the error of each pixel is divided; none: it is not."),
+    ] = field(default_factory=AttributionPlan)
+
     wavelengths: Annotated[
         WavelengthPlan,
         Parameter("Bands that chipglow wavelengths compares, alone and as ratios."),
@@ -72,9 +77,10 @@ class Study(Part):
     @property
     def plan(self) -> Plan:
         """The plan of the analysis, with PSF widths around the camera's."""
-        plan, psf = self.analysis, self.camera.build().psf
+        plan = replace(self.analysis, attribution=self.attribution)
+        psf = self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
-        if "psf_widths" not in plan.given and ratio != 1.0:
+        if "psf_widths" not in self.analysis.given and ratio != 1.0:
             widths = [float(f"{ratio * width:.3g}") for width in plan.psf_widths]
             plan = replace(plan, psf_widths=tuple(widths))
         if isinstance(self.surface, FeaturesSection):
