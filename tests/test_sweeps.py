@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from chipglow.analysis import headlines
 from chipglow.cli import app
 from chipglow.io import write_scene
-from chipglow.quantities import changed
+from chipglow.quantities import changed, setting_at
+from chipglow.report.sweep_figure import draw_sweep
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, Sweep, errors, study_text, sweep
 from chipglow.study.sweeps import _key, axis
@@ -197,6 +198,30 @@ def test_a_killed_worker_costs_its_task_alone(tmp_path):
     assert min(times) == 1
     # A worker's finished tasks may be repeated only while the client has not released them.
     assert sum(times) <= 40 + 2
+
+
+def test_the_figure_draws_each_point_over_each_setting(study, tmp_path):
+    vary = {
+        "camera.psf.fwhm": ("6 um", "12 um"),
+        "camera.pitch": ("3 um", "9 um"),
+        "camera.integration_time": ("2 us", "3 us", "4 us"),
+    }
+    data = sweep(study, vary, tmp_path / "out", at=("hot",), workers=0).to_xarray()
+    quantities = {path: setting_at(study, path).parameter.quantity for path in vary}
+    figure = draw_sweep(data, quantities)
+    assert [panel.get_xlabel() for panel in figure.axes] == [
+        "fwhm / µm", "pitch / µm", "integration time / µs",
+    ]  # fmt: skip
+    for panel, path in zip(figure.axes, vary, strict=True):
+        drawn = set(zip(*(values.tolist() for values in panel.lines[0].get_data()), strict=True))
+        expected = {
+            (round(1e6 * float(one[path]), 6), float(one.error))
+            for one in (
+                data.isel(dict(zip((*vary, "reading"), (*index, 0), strict=True)))
+                for index in np.ndindex(2, 2, 3)
+            )
+        }
+        assert drawn == expected
 
 
 def test_the_command_writes_table_arrays_and_figure(study, tmp_path):

@@ -113,6 +113,7 @@ from .study import (
     cut as cut,
     load_study as load_study,
     run as run,
+    sweep as sweep,
     wavelengths as wavelengths,
 )
 from .surface import (

@@ -47,14 +47,17 @@ def draw_sweep(data: xr.Dataset, quantities: _Quantities) -> Figure:
 
 
 def _draw_curve(panel: Axes, one: xr.Dataset, setting: str, quantities: _Quantities) -> None:
-    at = one.error.broadcast_like(one[setting])
-    positions, label = _axis(one[setting].broadcast_like(at).values.ravel(), setting, quantities)
-    is_line = one.error.ndim == 1 and "point" not in one.error.dims
-    bars: Any = {"marker": "o", "markersize": 4, "capsize": 2, "color": scales.BLUE}
-    spread = one.uncertainty.values.ravel() if is_line else None
-    panel.errorbar(
-        positions, one.error.values.ravel(), spread, linestyle="-" if is_line else "none", **bars
-    )
+    """Draw every point over one setting and, in a grid, the mean over the other settings."""
+    error, at = xr.broadcast(one.error, one[setting])
+    at = at.transpose(*error.dims)
+    positions, label = _axis(at.values.ravel(), setting, quantities)
+    marks: Any = {"marker": "o", "markersize": 4, "linestyle": "none", "color": scales.BLUE}
+    is_curve = error.ndim == 1 and "point" not in error.dims
+    spread = one.uncertainty.values if is_curve else None
+    panel.errorbar(positions, error.values.ravel(), spread, capsize=2, **marks)
+    if setting in error.dims:
+        mean = error.mean([dim for dim in error.dims if dim != setting])
+        panel.plot(_axis(one[setting].values, setting, quantities)[0], mean, color=scales.BLUE)
     panel.axhline(0.0, color=scales.GREY, linewidth=0.6)
     panel.set(xlabel=label, ylabel="error / K")
 

@@ -37,7 +37,11 @@ def local_client(client: Client | None, workers: int | None, most: int) -> Itera
     with (
         dask.config.set(options),
         distributed.LocalCluster(
-            count, threads_per_worker=1, env=_THREADS, dashboard_address=None, silence_logs="ERROR"
+            n_workers=count,
+            threads_per_worker=1,
+            env=_THREADS,
+            dashboard_address=None,
+            silence_logs="ERROR",
         ) as cluster,
         distributed.Client(cluster) as own,
     ):
