@@ -40,7 +40,7 @@ def local_client(client: Client | None, workers: int | None, most: int) -> Itera
             n_workers=count,
             threads_per_worker=1,
             env=_THREADS,
-            dashboard_address=None,
+            dashboard_address=":0",  # any free port
             silence_logs="ERROR",
         ) as cluster,
         distributed.Client(cluster) as own,
