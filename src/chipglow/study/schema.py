@@ -7,10 +7,10 @@ from typing import Annotated, Any, Self
 
 from chipglow.analysis import AttributionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
-from chipglow.quantities import FileBeside, Parameter, Part, changed
+from chipglow.quantities import FileBeside, Parameter, Part, changed, value_at
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
-from chipglow.study.scaling import scaled
+from chipglow.study.scaling import DERIVED, VIEWS, scaled, without
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 from chipglow.text import commented_yaml
 
@@ -128,6 +128,19 @@ class Study(Part):
         if isinstance(surface, Mapping) or (surface is None and "surface" in data):
             data = {**data, "surface": {"kind": "features", **(surface or {})}}
         return scaled(data, from_file)
+
+    def stated(self) -> dict[str, Any]:
+        """Return the given settings without those that follow from others."""
+        cutting = self.cutting.stated()
+        data = super().stated() | {"camera": self.camera.stated(), "cutting": cutting}
+        data["cutting"] |= {name: cutting[name].stated() for name in VIEWS if name in cutting}
+        try:
+            plain = type(self)(**without(data, DERIVED))
+        except ValueError:  # what is left is impossible
+            return data
+        return without(
+            data, [path for path in DERIVED if value_at(plain, path) == value_at(self, path)]
+        )
 
     def __post_init__(self) -> None:
         super().__post_init__()
