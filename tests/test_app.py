@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import chipglow
-from chipglow.analysis import LinePlace, error_images, error_parts
+from chipglow.analysis import LinePlace, attribute, error_images, error_parts
 from chipglow.app.controls import OWN, TABLE
 from chipglow.app.files import chip_picture, measurement_file, study_file
 from chipglow.app.opening import open_any, open_uploaded, scene_model
@@ -185,12 +185,41 @@ def test_a_limit_above_all_temperatures_says_so_and_leaves_the_scene_visible(ope
     assert kind == "error"
 
 
+def test_the_contributions_at_the_cursor_sum_to_the_error_of_the_true_temperature(opened, model):
+    state = model.controls.changed(model.controls.initial, {"cursor": "-40,200"})
+    picture = model.picture(state)
+    found = model.contributions(picture, lambda: None)
+    camera, _, surface = seen_by_the_library(state.study, state.study.start)
+    data = attribute(model.scene, camera, surface, state.study.start)
+    one = data.sel(x=-40e-6, y=200e-6, method="nearest")
+    assert found == dict(zip(data.effect.values, one.contribution.values, strict=True))
+    error = float(one.measured - one.reference)
+    assert sum(found.values()) == pytest.approx(error, abs=1e-9)
+    view, sent = PageView(opened), []
+    view.page._send_msg = sent.append
+    view._show_numbers(picture, model.numbers(picture), found)
+    assert "Contribution of each effect" in sent[-1]["content"]
+    largest = max(found, key=lambda name: abs(found[name]))
+    assert f"{abs(found[largest]):.1f}" in sent[-1]["content"]
+
+
+def test_a_newer_state_ends_the_contributions(model):
+    state = model.controls.changed(model.controls.initial, {"camera.pitch": "7 um"})
+    picture = model.picture(state)
+
+    def check():
+        raise SupersededError
+
+    with pytest.raises(SupersededError):
+        model.contributions(picture, check)
+
+
 def test_the_uncertainty_is_shown_or_its_absence_explained(opened, model):
     view, sent = PageView(opened), []
     view.page._send_msg = sent.append
     for texts, said in (({}, "No ± without noise"), ({"camera.detector": "noise"}, " ± 0.0")):
         picture = model.picture(model.controls.changed(model.controls.initial, texts))
-        view._show_numbers(picture, model.numbers(picture))
+        view._show_numbers(picture, model.numbers(picture), {})
         assert said in sent[-1]["content"]
 
 
@@ -363,7 +392,8 @@ class Heard:
     def __call__(self, kind, *content):
         kept = {"picture": self.pictures, "numbers": self.numbers, "failed": self.failures}
         kept[kind].append(content[-1])
-        if kind != "picture":
+        # The numbers come again with the contributions of the effects.
+        if kind == "failed" or (kind == "numbers" and content[-1]):
             self.settled.set()
 
     def settle(self):

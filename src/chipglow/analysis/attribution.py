@@ -16,6 +16,7 @@ from chipglow.analysis.places import Place
 from chipglow.camera import UNUSABLE, Camera, Exposure
 from chipglow.camera.exposure import View, expose
 from chipglow.camera.optics.sampling import integrate, largest
+from chipglow.camera.sweep import Check
 from chipglow.quantities import Parameter, Part
 from chipglow.scene import Raster, Scene, sample
 from chipglow.surface import ModifiedSurface, Surface, UniformSurface
@@ -92,6 +93,7 @@ def attribute(
     reference: AttributionReference = "true",
     permutations: int = 64,
     seed: int = 0,
+    check: Check | None = None,
 ) -> xr.Dataset:
     """Divide the error of each pixel of one exposure among the effects that cause it.
 
@@ -115,6 +117,8 @@ def attribute(
         Orders of the effects that are sampled if there are more than `MAX_EXACT`.
     seed : int
         Seed of the sampled orders.
+    check : callable, optional
+        Called periodically. An exception raised here ends the computation.
 
     Returns
     -------
@@ -146,7 +150,7 @@ def attribute(
     if start is None:
         times = scene.times
         start = float(times[0] + times[-1] + scene.frame_spacing - camera.integration_time) / 2
-    model = _Model(camera, _sources(scene, camera, surface, start), plan)
+    model = _Model(camera, _sources(scene, camera, surface, start, check), plan, check)
     variables = _divided(model, plan.permutations, seed)
     half = replace(camera, integration_time=camera.integration_time / 2)
     shorter = half.expose(scene, surface, start + half.integration_time / 2)
@@ -255,7 +259,9 @@ class _Sources:
         return seen if "reflection" in on else unreflecting
 
 
-def _sources(scene: Scene, camera: Camera, surface: Surface, start: float) -> _Sources:
+def _sources(
+    scene: Scene, camera: Camera, surface: Surface, start: float, check: Check | None
+) -> _Sources:
     band, plain = camera.band, _unreflecting(surface)
     views = [
         View(camera.lay(surface, scene), band, camera.reflected),
@@ -263,7 +269,7 @@ def _sources(scene: Scene, camera: Camera, surface: Surface, start: float) -> _S
         View(UniformSurface(1.0).on(scene, band), band),
     ]
     delays = camera.row_delays(scene.raster)
-    exposures = expose(scene, views, start, camera.integration_time, delays)
+    exposures = expose(scene, views, start, camera.integration_time, delays, check)
     return _Sources(exposures, plain is not surface or camera.reflected is not None)
 
 
@@ -281,7 +287,14 @@ class _Model:
     A coalition contains names of `EFFECTS`, and kinds of terms that the plan names.
     """
 
-    def __init__(self, camera: Camera, sources: _Sources, plan: AttributionPlan) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        sources: _Sources,
+        plan: AttributionPlan,
+        check: Check | None = None,
+    ) -> None:
+        self.check = check
         seen = sources.exposures[0]
         self.camera, self.sources, self.start = camera, sources, seen.start
         self.reference = reference_temperature(camera, seen, plan.reference)
@@ -353,6 +366,8 @@ class _Model:
 
     def _formed(self, on: _Coalition) -> Array:
         """Return the radiance of the pixels before the detector in W/(m² sr)."""
+        if self.check:
+            self.check()
         exposure, camera = self.sources.of(on), self._switched(on)
         hottest = exposure.peak_radiance.astype(np.float64)
         radiance = exposure.mean_radiance if "exposure" in on else hottest

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace
+from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace, attribute
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.looks import Schedule, View, look
 from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, Controls, State
@@ -174,6 +174,20 @@ class SceneModel:
         numbers["sample emissivity"] = sample_of("emissivity")
         return numbers
 
+    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
+        """Return the contribution of each effect to the error at the cursor in K."""
+        assert picture.camera and picture.exposure
+        state, camera, start = picture.state, picture.camera, picture.exposure.start
+        scene, surface = self._on(state, quick=False)
+        data = self._kept(
+            2,
+            "contributions",
+            (self._exposure_key(state), camera),
+            lambda: attribute(scene, camera, surface, start, check=check),
+        )
+        values = (nearest(one, picture.raster, state.cursor) for one in data.contribution.values)
+        return dict(zip(data.effect.values.tolist(), map(float, values), strict=True))
+
     def drawn(
         self, state: State, phases: int, textures: int, progress: Callable[[float], None]
     ) -> Drawn:
@@ -336,6 +350,10 @@ class MeasurementModel:
         panels, lines = {"measured": _measured_panel(data, raster)}, _lines(state, raster, data)
         crossings = _crossings(state, measurement.tool)
         return Picture(state, raster, data, panels, lines, crossings)
+
+    def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
+        """Return nothing: the true temperature of a measurement is not known."""
+        return {}
 
     def numbers(self, picture: Picture) -> dict[str, float]:
         """Return the numbers at the cursor in K, with the calibration's uncertainty if known."""

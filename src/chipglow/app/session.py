@@ -158,7 +158,10 @@ class Session:
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
             work.pause(PAUSE if model.has_quick_look else 0.0)
-        self._notify("numbers", picture, model.numbers(picture))
+        numbers = model.numbers(picture)
+        self._notify("numbers", picture, numbers, {})
+        if contributions := model.contributions(picture, work.check):
+            self._notify("numbers", picture, numbers, contributions)
 
     def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""

@@ -4,7 +4,7 @@ import logging
 import re
 from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from math import isfinite
@@ -250,16 +250,19 @@ class View:
         took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
         return f"Exact picture{took if self._began else ''}.", ""
 
-    def _show_numbers(self, picture: Picture, numbers: dict[str, float]) -> None:
+    def _show_numbers(
+        self, picture: Picture, numbers: dict[str, float], contributions: dict[str, float]
+    ) -> None:
         x, y = picture.state.cursor
         parts = {name: numbers[name] for name in (*PARTS, "texture") if name in numbers}
-        largest = np.nanmax([1e-9, *np.abs(list(parts.values()))])
         template = _TEMPLATES.get_template("numbers.html")
         html = template.render(
             numbers=numbers,
             is_scene=bool(parts),
             position=f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−"),
-            percent={name: 50 * np.nan_to_num(part) / largest for name, part in parts.items()},
+            percent=_bars(parts),
+            contributions=contributions,
+            widths=_bars(contributions),
         )
         self._send("numbers", html)
 
@@ -314,6 +317,12 @@ class View:
             self._document.add_next_tick_callback(together)
         except RuntimeError:  # the page was closed meanwhile
             self.session.end()
+
+
+def _bars(values: Mapping[Any, float]) -> dict[Any, float]:
+    """Return the lengths of bars to both sides in percent of their track."""
+    largest = np.nanmax([1e-9, *np.abs(list(values.values()))])
+    return {name: 50 * np.nan_to_num(value) / largest for name, value in values.items()}
 
 
 def readable(text: str) -> str:
