@@ -125,7 +125,7 @@ def test_a_file_says_what_it_includes(tmp_path):
     path = tmp_path / "psf.csv"
     np.savetxt(path, np.ones((3, 3)), delimiter=",")
     part = MeasuredPSFFile(str(path), 2e-6, ("footprint",))
-    assert part.of_camera(Camera().band, None).includes == ("footprint",)
+    assert part.for_camera(Camera().band, None).includes == ("footprint",)
     assert MeasuredPSF.from_file(path, 2e-6).includes == ()
     with pytest.raises(ValueError, match=r"psf.includes: \('pixel',\), expected any of footprint"):
         Camera(psf=MeasuredPSF.from_file(path, 2e-6, ("pixel",)))

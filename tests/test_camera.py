@@ -46,7 +46,7 @@ class Painted(Surface):
     def __init__(self, times, values):
         self.times, self.values = times, values
 
-    def on(self, scene, band=None, reflected=None):
+    def prepare(self, scene, band=None, reflected=None):
         return EmissivityField(self.emissivity)
 
     def emissivity(self, frame):
@@ -144,7 +144,7 @@ def test_the_ends_of_the_tables_are_as_exact(temperature):
 def test_peaks_and_centre():
     scene, surface = random_scene(frames=5)
     band = Camera().band
-    (exposure,) = expose(scene, [View(surface.on(scene), band)], 0.0, 5 * STEP)
+    (exposure,) = expose(scene, [View(surface.prepare(scene), band)], 0.0, 5 * STEP)
     temperature = scene.data["temperature"].values
     radiance = surface.values * band.radiance(temperature.astype(np.float64))
     # float32 has a step of 6e-8, the look-up is within 4e-7
@@ -175,7 +175,7 @@ def test_exposures_of_several_surfaces_are_those_of_each():
     )
     scene = Scene(data)
     for some in (surfaces, [CHIP_1, CHIP_2, CHIP_1.redrawn(1)]):
-        views = [View(surface.on(scene), Camera().band, 500.0) for surface in some]
+        views = [View(surface.prepare(scene), Camera().band, 500.0) for surface in some]
         found = expose(scene, views, 0.1 * STEP, 4 * STEP)
         for one, view in zip(found, views, strict=True):
             (alone,) = expose(scene, [view], 0.1 * STEP, 4 * STEP)

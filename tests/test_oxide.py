@@ -34,7 +34,7 @@ def scene(times, temperature, speed=0.0, material=1):
 
 
 def grown(made, index, oxide=OXIDE):
-    return OxideHistory.of(made, oxide).thickness(made.frame(index))
+    return OxideHistory.from_scene(made, oxide).thickness(made.frame(index))
 
 
 @given(st.floats(500.0, 1400.0), st.floats(1e-6, 1e-3), st.floats(0.0, 20e-9))

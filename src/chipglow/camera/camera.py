@@ -175,7 +175,7 @@ class Camera(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.psf is not None:
-            object.__setattr__(self, "psf", self.psf.of_camera(self.band, None))
+            object.__setattr__(self, "psf", self.psf.for_camera(self.band, None))
         included = self.psf.includes if self.psf else ()
         if included and not set(included) <= {"footprint", *BLURS.kinds}:
             known = ", ".join(("footprint", *BLURS.kinds))
@@ -262,27 +262,27 @@ class Camera(Part):
         """Return the time in s from the first row's start of integration to the last's end."""
         return self.integration_time + float(self.row_delays(scene).max())
 
-    def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
+    def prepare(self, surface: Surface, scene: Scene) -> EmissivityField:
         """Return a surface laid on a scene, in this camera's band and surroundings."""
         if not isinstance(surface, Surface):
             raise ValueError(
                 f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
                 "UniformSurface(0.6)"
             )
-        return surface.on(scene, self.band, self.reflected)
+        return surface.prepare(scene, self.band, self.reflected)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
         """Return the exposure of a scene from `start` on, in s, over one integration time.
 
         A ValueError if the integration reaches beyond the scene, or the pixels do not fit it.
         """
-        return self._expose(scene, surface, self.lay(surface, scene), start)
+        return self._expose(scene, surface, self.prepare(surface, scene), start)
 
     def _expose(
         self, scene: Scene, surface: Surface, field: EmissivityField, start: float
     ) -> Exposure:
         (exposure,) = self.expose_fields(scene, (field,), start)
-        warnings = tuple(surface.origin.doubts(self.band, scene))
+        warnings = tuple(surface.origin.warnings(self.band, scene))
         return replace(exposure, effects=surface.effects, warnings=warnings)
 
     def expose_fields(
@@ -292,7 +292,7 @@ class Camera(Part):
         start: float,
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
-        """Return the exposures of several surfaces, laid by `lay`: each frame is read once.
+        """Return the exposures of several surfaces, laid by `prepare`: each frame is read once.
 
         `start` is when the integration of the first row begins in s; an error that `check`, called
         now and then meanwhile, raises ends the pass.
@@ -356,7 +356,7 @@ class Camera(Part):
             As many frames as starts, with the scene's tool, and attributes of camera and surface.
         """
         self.pixels(scene.raster)
-        field = self.lay(surface, scene)
+        field = self.prepare(surface, scene)
         measured = self.form_measurement(
             self._expose(scene, surface, field, at)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()

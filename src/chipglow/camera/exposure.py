@@ -41,7 +41,7 @@ class Exposure:
     effects: Mapping[str, str] = field(default_factory=dict)
     """Attributes of its measurements about the surface: `Surface.effects`."""
     warnings: tuple[str, ...] = ()
-    """Why the surface may have another emissivity: `Origin.doubts`."""
+    """Why the surface may have another emissivity: `Origin.warnings`."""
 
 
 def surroundings_radiance(band: Band, reflected: float | None) -> float:
@@ -203,7 +203,7 @@ def _sweep(
         if splines:
             sums.add_splines(splines, features, weights, middles)
             return
-    for begin, frames in _batches(scene, indices, stack.needed):
+    for begin, frames in _batches(scene, indices, stack.required_fields):
         part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
         if features is None:
             sums.add_given(frames, stack, part, middles - begin)

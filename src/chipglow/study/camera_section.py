@@ -181,7 +181,7 @@ class CameraSection(Part):
                     "part of"
                 )
             return None
-        psf = self.psf.of_camera(band, self.magnification)
+        psf = self.psf.for_camera(band, self.magnification)
         return BlurredPSF(psf, self.blur) if self.blur else psf
 
 

@@ -195,7 +195,7 @@ def wavelengths(
             text
             for band in study.wavelengths.bands
             for surface in fitted.surfaces.values()
-            for text in surface.origin.doubts(band, scene)
+            for text in surface.origin.warnings(band, scene)
         ]
         return data.assign_attrs((fitted.notes + Notes(warnings=doubts)).attrs())
 

@@ -68,7 +68,7 @@ class PSFChoice(Part, ABC):
     """A description's choice of a camera's point spread function."""
 
     @abstractmethod
-    def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
+    def for_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
         """Return the point spread function on the scene, by the band and the lens's magnification.
 
         A ValueError if that is not possible, such as without a magnification where it is needed.
@@ -85,7 +85,7 @@ class PointSpreadFunction(PSFChoice):
     fwhm: float
     includes: tuple[str, ...] = ()
 
-    def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
+    def for_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
         """Return itself: it is given on the scene."""
         return self
 
@@ -163,7 +163,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         half = scipy.optimize.brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         return 2 * float(half) * self._unit
 
-    def of_camera(self, band: Band, magnification: float | None) -> "AnnularAperturePSF":
+    def for_camera(self, band: Band, magnification: float | None) -> "AnnularAperturePSF":
         return self if self.wavelength is not None else self.in_band(band)
 
     def in_band(self, band: Band) -> "AnnularAperturePSF":
@@ -367,7 +367,7 @@ class AiryAperture(ApertureChoice):
     example = "{kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture"
     wavelength: DiffractionWavelength = None
 
-    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
+    def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         wavelength = self.wavelength or (band.lower + band.upper) / 2
         return AnnularAperturePSF(wavelength, self.aperture(magnification), 0.0)
 
@@ -405,7 +405,7 @@ class MeasuredPSFFile(PSFChoice):
         psf = MeasuredPSF.from_file(self.file, self.spacing, self.includes)
         object.__setattr__(self, "psf", psf)
 
-    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
+    def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         return self.psf
 
 

@@ -336,7 +336,7 @@ class Pupil(ApertureChoice):
     zernike: Aberrations = ()
     temperature: SourceTemperature = 1000.0
 
-    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
+    def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         return PupilPSF(
             band,
             self.aperture(magnification),
