@@ -127,5 +127,5 @@ def test_a_file_says_what_it_includes(tmp_path):
     part = MeasuredPSFFile(str(path), 2e-6, ("footprint",))
     assert part.for_camera(Camera().band, None).includes == ("footprint",)
     assert MeasuredPSF.from_file(path, 2e-6).includes == ()
-    with pytest.raises(ValueError, match=r"psf.includes: \('pixel',\), expected any of footprint"):
+    with pytest.raises(ValueError, match=r"psf.includes: \('pixel',\), only footprint"):
         Camera(psf=MeasuredPSF.from_file(path, 2e-6, ("pixel",)))
