@@ -109,9 +109,8 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
     if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
         yield (
-            f"Nothing moves between the scene's frames: one of them stands for "
-            f"{spacing * 1e6:.3g} us of the exposure's {exposure * 1e6:.3g} us. Motion in that "
-            "time makes no error here."
+            f"Each frame of the scene represents {spacing * 1e6:.3g} us of the exposure's "
+            f"{exposure * 1e6:.3g} us: motion within that time is neglected."
         )
     cutting = study.cutting
     cells = cutting.feed / cutting.numerics.cell

@@ -54,14 +54,14 @@ def cut(
     resume: bool = False,
     on_preview: Callable[[Frame], None] | None = None,
 ) -> Path:
-    """File of the study's scene: computed now, or found in the cache.
+    """Return the file of the study's scene, from the cache or newly computed.
 
     Parameters
     ----------
     study : Study
         Only its section `cutting` matters.
     progress : callable, optional
-        Told how far the simulation is; not called if the scene is found.
+        Called with the progress of the simulation; not called if the scene is cached.
     resume : bool
         Go on from the last checkpoint of a run of the same cut that was interrupted or killed, if
         there is one. The scene is the same to the last bit.
@@ -123,7 +123,7 @@ def run(
     study : Study
         The study; the paper's is ``Study()``.
     progress : callable, optional
-        Told which step is under way and how much of it is done.
+        Called with the current step and its completed fraction, 0 to 1.
     resume : bool
         As for `cut`.
 
@@ -160,7 +160,7 @@ def wavelengths(
     progress: Progress | None = None,
     resume: bool = False,
 ) -> xr.Dataset:
-    """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
+    """Compute the errors of the study's spectral bands, alone and as ratios of two.
 
     They are read at the rake face and in the shear band of a cut, or at the points of the section
     analysis, if given. The study's camera is given each band in turn.

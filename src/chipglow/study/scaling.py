@@ -98,7 +98,7 @@ def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, A
     given = LENGTH.parse(camera["pitch"], si=not from_file) if "pitch" in camera else pitch
     if abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(
-            f"pitch: {camera['pitch']} beside a detector_pitch that makes {LENGTH.text(pitch)}, "
-            "expected one of them"
+            f"pitch: {camera['pitch']} contradicts detector_pitch / magnification, "
+            f"{LENGTH.text(pitch)}; state only one of them"
         )
     return {**camera, "magnification": float(magnification), "pitch": LENGTH.text(pitch)}
