@@ -176,7 +176,7 @@ class CameraSection(Part):
     def _psf(self, band: Band) -> PointSpreadFunction | None:
         if self.psf is None:
             if self.blur:
-                raise ValueError("blur: requires a point spread function, but psf is none")
+                raise ValueError("blur: requires a point spread function, got psf: none")
             return None
         psf = self.psf.of_camera(band, self.magnification)
         return BlurredPSF(psf, self.blur) if self.blur else psf
