@@ -42,7 +42,10 @@ PAPER_FIGURES = {
     "figure-10-error-images": "Figure 10",
     "figure-11-error-lines": "Figure 11",
 }
-FIGURES = {*PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness", "bands"}
+FIGURES = {
+    *PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness", "bands",
+    "attribution", "attribution-lines",
+}  # fmt: skip
 PAPERS = Study()
 CAUSES = ("segment", "texture", "pixel phase")
 SETTINGS = table_2(PAPERS.cutting)
@@ -315,7 +318,7 @@ def test_a_contact_that_reaches_the_border_is_a_least_length(result, monkeypatch
     assert row.cells["interval"] == "–"
     assert "continues beyond" in row.explanation
     rows = {"errors": [], "cut": [row], "chip": [], "camera": []}
-    assert summary(rows, [], result, {}).lower_bounds == ["contact_length_um"]
+    assert summary(rows, [], result, {}, {}).lower_bounds == ["contact_length_um"]
 
 
 def test_the_summary_keeps_its_schema(folder):

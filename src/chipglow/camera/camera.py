@@ -1,10 +1,10 @@
 """The virtual infrared camera."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from math import exp
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, TypeAlias
 from warnings import warn
 
 import numpy as np
@@ -41,6 +41,8 @@ BORDER_TOLERANCE: Final = 1.0
 
 PAPER_LIMIT: Final = 573.15
 """Lower limit in K of the paper's camera."""
+
+Gather: TypeAlias = Callable[[Array, Raster, Raster, float], Array]
 
 _ROUNDING: Final = 1e-13
 _COLD_FLOOR: Final = 373.15
@@ -372,7 +374,7 @@ class Camera(Part):
         fraction = self._both(np.ones(scene.shape), scene)[1]
         return np.where(fraction < 1 - _ROUNDING, 1 - fraction, 0.0)
 
-    def form_image(self, radiance: Array, scene: Raster) -> Array:
+    def form_image(self, radiance: Array, scene: Raster, gather: Gather = integrate) -> Array:
         """Return the image of a radiance map on the pixels: optics, PSF and footprint.
 
         Parameters
@@ -382,6 +384,9 @@ class Camera(Part):
             time, such as `Exposure.mean_radiance`.
         scene : Raster
             The samples.
+        gather : callable
+            Takes samples, their raster, that of the pixels and the fill factor, and returns what
+            each pixel receives, such as the mean over its square (`integrate`).
 
         Returns
         -------
@@ -393,8 +398,8 @@ class Camera(Part):
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
-        if self.psf is None or self.optics:
-            return self._show(self._collect(image, scene, "edge"), self.pixels(scene))
+        if self.psf is None or self.optics or gather is not integrate:
+            return self._show(self._collect(image, scene, "edge", gather), self.pixels(scene))
         return self._both(image, scene)[0]
 
     def _both(self, image: Array, scene: Raster) -> tuple[Array, Array]:
@@ -409,7 +414,9 @@ class Camera(Part):
         edge, nothing = blurs(received, self.psf, self.pitch)
         return edge[own], nothing[own]
 
-    def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
+    def _collect(
+        self, image: Array, scene: Raster, beyond: Beyond, gather: Gather = integrate
+    ) -> Array:
         """Return the radiance that the pixels receive: point spread function, optics, footprint."""
         pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
@@ -417,10 +424,10 @@ class Camera(Part):
         for term in self.optics:
             image = term.on_samples(image, scene, pixels, blurred)
         if self.psf is None or self.psf_order == "optics":
-            return integrate(image, scene, pixels, self._sensitive(scene))
+            return gather(image, scene, pixels, self._sensitive(scene))
         # Pixels that are not read out supply the radiance beyond the others.
         whole, own = whole_raster(scene, pixels)
-        return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
+        return blurred(gather(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
     def _show(self, image: Array, pixels: Raster) -> Array:
         """Return the radiance after the optics' effects on the received radiance."""

@@ -12,7 +12,7 @@ from chipglow import __version__
 from chipglow.analysis import Analysis, with_errors
 from chipglow.drawing import drawing
 from chipglow.io import write_dataset
-from chipglow.report import cut_figures, figures, paper
+from chipglow.report import attribution, cut_figures, figures, paper
 from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
@@ -55,6 +55,8 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "band-curves": cut_figures.band_curves,
     "error-images": figures.error_images,
     "error-lines": figures.error_lines,
+    "attribution": attribution.maps,
+    "attribution-lines": attribution.profiles,
     "over-time": figures.over_time,
     "psf-sensitivity": figures.psf_sensitivity,
     "bands": cut_figures.bands,
@@ -114,7 +116,8 @@ def write_report(
     tool = tool_rows(analysis, steady) if steady else []
     (folder / "study.yaml").write_text(study_text, encoding="utf-8")
     _write_arrays(analysis.data, provenance, folder / "results.nc")
-    _write_numbers(summary(rows, tool, analysis, provenance), folder)
+    attributed = attribution.contributions(facts)
+    _write_numbers(summary(rows, tool, analysis, provenance, attributed), folder)
     (folder / "figures").mkdir()
     values = {
         "title": title,
@@ -122,6 +125,7 @@ def write_report(
         "remarks": remarks,
         "answer": answer(facts, rows["errors"]),
         "changes": changes(facts, rows["errors"]),
+        "attribution": list(attribution.sentences(facts)),
         "note": facts.text(texts()["note"]),
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),

@@ -21,3 +21,4 @@ from chipglow.study.running import (
     wavelengths as wavelengths,
 )
 from chipglow.study.schema import Study as Study
+from chipglow.study.sweeps import Method as Method, Sweep as Sweep, sweep as sweep

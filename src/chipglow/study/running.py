@@ -79,7 +79,7 @@ def cut(
     SolverError
         If the simulation goes wrong; the message names the last checkpoint, which is kept.
     """
-    path = scene_path(_inputs(study))
+    path = scene_path(scene_inputs(study))
     if not _is_whole(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         _compute(study, path, progress or _silent, resume, on_preview)
@@ -97,18 +97,20 @@ def _silent(step: str, fraction: float) -> None:
 
 def is_cut(study: Study) -> bool:
     """Return whether the study's scene is in the cache."""
-    return _is_whole(scene_path(_inputs(study)))
+    return _is_whole(scene_path(scene_inputs(study)))
 
 
 def is_damaged(study: Study) -> bool:
     """Return whether the study's scene in the cache is damaged; `cut` computes it again."""
-    path = scene_path(_inputs(study))
+    path = scene_path(scene_inputs(study))
     return path.exists() and not _is_whole(path)
 
 
 def kept_progress(study: Study) -> float:
     """Return the fraction of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
-    return max((left.progress for left in unfinished_scenes(scene_path(_inputs(study)))), default=0)
+    return max(
+        (left.progress for left in unfinished_scenes(scene_path(scene_inputs(study)))), default=0
+    )
 
 
 def run(
@@ -215,7 +217,8 @@ def _fitted(study: Study, progress: Progress | None, resume: bool) -> Iterator[F
         raise ValueError(f"{study.scene}: {error}") from None
 
 
-def _inputs(study: Study) -> dict[str, Any]:
+def scene_inputs(study: Study) -> dict[str, Any]:
+    """Return all that determines the scene of a study's cut."""
     simulation = study.cutting.simulation()
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)
@@ -249,7 +252,7 @@ def _compute(
     raster = cutting.field_of_view.build()
     simulation = cutting.simulation()
     attributes: Mapping[str, str | float] = {
-        "inputs": dumps(_inputs(study), sort_keys=True),
+        "inputs": dumps(scene_inputs(study), sort_keys=True),
         "momentum_flow": simulation.momentum_flow,
         "mass_scaling": simulation.mass_scaling,
         "cell": simulation.numerics.cell,
