@@ -136,7 +136,7 @@ def test_a_response_file_weighs_the_band(tmp_path):
     [
         ({"detector_pitch": "15 um"}, "magnification: must be given"),
         ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, must be positive"),
-        ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "makes 6 um"),
+        ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "magnification, 6 um"),
         ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
         ({"preset": {}}, "{} is unknown, expected one of flir-lepton-3"),
         ({"preset": "alpha-nir"}, "magnification: must be given"),
