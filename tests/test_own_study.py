@@ -221,7 +221,7 @@ def test_what_is_too_coarse_is_said():
     scene = AnalyticChip(frames=10, frame_spacing=8e-6).scene()
     told = " ".join(fit(coarse, scene).notes.assumed)
     assert "The feed is 5 cells: too coarse" in told
-    assert "one of them stands for 8 us of the exposure's 10 us" in told
+    assert "represents 8 us of the exposure's 10 us" in told
     fine = AnalyticChip(frames=10, frame_spacing=1e-6).scene()
     assert fit(Study(), fine).notes.assumed == []
 
