@@ -127,7 +127,7 @@ class CameraSection(Part):
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
-        """Return the data with what preset, detector and lens make."""
+        """Return the data, completed by preset, detector and lens."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("preset")

@@ -1,4 +1,4 @@
-"""Running a study: the cut (or the scene that was cut before), the camera, the analysis."""
+"""Running a study: cut or cached scene, camera, analysis."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -77,7 +77,7 @@ def cut(
     Raises
     ------
     SolverError
-        If the simulation goes wrong; the message names the last checkpoint, which is kept.
+        If the simulation fails; the message names the last checkpoint, which is kept.
     """
     path = scene_path(scene_inputs(study))
     if not _is_whole(path):
@@ -118,7 +118,7 @@ def run(
     progress: Progress | None = None,
     resume: bool = False,
 ) -> Analysis:
-    """Run a study from the cut, or from the scene that takes its place, to the analysis.
+    """Run a study: cut or open its scene, measure and analyse.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def run(
     Raises
     ------
     ValueError
-        If the scene cannot be analysed as the study wants it; the message names the scene file.
+        If the scene cannot be analysed as the study requires; the message names the scene file.
     """
     with _fitted(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)

@@ -112,7 +112,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
 
 
 def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """Return a camera's data with the pitch on the scene that its data sheet makes."""
+    """Return a camera's data with the pitch on the scene that follows from its data sheet."""
     detector, magnification = (camera.get(name) for name in ("detector_pitch", "magnification"))
     if detector in (None, "none"):
         return dict(camera)
