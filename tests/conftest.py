@@ -154,7 +154,7 @@ def chip_analysis():
     """The paper's camera on the analytic chip: eight draws in one segment."""
     from analytic_chip import AnalyticChip
 
-    from chipglow.analysis import Plan, analyse
+    from chipglow.analysis import AttributionPlan, Plan, analyse
     from chipglow.camera import Camera
     from chipglow.surface import CHIP_1, CHIP_2
 
@@ -162,5 +162,11 @@ def chip_analysis():
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera.paper(),
-        Plan(exposures=3, phases=2, textures=3, psf_widths=(4e-6, 12e-6, 20e-6)),
+        Plan(
+            exposures=3,
+            phases=2,
+            textures=3,
+            psf_widths=(4e-6, 12e-6, 20e-6),
+            attribution=AttributionPlan(),
+        ),
     )

@@ -29,8 +29,8 @@ from chipglow.analysis import (
     sensitivity_psf_fraction,
 )
 from chipglow.analysis.heated import heated_objects
-from chipglow.analysis.images import LEAST_COVERED
 from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
+from chipglow.camera.optics.sampling import LEAST_COVERED
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene, ToolGeometry, sample

@@ -74,6 +74,10 @@ PROGRAMS = {
         {"| scikit-image |": 5},
     ),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
+    "sweeps.py": (
+        "--tasks 4 --points 6 --kills 1",
+        {"| 1 |": 4, "| 2 |": 4, "| 6 | ": 6},
+    ),
     "titanium.py": (
         f"--cell {COARSEST} 88.9-0.1",
         {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},
@@ -86,9 +90,10 @@ NEEDED = {
     "movies.py": ("av",),
     "rasterise.py": ("pyvista",),
     "registration_libraries.py": ("skimage",),
+    "sweeps.py": ("distributed",),
 }
 # Programs that fork, spawn processes or drive a browser run in a process of their own.
-OWN_PROCESS = ("app_latency.py", "fuzz/fuzz.py")
+OWN_PROCESS = ("app_latency.py", "fuzz/fuzz.py", "sweeps.py")
 
 
 @pytest.fixture

@@ -151,7 +151,7 @@ def test_impossible_bands_are_refused(limits):
     ("camera", "message"),
     [
         ("{detector: {full_well: 1e6}}", "detector.response: is missing"),
-        ("{lower_limit: detector}", "lower_limit: detector, expected a detector beside it"),
+        ("{lower_limit: detector}", "lower_limit: detector requires a detector"),
         ("{detector: {response: {kind: x}}}", "kind: 'x', expected one of photon, energy, range"),
         (
             "{detector: {response: {kind: energy, per_radiance: 1}, gain: 1, terms: [{kind: y}]}}",

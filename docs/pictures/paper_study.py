@@ -1,4 +1,4 @@
-"""Tables and picture of the page on the paper's study.
+"""Tables and pictures of the pages on the paper's study.
 
     python docs/pictures/paper_study.py RESULTS
 
@@ -22,13 +22,17 @@ NAMES = {
 
 
 def main() -> None:
-    """Print both tables and take the picture."""
+    """Print both tables and copy the pictures."""
     results = Path(sys.argv[1])
     summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
     print(_errors(summary))
     print()
     print(_causes(summary))
-    shutil.copyfile(results / "figures" / "figure-11-error-lines.png", HERE / "error-lines.png")
+    for name, file in (
+        ("figure-11-error-lines", "error-lines"),
+        ("attribution-lines", "attribution"),
+    ):
+        shutil.copyfile(results / "figures" / f"{name}.png", HERE / f"{file}.png")
 
 
 def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:

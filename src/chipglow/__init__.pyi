@@ -16,6 +16,7 @@ from .analysis import (
     Analysis as Analysis,
     Plan as Plan,
     analyse as analyse,
+    attribute as attribute,
     error_images as error_images,
     error_parts as error_parts,
     ratio_errors as ratio_errors,
@@ -112,6 +113,7 @@ from .study import (
     cut as cut,
     load_study as load_study,
     run as run,
+    sweep as sweep,
     wavelengths as wavelengths,
 )
 from .surface import (

@@ -1,5 +1,10 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
+from chipglow.analysis.attribution import (
+    EFFECTS as EFFECTS,
+    AttributionPlan as AttributionPlan,
+    attribute as attribute,
+)
 from chipglow.analysis.cut import (
     Cut as Cut,
     CuttingForces as CuttingForces,
@@ -16,6 +21,7 @@ from chipglow.analysis.heated import HeatedObject as HeatedObject, HeatedRow as 
 from chipglow.analysis.images import (
     ALL as ALL,
     CASES as CASES,
+    Array as Array,
     ExposureImages as ExposureImages,
     error_images as error_images,
     error_parts as error_parts,

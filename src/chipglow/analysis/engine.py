@@ -9,6 +9,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 import xarray as xr
 
+from chipglow.analysis.attribution import attribute, read_attribution
 from chipglow.analysis.cut import (
     Cut,
     Progress,
@@ -195,6 +196,7 @@ def analyse(
         **looked.variables(HEADLINES if cut else {}, "segment" if cut else "exposure"),
     }
     variables |= _corrected(camera, variables)
+    variables |= task.attempt("attribution", lambda: _attribution(task, schedule, looked)) or {}
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,
         "error_reference": plan.reference,
@@ -429,6 +431,44 @@ def _corrected(camera: Camera, variables: Variables) -> Variables:
     return {
         "set_emissivity": ("surface", assumed, {"units": "1"}),
         "corrected": (variables["reference"][0], shown, _KELVIN),
+    }
+
+
+def _attribution(task: _Task, schedule: Schedule, looked: Looked) -> Variables:
+    """Return the contributions of the effects in the shown exposure, and at the readings."""
+    plan, shown = task.plan.attribution, schedule.shown
+    if plan is None:
+        return {}
+    every = []
+    how = plan.effects, plan.reference, plan.permutations
+    for number, surface in enumerate(task.surfaces.values()):
+        task.tell("attribution", number / len(task.surfaces))
+        camera, start = task.camera.redrawn(number), float(schedule.starts[shown])
+        every.append(attribute(task.scene, camera, surface, start, *how))
+    task.tell("attribution", 1.0)
+    data = xr.concat(every, "surface", join="outer").rename(y="pixel_y", x="pixel_x")
+    readings = np.full((len(looked.readings), data.sizes["effect"] + 1), np.nan)
+    along = np.full((len(looked.lines), data.sizes["effect"], looked.along.shape[-1]), np.nan)
+    exposure, names = schedule.drawn.index(shown), list(task.surfaces)
+    for number, view in enumerate(schedule.views):
+        of_surface = names.index(view.surface)
+        images = looked.references[view.surface][shown], looked.shown[view.surface][1][0]
+        for i, place in enumerate(view.places[exposure]):
+            read, lines = read_attribution(every[of_surface], place, images, task.camera.pitch)
+            readings[[one[:2] == (number, i) for one in looked.readings]] = read
+            for name, values in lines.items():
+                along[looked.lines.index((number, i, name)), :, : values.shape[1]] = values
+    variables: Variables = {
+        f"attribution_{name}": (one.dims, one.values, one.attrs)
+        for name, one in data.data_vars.items()
+    }
+    if looked.lines:
+        variables["attribution_line"] = ("line", "effect", "point"), along, _KELVIN
+    return {
+        **variables,
+        "effect": ("effect", data.effect.values),
+        "attribution_reading": (("reading", "effect"), readings[:, :-1], _KELVIN),
+        "attribution_reading_gain": ("reading", readings[:, -1], _KELVIN),
     }
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
-from math import ceil, floor, sqrt
+from math import ceil, floor
 from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera import UNUSABLE, Camera, Exposure, PointSpreadFunction, blur
-from chipglow.camera.optics.sampling import integrate, overlap_lengths
+from chipglow.camera.optics.sampling import integrate, largest
 from chipglow.scene import Raster
 from chipglow.scene.lines import nearest
 
@@ -30,14 +30,6 @@ sample in the pixel's square during the exposure; ``mean``: that of the mean rad
 and exposure; ``centre``: that of the sample under the pixel's centre in the middle of the
 exposure; ``true``: the largest true temperature in the square during the exposure.
 """
-
-LEAST_COVERED: Final = 0.05
-"""Part of a sample's width that a pixel must cover for the sample to count in its maximum.
-
-Where a whole number of samples makes a pixel, a pitch that was rounded adds up to slivers of the
-neighbours' samples. A single hot one would be the reference of the whole pixel.
-"""
-
 
 PARTS: Final = ("emissivity", "motion", "footprint", "psf", "detector")
 """Causes of the error in the order of the light; the parts that they contribute sum to it."""
@@ -268,40 +260,17 @@ def reference_temperature(
 ) -> NDArray[np.float64]:
     """Return the temperature in K of a pixel without error; NaN where nothing radiates."""
     pixels = camera.pixels(exposure.raster)
+    squares = exposure.raster, pixels, camera.fill_factor
     if kind == "maximum":
-        return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, pixels))
+        return _temperature(camera, largest(exposure.peak_radiance, *squares))
     if kind == "mean":
-        mean = integrate(exposure.mean_radiance, exposure.raster, pixels, camera.fill_factor)
-        return _temperature(camera, mean)
+        return _temperature(camera, integrate(exposure.mean_radiance, *squares))
     if kind == "centre":
         points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
         return _temperature(camera, nearest(exposure.centre_radiance, exposure.raster, points))
     if kind == "true":
-        return _maximum(exposure.peak_temperature, camera, exposure, pixels)
+        return largest(exposure.peak_temperature, *squares)
     raise ValueError(f"reference: unknown {kind!r}, expected one of {get_args(ReferenceKind)}")
-
-
-def _maximum(
-    values: NDArray[np.floating], camera: Camera, exposure: Exposure, pixels: Raster
-) -> NDArray[np.float64]:
-    """Return the largest value of the samples in every pixel's sensitive square; NaN for none."""
-    grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
-    known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
-    columns = _covered(pixels.x - grid.left, side, grid.columns, grid.spacing)
-    rows = _covered(grid.top - pixels.y, side, grid.rows, grid.spacing)
-    down = np.stack([known[part].max(axis=0) for part in rows])
-    greatest = np.stack([down[:, part].max(axis=1) for part in columns], axis=1)
-    return np.where(np.isfinite(greatest), greatest, np.nan).astype(np.float64)
-
-
-def _covered(
-    centres: NDArray[np.float64], side: float, samples: int, spacing: float
-) -> list[slice]:
-    """Return the samples under each pixel along a line, without slivers."""
-    least = LEAST_COVERED * min(spacing, side)
-    covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
-    first = covered.argmax(axis=1)
-    return [slice(i, i + n) for i, n in zip(first, covered.sum(axis=1), strict=True)]
 
 
 def _temperature(camera: Camera, radiance: NDArray[np.floating]) -> NDArray[np.float64]:

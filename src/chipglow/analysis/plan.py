@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator
 
+from chipglow.analysis.attribution import AttributionPlan
 from chipglow.analysis.images import ReferenceKind
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.laboratory.emissivity import RegionSection
@@ -25,6 +26,8 @@ class Plan(Part):
     cut : bool
         Whether a scene that shows a cut is analysed segment by segment, at the rake face and the
         shear band. Otherwise the scene is analysed exposure by exposure.
+    attribution : AttributionPlan, optional
+        Effects among which the errors of the shown exposure are divided; None: they are not.
 
     Raises
     ------
@@ -96,6 +99,7 @@ class Plan(Part):
     ] = field(default_factory=dict)
     places: tuple[Place, ...] = ()
     cut: bool = True
+    attribution: AttributionPlan | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

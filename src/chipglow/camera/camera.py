@@ -1,10 +1,10 @@
 """The virtual infrared camera."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from math import exp
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, TypeAlias
 from warnings import warn
 
 import numpy as np
@@ -41,6 +41,8 @@ BORDER_TOLERANCE: Final = 1.0
 
 PAPER_LIMIT: Final = 573.15
 """Lower range limit in K of the paper's camera."""
+
+Gather: TypeAlias = Callable[[Array, Raster, Raster, float], Array]
 
 _ROUNDING: Final = 1e-13
 _SUSPECT_LIMIT: Final = 373.15
@@ -368,7 +370,7 @@ class Camera(Part):
         fraction = self._received(np.ones(scene.shape), scene)[1]
         return np.where(fraction < 1 - _ROUNDING, 1 - fraction, 0.0)
 
-    def form_image(self, radiance: Array, scene: Raster) -> Array:
+    def form_image(self, radiance: Array, scene: Raster, gather: Gather = integrate) -> Array:
         """Form the image of a radiance map on the pixels by optics, PSF and footprint.
 
         Parameters
@@ -378,6 +380,9 @@ class Camera(Part):
             `Exposure.mean_radiance`.
         scene : Raster
             Grid of the samples.
+        gather : callable
+            Takes samples, their raster, the raster of the pixels and the fill factor. Returns the
+            values that the pixels receive, such as the mean over each square (`integrate`).
 
         Returns
         -------
@@ -389,8 +394,8 @@ class Camera(Part):
             raise ValueError(f"camera: radiance must have shape {scene.shape}, not {image.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and not negative")
-        if self.psf is None or self.optics:
-            return self._displayed(self._collect(image, scene, "edge"), self.pixels(scene))
+        if self.psf is None or self.optics or gather is not integrate:
+            return self._displayed(self._collect(image, scene, "edge", gather), self.pixels(scene))
         return self._received(image, scene)[0]
 
     def _received(self, image: Array, scene: Raster) -> tuple[Array, Array]:
@@ -405,7 +410,9 @@ class Camera(Part):
         edge, nothing = blurs(received, self.psf, self.pitch)
         return edge[own], nothing[own]
 
-    def _collect(self, image: Array, scene: Raster, beyond: Beyond) -> Array:
+    def _collect(
+        self, image: Array, scene: Raster, beyond: Beyond, gather: Gather = integrate
+    ) -> Array:
         """Apply point spread function, optics and footprint."""
         pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
@@ -413,10 +420,10 @@ class Camera(Part):
         for term in self.optics:
             image = term.on_samples(image, scene, pixels, blurred)
         if self.psf is None or self.psf_order == "optics":
-            return integrate(image, scene, pixels, self._sensitive(scene))
+            return gather(image, scene, pixels, self._sensitive(scene))
         # Pixels that are not read out supply the radiance around the others.
         whole, own = whole_raster(scene, pixels)
-        return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
+        return blurred(gather(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
     def _displayed(self, image: Array, pixels: Raster) -> Array:
         """Apply the optics' effects on pixel radiance."""

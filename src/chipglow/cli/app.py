@@ -21,6 +21,7 @@ from chipglow.cli.register import register
 from chipglow.cli.screen import current
 from chipglow.cli.sources import convert, import_source
 from chipglow.cli.studies import cut, error, measure, reproduce, run, wavelengths
+from chipglow.cli.sweep import sweep
 
 app = typer.Typer(
     cls=Boundary,
@@ -41,6 +42,7 @@ EXAMPLES = {
     "import": "'chip_*.vtu' --set units.length=mm --set interval=1us --out scene.nc",
     "measure": "scene.nc --study study.yaml --chip 'chip 2' --out measured.nc",
     "wavelengths": "study.yaml --plot bands.png",
+    "sweep": "study.yaml --vary camera.integration_time=2us,5us,10us --out sweep",
     "show": "measured.nc --plot measured.png",
     "app": "scene.nc",
     "materials": "aisi-1045",
@@ -152,6 +154,7 @@ app.command()(cut)
 app.command("import")(import_source)
 app.command()(measure)
 app.command()(wavelengths)
+app.command()(sweep)
 
 
 @app.command()

@@ -121,6 +121,11 @@ class Part:
         """Return the section's data with what follows from them; numbers from a file need units."""
         return data
 
+    def stated(self) -> dict[str, Any]:
+        """Return the fields that were given, by name, with the kind."""
+        fields = {name: getattr(self, name) for name in self.given & self.declared().keys()}
+        return {**fields, "kind": self.kind} if self.kind else fields
+
     @classmethod
     def parameter(cls, name: str) -> Parameter:
         """Return what a field declares, for another part that has it too."""

@@ -105,16 +105,14 @@ def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
     return made
 
 
-def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
-    """Return what was given of a part, a mapping or a list, with the changes."""
+def _with_changes(part: Any, changes: Mapping[str, object], stated: Any = None) -> Any:
+    """Return what was stated of a part, a mapping or a list, with the changes."""
     if isinstance(part, Mapping):
         data = dict(part)
     elif isinstance(part, tuple):
         data = {str(number): one for number, one in enumerate(part)}
     else:
-        data = {name: getattr(part, name) for name in part.given & part.declared().keys()}
-        if part.kind:
-            data["kind"] = part.kind
+        data = dict(stated) if isinstance(stated, Mapping) else part.stated()
     inner: dict[str, dict[str, object]] = {}
     for path, value in changes.items():
         name, dot, rest = path.partition(".")
@@ -123,7 +121,7 @@ def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
         else:
             data[name] = value
     for name, one in inner.items():
-        data[name] = _with_changes(value_at(part, name), one)
+        data[name] = _with_changes(value_at(part, name), one, data.get(name))
     return tuple(data.values()) if isinstance(part, tuple) else data
 
 

@@ -1,5 +1,6 @@
 """The report of an analysis: page, figures, numbers and arrays; pictures of scenes; movies."""
 
+from chipglow.report.attribution import attribution_sentence as attribution_sentence
 from chipglow.report.movie import (
     CutPicture as CutPicture,
     MovieScales as MovieScales,

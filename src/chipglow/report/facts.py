@@ -59,6 +59,7 @@ class Facts:
             "KELVIN": KELVIN,
             "VOID": Material.VOID,
             "analysis": analysis,
+            "attribution_reference": getattr(analysis.plan.attribution, "reference", ""),
             "calibration": camera.calibration(camera.pixels(analysis.raster).shape),
             "camera": camera,
             "cause": data.exposure.attrs["title"],

@@ -7,12 +7,13 @@ from typing import Any, Final, NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
+from PIL.Image import Image
 
 from chipglow import __version__
 from chipglow.analysis import Analysis, with_errors
 from chipglow.drawing import drawing
 from chipglow.io import write_dataset
-from chipglow.report import cut_figures, figures, paper
+from chipglow.report import attribution, cut_figures, figures, paper
 from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
@@ -25,15 +26,15 @@ from chipglow.text import json_schema
 
 
 class FigureFile(NamedTuple):
-    """A figure as written: file name without ending, heading, figure of the paper, texts, PNGs."""
+    """A figure as written: file name without ending, heading, the paper's figure, texts, images."""
 
     name: str
     title: str
     paper: str
     caption: str
     alt: str
-    png: Path
-    narrow: str  # address of the picture with its panels stacked; empty for one column
+    columns: Sequence[Image]  # of panels, beside each other or stacked on a narrow screen
+    legend: Image | None
 
 
 class Failure(NamedTuple):
@@ -55,6 +56,8 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "band-curves": cut_figures.band_curves,
     "error-images": figures.error_images,
     "error-lines": figures.error_lines,
+    "attribution": attribution.maps,
+    "attribution-lines": attribution.profiles,
     "over-time": figures.over_time,
     "psf-sensitivity": figures.psf_sensitivity,
     "bands": cut_figures.bands,
@@ -114,7 +117,8 @@ def write_report(
     tool = tool_rows(analysis, steady) if steady else []
     (folder / "study.yaml").write_text(study_text, encoding="utf-8")
     _write_arrays(analysis.data, provenance, folder / "results.nc")
-    _write_numbers(summary(rows, tool, analysis, provenance), folder)
+    attributed = attribution.contributions(facts)
+    _write_numbers(summary(rows, tool, analysis, provenance, attributed), folder)
     (folder / "figures").mkdir()
     values = {
         "title": title,
@@ -122,6 +126,7 @@ def write_report(
         "remarks": remarks,
         "answer": answer(facts, rows["errors"]),
         "changes": changes(facts, rows["errors"]),
+        "attribution": list(attribution.sentences(facts)),
         "note": facts.text(texts()["note"]),
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
@@ -177,12 +182,8 @@ def _figure(
             return None
         number, more = paper.FIGURES.get(name, ("", "")) if facts.is_compared else ("", "")
         file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
+        drawing.label_panels(figure)
         png, _ = drawing.save(figure, folder, file)
-        narrow = ""
-        if getattr(figure, "columns", 1) > 1:
-            with drawing.stacked():
-                same = draw(facts)
-            assert same is not None
-            narrow = drawing.data_url(drawing.narrow_png(same))
+        columns, legend = drawing.panels(figure, png)
     caption, alt = (facts.text(texts()["figures"][name][key]) for key in ("caption", "alt"))
-    return FigureFile(file, title, number, f"{caption} {more}".strip(), alt, png, narrow)
+    return FigureFile(file, title, number, f"{caption} {more}".strip(), alt, columns, legend)

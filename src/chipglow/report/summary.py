@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from chipglow.analysis import Analysis, Distribution
-from chipglow.report.rows import Row, known
+from chipglow.report.rows import Row, known, slug
 from chipglow.report.steady_tool import ToolRow
 
 _Known = FiniteFloat | None
@@ -107,6 +107,10 @@ class Summary(_Numbered):
             description="Contributions to the errors: psf, motion and footprint, or psf and rest."
         ),
     ]
+    attribution: Annotated[
+        dict[str, dict[str, FiniteFloat]],
+        Field(description="Contribution of each effect to the errors of the shown exposure in K."),
+    ] = {}
     one_draw: Annotated[_Numbers, Field(description="Results of a single frame.")]
     chip: Annotated[_Numbers, Field(description="Metrics of the chip.")] = {}
     chip_uncertainty: Annotated[
@@ -132,6 +136,7 @@ def summary(
     steady: Sequence[ToolRow],
     analysis: Analysis,
     provenance: Mapping[str, str],
+    attributed: Mapping[str, Mapping[str, float]],
 ) -> Summary:
     """Return the numbers of a report."""
     results, chip = [*rows["errors"], *rows["cut"]], rows["chip"]
@@ -148,6 +153,7 @@ def summary(
             for row in results
             if row.parts
         },
+        attribution={slug(name): dict(one) for name, one in attributed.items()},
         one_draw={row.key: row.one_draw for row in results if row.one_draw is not None},
         chip={row.key: row.here for row in chip},
         chip_uncertainty={row.key: row.uncertainty for row in chip if row.uncertainty is not None},

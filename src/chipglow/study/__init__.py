@@ -1,4 +1,4 @@
-"""Studies: what to cut, look at and analyse, as a YAML file or in Python."""
+"""Studies: settings of cut, camera and analysis, as a YAML file or in Python."""
 
 from chipglow.study.cache import (
     CachedScene as CachedScene,
@@ -21,3 +21,4 @@ from chipglow.study.running import (
     wavelengths as wavelengths,
 )
 from chipglow.study.schema import Study as Study
+from chipglow.study.sweeps import Method as Method, Sweep as Sweep, sweep as sweep

@@ -1,4 +1,4 @@
-"""Running a study: the cut (or the scene that was cut before), the camera, the analysis."""
+"""Running a study: cut or cached scene, camera, analysis."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -54,14 +54,14 @@ def cut(
     resume: bool = False,
     on_preview: Callable[[Frame], None] | None = None,
 ) -> Path:
-    """File of the study's scene: computed now, or found in the cache.
+    """Return the file of the study's scene, from the cache or newly computed.
 
     Parameters
     ----------
     study : Study
         Only its section `cutting` matters.
     progress : callable, optional
-        Told how far the simulation is; not called if the scene is found.
+        Called with the progress of the simulation; not called if the scene is cached.
     resume : bool
         Go on from the last checkpoint of a run of the same cut that was interrupted or killed, if
         there is one. The scene is the same to the last bit.
@@ -77,9 +77,9 @@ def cut(
     Raises
     ------
     SolverError
-        If the simulation goes wrong; the message names the last checkpoint, which is kept.
+        If the simulation fails; the message names the last checkpoint, which is kept.
     """
-    path = scene_path(_inputs(study))
+    path = scene_path(scene_inputs(study))
     if not _is_whole(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         _compute(study, path, progress or _silent, resume, on_preview)
@@ -97,18 +97,20 @@ def _silent(step: str, fraction: float) -> None:
 
 def is_cut(study: Study) -> bool:
     """Return whether the study's scene is in the cache."""
-    return _is_whole(scene_path(_inputs(study)))
+    return _is_whole(scene_path(scene_inputs(study)))
 
 
 def is_damaged(study: Study) -> bool:
     """Return whether the study's scene in the cache is damaged; `cut` computes it again."""
-    path = scene_path(_inputs(study))
+    path = scene_path(scene_inputs(study))
     return path.exists() and not _is_whole(path)
 
 
 def kept_progress(study: Study) -> float:
     """Return the fraction of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
-    return max((left.progress for left in unfinished_scenes(scene_path(_inputs(study)))), default=0)
+    return max(
+        (left.progress for left in unfinished_scenes(scene_path(scene_inputs(study)))), default=0
+    )
 
 
 def run(
@@ -116,14 +118,14 @@ def run(
     progress: Progress | None = None,
     resume: bool = False,
 ) -> Analysis:
-    """Run a study from the cut, or from the scene that takes its place, to the analysis.
+    """Run a study: cut or open its scene, measure and analyse.
 
     Parameters
     ----------
     study : Study
         The study; the paper's is ``Study()``.
     progress : callable, optional
-        Told which step is under way and how much of it is done.
+        Called with the current step and its completed fraction, 0 to 1.
     resume : bool
         As for `cut`.
 
@@ -137,7 +139,7 @@ def run(
     Raises
     ------
     ValueError
-        If the scene cannot be analysed as the study wants it; the message names the scene file.
+        If the scene cannot be analysed as the study requires; the message names the scene file.
     """
     with _fitted(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
@@ -160,7 +162,7 @@ def wavelengths(
     progress: Progress | None = None,
     resume: bool = False,
 ) -> xr.Dataset:
-    """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
+    """Compute the errors of the study's spectral bands, alone and as ratios of two.
 
     They are read at the rake face and in the shear band of a cut, or at the points of the section
     analysis, if given. The study's camera is given each band in turn.
@@ -215,7 +217,8 @@ def _fitted(study: Study, progress: Progress | None, resume: bool) -> Iterator[F
         raise ValueError(f"{study.scene}: {error}") from None
 
 
-def _inputs(study: Study) -> dict[str, Any]:
+def scene_inputs(study: Study) -> dict[str, Any]:
+    """Return all that determines the scene of a study's cut."""
     simulation = study.cutting.simulation()
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)
@@ -249,7 +252,7 @@ def _compute(
     raster = cutting.field_of_view.build()
     simulation = cutting.simulation()
     attributes: Mapping[str, str | float] = {
-        "inputs": dumps(_inputs(study), sort_keys=True),
+        "inputs": dumps(scene_inputs(study), sort_keys=True),
         "momentum_flow": simulation.momentum_flow,
         "mass_scaling": simulation.mass_scaling,
         "cell": simulation.numerics.cell,

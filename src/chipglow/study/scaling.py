@@ -1,6 +1,6 @@
 """Defaults that follow from feed, rake angle, speed and exposure: view, window, cutting length."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import ceil, degrees, radians, tan
 from typing import Any, Final
 
@@ -30,6 +30,32 @@ _EXPOSURES: Final = 3.0
 
 _SUB_FRAMES: Final = 10
 """Frames that an exposure has at least."""
+
+
+VIEWS: Final = ("window", "field_of_view")
+"""Parts of the section cutting with derived settings."""
+
+DERIVED: Final = (
+    "camera.pitch",
+    "camera.psf",
+    "camera.lower_limit",
+    "cutting.cutting_length",
+    *(f"cutting.window.{name}" for name in ("start", "end", "interval", "band_duration")),
+    *(f"cutting.field_of_view.{name}" for name in ("left", "top", "spacing", "rows", "columns")),
+)
+"""Settings that follow from others."""
+
+
+def without(data: Mapping[str, Any], paths: Iterable[str]) -> dict[str, Any]:
+    """Return nested data without the settings at some paths."""
+    left = dict(data)
+    for path in paths:
+        name, dot, rest = path.partition(".")
+        if dot and isinstance(left.get(name), Mapping):
+            left[name] = without(left[name], [rest])
+        elif not dot:
+            left.pop(name, None)
+    return left
 
 
 def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
@@ -86,7 +112,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
 
 
 def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """Return a camera's data with the pitch on the scene that its data sheet makes."""
+    """Return a camera's data with the pitch on the scene that follows from its data sheet."""
     detector, magnification = (camera.get(name) for name in ("detector_pitch", "magnification"))
     if detector in (None, "none"):
         return dict(camera)
@@ -98,7 +124,7 @@ def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, A
     given = LENGTH.parse(camera["pitch"], si=not from_file) if "pitch" in camera else pitch
     if abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(
-            f"pitch: {camera['pitch']} beside a detector_pitch that makes {LENGTH.text(pitch)}, "
-            "expected one of them"
+            f"pitch: {camera['pitch']} contradicts detector_pitch / magnification, "
+            f"{LENGTH.text(pitch)}; state only one of them"
         )
     return {**camera, "magnification": float(magnification), "pitch": LENGTH.text(pitch)}

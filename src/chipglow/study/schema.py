@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Annotated, Any, Self
 
-from chipglow.analysis import Plan, WavelengthPlan
+from chipglow.analysis import AttributionPlan, Plan, WavelengthPlan
 from chipglow.camera import AnnularAperturePSF
-from chipglow.quantities import FileBeside, Parameter, Part, changed
+from chipglow.quantities import FileBeside, Parameter, Part, changed, value_at
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
-from chipglow.study.scaling import scaled
+from chipglow.study.scaling import DERIVED, VIEWS, scaled, without
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 from chipglow.text import commented_yaml
 
@@ -41,9 +41,8 @@ class Study(Part):
     scene: Annotated[
         FileBeside | None,
         Parameter(
-            "File of a scene that takes the place of the cut, such as one of chipglow import. Its "
-            "own times and samples count; of the section cutting only the tool, if the scene has "
-            "none.",
+            "Scene file to measure instead of a cut, such as the output of chipglow import. The "
+            "section cutting is then ignored, except for its tool if the scene has none.",
             allowed="none, or a file beside this one: scene.nc",
         ),
     ] = None
@@ -60,6 +59,11 @@ class Study(Part):
         field(default_factory=Plan)
     )
 
+    attribution: Annotated[
+        AttributionPlan | None,
+        Parameter("Effects among which the error of each pixel is divided; none: it is not."),
+    ] = field(default_factory=AttributionPlan)
+
     wavelengths: Annotated[
         WavelengthPlan,
         Parameter("Bands that chipglow wavelengths compares, alone and as ratios."),
@@ -72,9 +76,10 @@ class Study(Part):
     @property
     def plan(self) -> Plan:
         """The plan of the analysis, with PSF widths around the camera's."""
-        plan, psf = self.analysis, self.camera.build().psf
+        plan = replace(self.analysis, attribution=self.attribution)
+        psf = self.camera.build().psf
         ratio = 1.0 if psf is None else psf.fwhm / AnnularAperturePSF().fwhm
-        if "psf_widths" not in plan.given and ratio != 1.0:
+        if "psf_widths" not in self.analysis.given and ratio != 1.0:
             widths = [float(f"{ratio * width:.3g}") for width in plan.psf_widths]
             plan = replace(plan, psf_widths=tuple(widths))
         if isinstance(self.surface, FeaturesSection):
@@ -122,6 +127,19 @@ class Study(Part):
         if isinstance(surface, Mapping) or (surface is None and "surface" in data):
             data = {**data, "surface": {"kind": "features", **(surface or {})}}
         return scaled(data, from_file)
+
+    def stated(self) -> dict[str, Any]:
+        """Return the given settings without those that follow from others."""
+        cutting = self.cutting.stated()
+        data = super().stated() | {"camera": self.camera.stated(), "cutting": cutting}
+        data["cutting"] |= {name: cutting[name].stated() for name in VIEWS if name in cutting}
+        try:
+            plain = type(self)(**without(data, DERIVED))
+        except ValueError:  # what is left is impossible
+            return data
+        return without(
+            data, [path for path in DERIVED if value_at(plain, path) == value_at(self, path)]
+        )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -5,6 +5,7 @@ from math import sqrt
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from chipglow.quantities import Array
@@ -12,6 +13,13 @@ from chipglow.scene import Raster
 
 _ROUNDING: Final = 1e-6
 """Lengths below this fraction of a pixel or sample are rounding errors."""
+
+LEAST_COVERED: Final = 0.05
+"""Part of a sample's width that a pixel must cover for the sample to count in its maximum.
+
+Where a whole number of samples makes a pixel, a pitch that was rounded adds up to slivers of the
+neighbours' samples. A single hot one would be the reference of the whole pixel.
+"""
 
 
 def overlap_lengths(left: Array, width: float, samples: int, spacing: float) -> Array:
@@ -66,7 +74,28 @@ def integrate(radiance: Array, scene: Raster, sensors: Raster, fill_factor: floa
     return np.asarray((across @ (down @ radiance).T).T)
 
 
-@lru_cache(maxsize=256)  # an analysis uses each pixel phase many times
+def largest(
+    values: NDArray[np.floating], scene: Raster, sensors: Raster, fill_factor: float
+) -> Array:
+    """Return the largest value of the samples in every pixel's sensitive square; NaN for none."""
+    side = sensors.spacing * sqrt(fill_factor)
+    known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
+    columns = _covered(sensors.x - scene.left, side, scene.columns, scene.spacing)
+    rows = _covered(scene.top - sensors.y, side, scene.rows, scene.spacing)
+    down = np.stack([known[part].max(axis=0) for part in rows])
+    maximum = np.stack([down[:, part].max(axis=1) for part in columns], axis=1)
+    return np.where(np.isfinite(maximum), maximum, np.nan).astype(np.float64)
+
+
+def _covered(centres: Array, side: float, samples: int, spacing: float) -> list[slice]:
+    """Return the samples under each pixel along a line, without slivers."""
+    least = LEAST_COVERED * min(spacing, side)
+    covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
+    first = covered.argmax(axis=1)
+    return [slice(i, i + n) for i, n in zip(first, covered.sum(axis=1), strict=True)]
+
+
+@lru_cache(maxsize=256)  # an analysis returns to each of its pixel phases many times
 def line_weights(
     scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[sparse.csr_array, sparse.csr_array]:

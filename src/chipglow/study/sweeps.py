@@ -1,0 +1,387 @@
+"""Sweeps: a study at many settings, one file per point, continued after any interruption."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from hashlib import file_digest, sha256
+from importlib.metadata import version
+from itertools import product
+from pathlib import Path
+from typing import Any, Final, Literal, TypeAlias, get_args
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+import yaml
+from scipy.stats import qmc
+
+from chipglow.analysis import Analysis, headlines
+from chipglow.io.atomic import atomic_path
+from chipglow.quantities import adapter, changed, setting_at
+from chipglow.study.running import Progress, cut, is_cut, run, scene_inputs
+from chipglow.study.schema import Study
+from chipglow.study.workers import Client, local_client, on_client
+
+Method: TypeAlias = Literal["grid", "latin-hypercube", "sobol"]
+"""All combinations of the values, or samples between the first and the last value."""
+
+DESCRIPTION: Final = "sweep.json"
+"""File in the folder of a sweep with its axes and points."""
+
+NUMBERS: Final = ("reference", "error", "uncertainty", "psf_portion", "true_error")
+"""Numbers of each reading in K; the uncertainty is the expanded one of the error's mean."""
+
+_RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d+))?")
+_QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A study at many settings, in its folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder that contains a file for each computed point.
+    axes : mapping
+        Values of each varied setting by its path.
+    settings : tuple of mapping
+        Settings of each point, in SI where they have a unit.
+    keys : tuple of str
+        Names of the points' files: digests of study, scene and version.
+    is_grid : bool
+        Whether the points are all combinations of the values.
+    """
+
+    folder: Path
+    axes: Mapping[str, Sequence[Any]]
+    settings: tuple[Mapping[str, Any], ...]
+    keys: tuple[str, ...]
+    is_grid: bool
+
+    @classmethod
+    def open(cls, folder: str | Path) -> "Sweep":
+        """Open the sweep in a folder."""
+        folder = Path(folder)
+        stated = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
+        points, keys = tuple(stated["settings"]), tuple(stated["keys"])
+        return cls(folder, stated["axes"], points, keys, stated["is_grid"])
+
+    @cached_property
+    def records(self) -> tuple[Mapping[str, Any] | None, ...]:
+        """Content of each point's file; None if the point is missing."""
+        return tuple(map(_record, (point_file(self.folder, key) for key in self.keys)))
+
+    @property
+    def missing(self) -> tuple[int, ...]:
+        """Indices of the points that are not computed yet."""
+        return tuple(i for i, one in enumerate(self.records) if one is None)
+
+    @property
+    def failed(self) -> dict[int, str]:
+        """Reasons by the index of the point that failed."""
+        every = enumerate(self.records)
+        return {i: str(one["failed"]) for i, one in every if one is not None and "failed" in one}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a table with one row per point and reading: settings in SI, and numbers in K."""
+        rows = [
+            {"point": i, **self.settings[i], "reading": name}
+            | {f"{number}_K": value for number, value in numbers.items()}
+            for i, readings in enumerate(self._readings)
+            for name, numbers in readings.items()
+        ]
+        names = [f"{number}_K" for number in NUMBERS]
+        frame = pd.DataFrame(rows, columns=["point", *self.axes, "reading", *names])
+        return frame.astype(dict.fromkeys(names, np.float64))
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return `NUMBERS` in K over the varied settings and ``reading``; NaN where unknown.
+
+        A grid has a dimension named by the path of each setting. Otherwise the dimension is
+        ``point``, with the settings as coordinates. Settings with a unit are in SI.
+        """
+        names = list(dict.fromkeys(name for one in self._readings for name in one))
+        values = np.array(
+            [
+                [[one.get(name, {}).get(number) for name in names] for one in self._readings]
+                for number in NUMBERS
+            ],
+            np.float64,  # None becomes NaN
+        )
+        settings = {path: [one[path] for one in self.settings] for path in self.axes}
+        dims: list[str] = ["point"]
+        coordinates: dict[str, Any] = {path: ("point", one) for path, one in settings.items()}
+        if self.is_grid:
+            dims = list(self.axes)
+            coordinates = {path: list(dict.fromkeys(one)) for path, one in settings.items()}
+        shape = [len(coordinates[dim]) for dim in dims] if self.is_grid else [len(self.keys)]
+        data = values.reshape(len(NUMBERS), *shape, len(names))
+        variables = {
+            number: ((*dims, "reading"), one, {"units": "K"})
+            for number, one in zip(NUMBERS, data, strict=True)
+        }
+        return xr.Dataset(variables, coords=coordinates | {"reading": names})
+
+    @property
+    def _readings(self) -> list[Mapping[str, Mapping[str, float]]]:
+        return [(record or {}).get("readings", {}) for record in self.records]
+
+
+def sweep(
+    study: Study,
+    vary: Mapping[str, str | Sequence[Any]],
+    out: str | Path,
+    at: Sequence[str] = (),
+    method: Method = "grid",
+    samples: int = 64,
+    seed: int = 0,
+    client: Client | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> Sweep:
+    """Run a study at many settings; points that were computed before are not computed again.
+
+    Parameters
+    ----------
+    study : Study
+        The study; its seed is that of every point.
+    vary : mapping
+        Values by the path of a setting such as ``camera.integration_time``: a sequence, or text
+        such as ``2 us, 5 us`` or ``6 um:20 um:8`` (first, last, number).
+    out : str or Path
+        Folder of the results, of an earlier sweep or new.
+    at : sequence of str
+        Readings to keep, such as ``rake`` and ``band``; all by default.
+    method : {"grid", "latin-hypercube", "sobol"}
+        All combinations of the values, or samples between the first and the last value of each.
+    samples, seed : int
+        Number of samples, and the seed of their choice.
+    client : distributed.Client, optional
+        Client of a Dask cluster that computes the points.
+    workers : int, optional
+        Without a client: number of processes on this machine, by default one per core; 0 computes
+        in this process.
+    progress : callable, optional
+        Called with the current step and the fraction of it that is complete.
+
+    Returns
+    -------
+    Sweep
+        The results; points that failed are in `Sweep.failed`, with the reason.
+
+    Raises
+    ------
+    ValueError
+        If a path or a value is impossible for all points, or the folder contains other files.
+    ConnectionError
+        If the cluster is lost; the computed points are kept.
+    """
+    tell, folder = progress or (lambda step, done: None), Path(out)
+    axes = {path: axis(values) for path, values in vary.items()}
+    points = list(_points(axes, method, samples, seed))
+    # Neither is kept of a point, and each takes longer than the rest.
+    study = replace(
+        study, analysis=changed(study.analysis, {"psf_widths": ("8 um",)}), attribution=None
+    )
+    studies = _studies(study, points)
+    settings = [{path: _in_si(study, path, one[path]) for path in one} for one in points]
+    keys = [_key(one, at) for one in studies]
+    _write_description(Sweep(folder, axes, tuple(settings), tuple(keys), method == "grid"))
+    tasks = {
+        key: (one, tuple(at), path)
+        for key, one in zip(keys, studies, strict=True)
+        if not _is_done(path := point_file(folder, key))
+    }
+    new = [one for one, *_ in tasks.values() if isinstance(one, Study) and one.scene is None]
+    scenes = {json.dumps(scene_inputs(one)): one for one in new}
+    cuts = [(one,) for one in scenes.values() if not is_cut(one)]
+    with local_client(client, workers, max(len(tasks), len(cuts))) as computing:
+        for step, function, arguments in (
+            ("cuts", _cut, cuts),
+            ("points", compute_point, list(tasks.values())),
+        ):
+            for count, _ in enumerate(on_client(computing, function, arguments), 1):
+                tell(step, count / len(arguments))
+    return Sweep.open(folder)
+
+
+def axis(values: str | Sequence[Any]) -> list[Any]:
+    """Return the values of a varied setting: a list, or a text with a list or a range."""
+    if not isinstance(values, str):
+        return list(values)
+    if (ends := _RANGE.fullmatch(values)) is None:
+        return [yaml.safe_load(one) for one in values.split(",")]
+    first, last, count = ends.groups()
+    return [between(first, last, part) for part in np.linspace(0.0, 1.0, int(count or 2))]
+
+
+def between(first: object, last: object, part: float) -> str | float:
+    """Return the value at a fraction of the way between two values with the same unit."""
+    low, high = (_QUANTITY.fullmatch(str(end)) for end in (first, last))
+    if low is None or high is None or low[2] != high[2]:
+        raise ValueError(f"{first}:{last}: a range needs two numbers with the same unit")
+    value = float(low[1]) + part * (float(high[1]) - float(low[1]))
+    if low[2]:
+        return f"{value:.12g} {low[2]}"
+    return int(value) if value.is_integer() and "." not in low[1] + high[1] else value
+
+
+def point_file(folder: Path, key: str) -> Path:
+    """Return the file of a point."""
+    return folder / "points" / f"{key}.json"
+
+
+def compute_point(study: Study | str, at: Sequence[str], path: Path) -> None:
+    """Analyse a study and write its readings; an error is written with its reason."""
+    if _is_done(path):
+        return
+    try:
+        if isinstance(study, str):
+            raise ValueError(study)
+        record = _numbers(run(study), at)
+    except Exception as error:
+        record = {"failed": f"{type(error).__name__}: {error}"}
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(record, indent=1), encoding="utf-8")
+
+
+def _numbers(analysis: Analysis, at: Sequence[str]) -> dict[str, Any]:
+    known = headlines(analysis.data)
+    kept = {name: one for name, one in known.items() if not at or name in at or one.place in at}
+    if missing := [name for name in at if not any(name in (k, o.place) for k, o in kept.items())]:
+        raise ValueError(f"{', '.join(missing)}: not read, expected any of {', '.join(known)}")
+    readings = {
+        name: (
+            one.reference.mean,
+            one.error.mean,
+            one.error.expanded_uncertainty,
+            one.psf_portion.mean,
+            one.true_error.mean,
+        )
+        for name, one in kept.items()
+    }
+    return {
+        "readings": {
+            name: dict(zip(NUMBERS, map(_finite, values), strict=True))
+            for name, values in readings.items()
+        }
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _cut(study: Study) -> None:
+    """Compute the scene of a study; an error is left to its points."""
+    try:
+        cut(study)
+    except Exception:
+        return
+
+
+def _points(
+    axes: Mapping[str, Sequence[Any]], method: Method, samples: int, seed: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the settings of each point as a study takes them."""
+    if not axes:
+        raise ValueError("vary: is empty, expected one setting or more")
+    if method == "grid":
+        for values in product(*axes.values()):
+            yield dict(zip(axes, values, strict=True))
+        return
+    makers = {"latin-hypercube": qmc.LatinHypercube, "sobol": qmc.Sobol}
+    if method not in makers:
+        raise ValueError(f"method: {method!r} is unknown, expected one of {get_args(Method)}")
+    generator = np.random.default_rng(seed)
+    for row in makers[method](len(axes), seed=generator).random(samples):
+        parts = zip(axes.items(), row, strict=True)
+        yield {path: between(values[0], values[-1], part) for (path, values), part in parts}
+
+
+def _studies(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | str]:
+    """Return the study of each point, or why it is impossible."""
+    studies: list[Study | str] = []
+    for point in points:
+        try:
+            studies.append(changed(study, point))
+        except (ValueError, LookupError) as error:
+            stated = ", ".join(f"{path} = {value}" for path, value in point.items())
+            studies.append(f"{stated}: {error}")
+    if all(isinstance(one, str) for one in studies):
+        raise ValueError(studies[0])
+    return studies
+
+
+def _in_si(study: Study, path: str, value: Any) -> Any:
+    """Return the value of a setting in SI, or as it was given if it has no unit."""
+    try:
+        quantity = setting_at(study, path).parameter.quantity
+    except LookupError:
+        return value
+    return quantity.parse(value) if quantity and isinstance(value, str) else value
+
+
+def _key(study: Study | str, at: Sequence[str]) -> str:
+    """Return the digest of all that determines a point's numbers."""
+    if isinstance(study, str):
+        return _digest(study)
+    content = adapter(Study).dump_python(study, mode="json")
+    del content["title"], content["wavelengths"]
+    if study.scene is None:
+        content["cutting"] = scene_inputs(study)
+    given = sorted(study.analysis.given)
+    return _digest([_contents(content), given, sorted(at), version("chipglow")])
+
+
+def _contents(value: Any) -> Any:
+    """Return a value with the content of each file in place of its name."""
+    if isinstance(value, Mapping):
+        return {key: _contents(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_contents(one) for one in value]
+    if isinstance(value, str) and Path(value).suffix and Path(value).is_file():
+        status = Path(value).stat()
+        return _file_digest(value, status.st_mtime_ns, status.st_size)
+    return value
+
+
+@lru_cache
+def _file_digest(path: str, modified: int, size: int) -> str:
+    with Path(path).open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
+
+
+def _digest(content: Any) -> str:
+    return sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:32]
+
+
+def _write_description(plan: Sweep) -> None:
+    folder = plan.folder
+    if folder.exists() and any(folder.iterdir()) and not (folder / DESCRIPTION).exists():
+        raise ValueError(f"{folder}: contains no sweep; choose a new or empty folder")
+    (folder / "points").mkdir(parents=True, exist_ok=True)
+    content = {
+        "axes": {path: list(map(str, values)) for path, values in plan.axes.items()},
+        "settings": plan.settings,
+        "keys": plan.keys,
+        "is_grid": plan.is_grid,
+    }
+    with atomic_path(folder / DESCRIPTION) as temporary:
+        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def _record(path: Path) -> Mapping[str, Any] | None:
+    if not path.exists():
+        return None
+    record: Mapping[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return record
+
+
+def _is_done(path: Path) -> bool:
+    """Return whether a point was computed; one that failed is computed again."""
+    record = _record(path)
+    return record is not None and "failed" not in record

@@ -1,0 +1,88 @@
+"""Worker processes of a sweep: those of a Dask cluster, or of this machine."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from itertools import islice
+from os import cpu_count
+from typing import Any, Final, TypeAlias
+
+Client: TypeAlias = Any
+"""A `distributed.Client`."""
+
+_THREADS: Final = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+_TASKS_PER_WORKER: Final = 4
+"""Tasks that are submitted at a time, so that memory does not grow with the number of points."""
+
+_ALLOWED_FAILURES: Final = 10
+"""Number of workers that may die with a task before the task fails."""
+
+
+@contextmanager
+def local_client(client: Client | None, workers: int | None, most: int) -> Iterator[Client | None]:
+    """Yield the client, or one of new processes of this machine; None for this process."""
+    if client is not None or workers == 0 or most == 0:
+        yield client
+        return
+    try:
+        dask: Any = import_module("dask")
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise ImportError(
+            "a sweep on several processes needs Dask: install chipglow with the extra 'sweep', or "
+            "set the number of workers to 0"
+        ) from None
+    count = min(workers or cpu_count() or 1, most)
+    options = {"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES}
+    with (
+        dask.config.set(options),
+        distributed.LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            env=_THREADS,
+            dashboard_address=":0",  # any free port
+            silence_logs="ERROR",
+        ) as cluster,
+        distributed.Client(cluster) as own,
+    ):
+        yield own
+
+
+def on_client(
+    client: Client | None, function: Callable[..., None], every: Sequence[tuple[Any, ...]]
+) -> Iterator[None]:
+    """Call a function with each of many arguments; yield after each call that is finished."""
+    if client is None:
+        for arguments in every:
+            function(*arguments)
+            yield
+        return
+    distributed: Any = import_module("distributed")
+    waiting = iter(every)
+
+    def submit(count: int) -> list[Any]:
+        return [
+            client.submit(_with_one_thread, function, *arguments, pure=False)
+            for arguments in islice(waiting, count)
+        ]
+
+    running = distributed.as_completed(submit(_TASKS_PER_WORKER * max(len(client.ncores()), 1)))
+    for future in running:
+        # Not `result`, which would fetch it and repeat the task if its worker died meanwhile.
+        if future.status == "error":
+            raise future.exception()
+        if future.status == "cancelled":
+            raise ConnectionError(
+                "the scheduler of the cluster is lost; the computed points are kept, run the sweep "
+                "again to continue"
+            )
+        future.release()
+        running.update(submit(1))
+        yield
+
+
+def _with_one_thread(function: Callable[..., None], *arguments: Any) -> None:
+    from numba import set_num_threads
+
+    set_num_threads(1)
+    function(*arguments)

@@ -1,0 +1,243 @@
+"""Sweeps: each point equals its own run, and what was computed stays."""
+
+import json
+import os
+import signal
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from chipglow.analysis import headlines
+from chipglow.cli import app
+from chipglow.io import write_scene
+from chipglow.quantities import changed, setting_at
+from chipglow.report.sweep_figure import draw_sweep
+from chipglow.scene import Raster, Scene
+from chipglow.study import Study, Sweep, errors, study_text, sweep
+from chipglow.study.sweeps import _key, axis
+from chipglow.study.workers import local_client, on_client
+
+EXPOSURES, PITCHES = ("2 us", "4 us"), ("3 um", "6 um", "9 um")
+GRID = {"camera.integration_time": EXPOSURES, "camera.pitch": PITCHES}
+PLACE = "hot, pixel"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A hot band that moves, and a point that it crosses."""
+    raster = Raster(left=-40e-6, top=40e-6, spacing=1e-6, rows=80, columns=80)
+    times = 1e-6 * np.arange(8)
+    frames = [600 + 500 * np.exp(-(((raster.x - 4.0 * t) / 10e-6) ** 2)) for t in times]
+    temperature = np.stack([np.broadcast_to(one, raster.shape) for one in frames])
+    path = tmp_path_factory.mktemp("sweep") / "band.nc"
+    write_scene(Scene.from_fields(raster, times, {"temperature": temperature}), path)
+    return Study(
+        scene=str(path),
+        surface={"kind": "uniform", "emissivity": 0.6},
+        camera={
+            "psf": {"kind": "gaussian", "fwhm": "8 um"},
+            "integration_time": "2 us",
+            "lower_limit": None,
+        },
+        analysis={"exposures": 3, "phases": 2, "points": {"hot": ("10 um", "0 um")}},
+    )
+
+
+@pytest.fixture(scope="module")
+def grid(study, tmp_path_factory):
+    return sweep(study, GRID, tmp_path_factory.mktemp("grid") / "out", at=("hot",), workers=0)
+
+
+def contents(one):
+    return {path.name: path.read_bytes() for path in (one.folder / "points").iterdir()}
+
+
+def test_each_point_of_a_grid_is_its_own_run(study, grid):
+    data = grid.to_xarray()
+    assert data.error.dims == ("camera.integration_time", "camera.pitch", "reading")
+    np.testing.assert_array_equal(data["camera.pitch"], [3e-6, 6e-6, 9e-6])
+    for exposure, pitch in (("2 us", "3 um"), ("4 us", "9 um")):
+        changes = {"camera.integration_time": exposure, "camera.pitch": pitch}
+        one = headlines(errors(changed(study, changes)).data)[PLACE]
+        at = {"camera.integration_time": float(exposure[0]) * 1e-6, "reading": PLACE}
+        point = data.sel(at).sel({"camera.pitch": float(pitch[0]) * 1e-6}, method="nearest")
+        assert float(point.error) == one.error.mean
+        assert float(point.uncertainty) == one.error.expanded_uncertainty
+        assert float(point.psf_portion) == one.psf_portion.mean
+        assert float(point.true_error) == one.true_error.mean
+
+
+def test_a_longer_exposure_of_a_moving_band_is_worse(grid):
+    short, long = grid.to_xarray().error.sel(reading=PLACE)
+    assert (np.abs(long) > np.abs(short)).all()
+
+
+def test_points_that_exist_are_kept_and_missing_ones_are_computed_again(study, grid, tmp_path):
+    first = sweep(study, {"camera.pitch": PITCHES[:2]}, tmp_path / "out", at=("hot",), workers=0)
+    files = sorted((first.folder / "points").iterdir())
+    before = [path.stat().st_mtime_ns for path in files]
+    again = sweep(study, {"camera.pitch": PITCHES}, tmp_path / "out", at=("hot",), workers=0)
+    assert [path.stat().st_mtime_ns for path in files] == before
+    whole = contents(again)
+    assert len(whole) == 3 and not again.missing and not again.failed
+    files[0].unlink()
+    opened = Sweep.open(tmp_path / "out")
+    assert len(opened.missing) == 1
+    assert np.isnan(opened.to_xarray().error).sum() == 1
+    again = sweep(study, {"camera.pitch": PITCHES}, tmp_path / "out", at=("hot",), workers=0)
+    assert contents(again) == whole
+
+
+def test_workers_give_the_same_bits(study, grid, tmp_path):
+    distributed = sweep(study, GRID, tmp_path / "out", at=("hot",), workers=2)
+    assert contents(distributed) == contents(grid)
+
+
+def test_a_change_of_the_scene_or_the_seed_is_another_point(study, tmp_path):
+    other = tmp_path / "other.nc"
+    changes = [
+        {},
+        {"title": "another"},
+        {"seed": 3},
+        {"camera.pitch": "5 um"},
+        {"analysis.phases": 3},
+    ]
+    keys = [_key(changed(study, one), ()) for one in changes]
+    assert keys[0] == keys[1]
+    assert len(set(keys)) == 4
+    other.write_bytes(Path(study.scene).read_bytes())
+    copied = changed(study, {"scene": str(other)})
+    assert _key(copied, ()) == keys[0]
+    other.write_bytes(b"another scene")
+    os.utime(other, ns=(0, 0))
+    assert _key(copied, ()) != keys[0]
+
+
+def test_a_point_that_fails_is_stated_and_the_others_are_computed(study, tmp_path):
+    vary = {"camera.integration_time": ("2 us", "40 us", "2 s")}
+    result = sweep(study, vary, tmp_path / "out", at=("hot",), workers=0)
+    assert list(result.failed) == [1, 2]
+    assert "lasts 8 us" in result.failed[1] and "integration_time" in result.failed[2]
+    assert np.isfinite(result.to_xarray().error.values).tolist() == [[True], [False], [False]]
+    assert list(result.to_frame().point) == [0]
+
+
+@pytest.mark.parametrize(
+    ("vary", "more", "text"),
+    [
+        ({"camera.pich": ("5 um",)}, {}, "pich"),
+        ({"camera.pitch": ("5",)}, {}, "has no unit"),
+        ({}, {}, "one setting or more"),
+        ({"camera.pitch": "5 um:6 us:3"}, {}, "same unit"),
+        ({"camera.pitch": ("5 um", "6 um")}, {"method": "random"}, "unknown"),
+    ],
+)
+def test_impossible_sweeps_write_nothing(study, tmp_path, vary, more, text):
+    with pytest.raises(ValueError, match=text):
+        sweep(study, vary, tmp_path / "out", workers=0, **more)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_with_other_files_is_refused(study, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match="contains no sweep"):
+        sweep(study, GRID, tmp_path, workers=0)
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("2us,5 us", ["2us", "5 us"]),
+        ("6um:20um:8", [f"{n} um" for n in range(6, 21, 2)]),
+        ("1:4:4", [1, 2, 3, 4]),
+        ("0.2:0.4:3", [0.2, pytest.approx(0.3), 0.4]),
+        ("optics,detector", ["optics", "detector"]),
+        (("3 um", None), ["3 um", None]),
+    ],
+)
+def test_values_of_an_axis(text, values):
+    assert axis(text) == values
+
+
+@pytest.mark.parametrize("method", ["latin-hypercube", "sobol"])
+def test_samples_fill_their_ranges_and_follow_from_the_seed(study, tmp_path, method):
+    vary = {"camera.pitch": "3 um:9 um", "camera.integration_time": "2 us:4 us"}
+    options = {"method": method, "samples": 4, "workers": 0, "at": ("hot",)}
+    one, same, other = (
+        sweep(study, vary, tmp_path / str(number), seed=seed, **options)
+        for number, seed in enumerate((1, 1, 2))
+    )
+    assert one.settings == same.settings != other.settings
+    # Both methods put one sample into each quarter of a range.
+    for path, low, high in (("camera.pitch", 3e-6, 9e-6), ("camera.integration_time", 2e-6, 4e-6)):
+        values = np.array([point[path] for point in one.settings])
+        quarters = np.floor(4 * (values - low) / (high - low)).astype(int)
+        assert sorted(quarters) == [0, 1, 2, 3]
+    assert one.to_xarray().error.dims == ("point", "reading")
+
+
+def write_once(folder, number, lethal):
+    """Write a file; at the first time a lethal number kills its process."""
+    mark = folder / f"tried-{number}"
+    if number in lethal and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    (folder / f"{number}-{os.getpid()}-{len(list(folder.glob(f'{number}-*')))}").touch()
+
+
+def test_a_killed_worker_costs_its_task_alone(tmp_path):
+    function = partial(write_once, tmp_path)
+    with local_client(None, 2, 40) as client:
+        done = sum(1 for _ in on_client(client, function, [(n, (7, 23)) for n in range(40)]))
+    assert done == 40
+    times = [len(list(tmp_path.glob(f"{number}-*"))) for number in range(40)]
+    assert min(times) == 1
+    # A worker's finished tasks may be repeated only while the client has not released them.
+    assert sum(times) <= 40 + 2
+
+
+def test_the_figure_draws_each_point_over_each_setting(study, tmp_path):
+    vary = {
+        "camera.psf.fwhm": ("6 um", "12 um"),
+        "camera.pitch": ("3 um", "9 um"),
+        "camera.integration_time": ("2 us", "3 us", "4 us"),
+    }
+    data = sweep(study, vary, tmp_path / "out", at=("hot",), workers=0).to_xarray()
+    quantities = {path: setting_at(study, path).parameter.quantity for path in vary}
+    figure = draw_sweep(data, quantities)
+    assert [panel.get_xlabel() for panel in figure.axes] == [
+        "fwhm / µm", "pitch / µm", "integration time / µs",
+    ]  # fmt: skip
+    for panel, path in zip(figure.axes, vary, strict=True):
+        drawn = set(zip(*(values.tolist() for values in panel.lines[0].get_data()), strict=True))
+        expected = {
+            (round(1e6 * float(one[path]), 6), float(one.error))
+            for one in (
+                data.isel(dict(zip((*vary, "reading"), (*index, 0), strict=True)))
+                for index in np.ndindex(2, 2, 3)
+            )
+        }
+        assert drawn == expected
+
+
+def test_the_command_writes_table_arrays_and_figure(study, tmp_path):
+    file = tmp_path / "study.yaml"
+    file.write_text(study_text(study))
+    arguments = ["sweep", str(file), "--vary", "camera.integration_time=2us,4us", "--at", "hot"]
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, [*arguments, "--workers", "0", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "2 points: 2 computed, 0 failed." in done.output and "4 us" in done.output
+    assert {path.name for path in out.iterdir()} == {
+        "points", "sweep.json", "sweep.csv", "sweep.nc", "sweep.png",
+    }  # fmt: skip
+    with xr.open_dataset(out / "sweep.nc", engine="h5netcdf") as data:
+        stored = data.error.sel(reading=PLACE).values
+    records = [json.loads(path.read_text()) for path in (out / "points").iterdir()]
+    assert sorted(stored) == sorted(one["readings"][PLACE]["error"] for one in records)
+    wrong = CliRunner().invoke(app, ["sweep", str(file), "--vary", "pitch", "--out", str(out)])
+    assert wrong.exit_code == 2 and "PATH=VALUES" in wrong.stderr
