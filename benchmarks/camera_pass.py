@@ -75,7 +75,7 @@ class GivenSurface(Surface):
     def __init__(self, values, times):
         self.values, self.times = values, times
 
-    def on(self, scene, band=None, reflected=None):
+    def prepare(self, scene, band=None, reflected=None):
         return EmissivityField(self.of, frozenset())
 
     def of(self, frame):
@@ -172,7 +172,7 @@ def read_once(arrays):
 def study(scene, instants):
     """Measure both chips at instants over a scene, as in the paper's study."""
     camera = Camera.paper()
-    fields = [camera.lay(chip, scene) for chip in (CHIP_1, CHIP_2)]
+    fields = [camera.prepare(chip, scene) for chip in (CHIP_1, CHIP_2)]
     starts = spread_starts(scene, camera.integration_time, instants)
     exposures = [camera.expose_fields(scene, fields, start) for start in starts]
     return [camera.form_measurement(chip) for chip in zip(*exposures, strict=True)]

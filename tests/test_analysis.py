@@ -545,7 +545,7 @@ def test_every_draw_is_the_loop_of_figure_6(chip):
     frames = [scene.frame(i) for i in range(first, first + 20)]
     place = scene.tool.rake_point(result.places[0].contact_length / 2)
     for texture in range(2):
-        field = replace(CHIP_2, seed=CHIP_2.seed + texture).on(scene)
+        field = replace(CHIP_2, seed=CHIP_2.seed + texture).prepare(scene)
         emissivities = [field.emissivity(frame) for frame in frames]
         for phase in range(phases**2):
             down, right = divmod(phase, phases)

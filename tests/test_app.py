@@ -120,7 +120,7 @@ def test_the_numbers_are_those_of_the_pixel_and_the_sample(model):
     # The image of the scene is in °C, in 32 bits.
     true = nearest(frame.temperature, scene.raster, at)
     assert numbers["sample temperature"] == pytest.approx(true, abs=1e-3)
-    laid = camera.lay(surface, scene).emissivity(frame)
+    laid = camera.prepare(surface, scene).emissivity(frame)
     assert numbers["sample emissivity"] == nearest(laid, scene.raster, at)
 
 
@@ -467,7 +467,7 @@ def test_only_the_newest_job_is_done():
 
 def test_a_pass_that_nobody_waits_for_ends_early(opened):
     scene, camera = opened.scene, Study().camera.build()
-    views = [View(camera.lay(CHIP_1, scene), camera.band)]
+    views = [View(camera.prepare(CHIP_1, scene), camera.band)]
     start = opened.controls.initial.study.start
     calls = []
 

@@ -63,11 +63,11 @@ def test_a_tilted_camera_sees_the_plane_at_that_angle():
     scene = a_scene()
     law = Fresnel(n=4.6, k=15.0, tilt=radians(60.0))
     plain, tilted = (
-        surface.on(scene).emissivity(scene.frame(0))
+        surface.prepare(scene).emissivity(scene.frame(0))
         for surface in (UniformSurface(0.3), UniformSurface(0.3).modified(law))
     )
     np.testing.assert_allclose(tilted, plain * law.ratio(0.5), rtol=1e-6)
-    full = UniformSurface(0.95).modified(law).on(scene).emissivity(scene.frame(0))
+    full = UniformSurface(0.95).modified(law).prepare(scene).emissivity(scene.frame(0))
     assert full.max() == 1.0
 
 

@@ -474,7 +474,7 @@ def even_scene(temperature, strain=1.0, rate=0.0):
 def shown(surface, *of_scene):
     """The emissivity that a surface has in an even scene."""
     scene = even_scene(*of_scene)
-    return surface.on(scene).emissivity(scene.frame(0))
+    return surface.prepare(scene).emissivity(scene.frame(0))
 
 
 @pytest.mark.usefixtures("two")

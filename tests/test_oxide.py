@@ -34,7 +34,7 @@ def scene(times, temperature, speed=0.0, material=1):
 
 
 def grown(made, index, oxide=OXIDE):
-    return OxideHistory.of(made, oxide).thickness(made.frame(index))
+    return OxideHistory.from_scene(made, oxide).thickness(made.frame(index))
 
 
 @given(st.floats(500.0, 1400.0), st.floats(1e-6, 1e-3), st.floats(0.0, 20e-9))
@@ -87,7 +87,7 @@ def test_oxide_follows_the_material_and_not_the_place():
     # The strip's 30 um come through 30 frames, in each of which the whole cell is in it.
     np.testing.assert_allclose(thickness[:, inside], expected, rtol=1e-4)
     assert thickness[:, away].max() < 1e-3 * expected
-    emissivity = SURFACE.on(made).emissivity(made.frame(30))
+    emissivity = SURFACE.prepare(made).emissivity(made.frame(30))
     np.testing.assert_allclose(emissivity[:, inside], OXIDE.of_thickness(BARE, expected), rtol=1e-6)
 
 
@@ -105,7 +105,7 @@ def test_what_comes_into_view_later_grows_from_then_on():
 def test_the_tool_has_none_and_none_is_none():
     made = scene([0.0, 1e-3], lambda t, x, y: np.full(x.shape, 1200.0), material=2)
     assert not grown(made, 1).any()
-    np.testing.assert_allclose(SURFACE.on(made).emissivity(made.frame(1)), BARE)
+    np.testing.assert_allclose(SURFACE.prepare(made).emissivity(made.frame(1)), BARE)
     assert OXIDE.of_thickness(BARE, 0.0) == BARE
     assert OXIDE.of_thickness(BARE, 1e-3) == pytest.approx(OXIDE.emissivity)
 
@@ -120,4 +120,4 @@ def test_growth_is_that_of_arrhenius():
 def test_a_scene_without_material_coordinates_is_refused():
     made = Scene.from_fields(RASTER, [0.0], {"temperature": np.full((1, *RASTER.shape), 500.0)})
     with pytest.raises(ValueError, match="oxide: the scene has no material coordinates"):
-        SURFACE.on(made)
+        SURFACE.prepare(made)

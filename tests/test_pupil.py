@@ -208,12 +208,12 @@ def test_a_band_is_the_sum_of_its_wavelengths():
 
 
 def test_an_f_number_is_a_numerical_aperture():
-    found = Pupil(f_number=2.5, obscuration=0.3).of_camera(MWIR, 2.5)
-    airy = AiryAperture(f_number=2.5).of_camera(MWIR, 2.5)
+    found = Pupil(f_number=2.5, obscuration=0.3).for_camera(MWIR, 2.5)
+    airy = AiryAperture(f_number=2.5).for_camera(MWIR, 2.5)
     assert found == PupilPSF(MWIR, airy.numerical_aperture, 0.3)
     assert airy.wavelength == pytest.approx(4.45e-6)
     with pytest.raises(ValueError, match="magnification: is missing"):
-        Pupil(f_number=2.5).of_camera(MWIR, None)
+        Pupil(f_number=2.5).for_camera(MWIR, None)
 
 
 def test_transfer_of_a_clear_pupil():

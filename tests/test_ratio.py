@@ -144,7 +144,7 @@ def test_bands_of_which_one_holds_the_other_have_a_range():
 
 
 def test_views_of_several_bands_are_those_of_each_alone(analytic_scene):
-    surfaces = [replace(chip, follow="mean").on(analytic_scene) for chip in (CHIP_1, CHIP_2)]
+    surfaces = [replace(chip, follow="mean").prepare(analytic_scene) for chip in (CHIP_1, CHIP_2)]
     views = [
         View(surface, band, reflected)
         for surface in surfaces
@@ -174,7 +174,7 @@ def test_diffraction_grows_with_the_wavelength_and_other_blurs_do_not():
 
 
 def emissivity(surface, band):
-    return surface.on(sloping(), band).emissivity(sloping().frame(0))
+    return surface.prepare(sloping(), band).emissivity(sloping().frame(0))
 
 
 def test_an_emissivity_that_is_the_laws_stays_the_laws():

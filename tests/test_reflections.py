@@ -330,7 +330,7 @@ def test_nearly_isothermal_surroundings():
 def test_a_hot_tool_makes_more_light_than_a_blackbody_would():
     scene = a_scene(-7.0, chip=WARM, tool=HOT)
     surface = UniformSurface(0.3).modified(Wedge(rake_emissivity=1.0))
-    field = CAMERA.lay(surface, scene)
+    field = CAMERA.prepare(surface, scene)
     emissivity = field.emissivity(scene.frame(0))
     assert emissivity.max() > 1.5
     radiance = apparent(scene, surface)
@@ -352,15 +352,15 @@ def test_where_nothing_touches_the_face_all_is_as_without(camera):
 def test_it_reads_no_more_of_a_scene_than_the_bare_surface():
     scene = a_scene()
     for bare in (CHIP_1, UniformSurface(CHIP)):
-        field = CAMERA.lay(bare.modified(Wedge()), scene)
-        assert EmissivityStack([field, field]).needed == bare.on(scene).fields
+        field = CAMERA.prepare(bare.modified(Wedge()), scene)
+        assert EmissivityStack([field, field]).required_fields == bare.prepare(scene).fields
 
 
 def test_several_surfaces_are_seen_as_each_alone():
     scene = a_scene(-7.0)
     surfaces = [chip.modified(Wedge()) for chip in (CHIP_1, CHIP_2)]
     surfaces += [CHIP_1.modified(Wedge(mirror=1.0)), CHIP_2]
-    views = [View(CAMERA.lay(surface, scene), BAND) for surface in surfaces]
+    views = [View(CAMERA.prepare(surface, scene), BAND) for surface in surfaces]
     for chosen in (slice(0, 2), slice(0, 4)):
         together = expose(scene, views[chosen], 0.0, 1e-5)
         for exposure, surface in zip(together, surfaces[chosen], strict=True):

@@ -131,7 +131,7 @@ def killed_run(study, rng, *options):
 
 def progress_of_all(study):
     """How far the runs are, also those that go on."""
-    folder = running.scene_path(running._inputs(study)).parent
+    folder = running.scene_path(running.scene_inputs(study)).parent
     for path in folder.glob(".scene-*.npz"):
         try:
             with np.load(path) as stored:
@@ -148,7 +148,7 @@ def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, unb
     assert not is_cut(study)
     killed_run(study, rng, "--resume")
     reached.append(kept_progress(study))
-    assert len(unfinished_scenes(running.scene_path(running._inputs(study)))) <= 2
+    assert len(unfinished_scenes(running.scene_path(running.scene_inputs(study)))) <= 2
     assert 0 < reached[0] < reached[1]
     with start("--resume") as process:
         _, errors = process.communicate(timeout=120)
@@ -210,7 +210,7 @@ def test_a_cut_that_is_stopped_goes_on_only_if_told_to(cache, unbroken):
 def test_a_broken_checkpoint_is_as_none(cache, unbroken):
     study = load_study("study.yaml")
     stopped(study, 30)
-    (left,) = unfinished_scenes(running.scene_path(running._inputs(study)))
+    (left,) = unfinished_scenes(running.scene_path(running.scene_inputs(study)))
     os.truncate(left.checkpoint, 1000)
     assert kept_progress(study) == 0
     path = cut(study, resume=True)

@@ -94,13 +94,11 @@ def test_rows_beside_the_pixels_go_with_the_nearest(moving):
 
 def test_what_is_too_short_is_one_error(moving):
     late = camera(line_time=1.2e-6)
-    text = "line_time: the last row's exposure begins 3.48e-05 s after the first's; exposure: "
+    text = "line_time: the last row is exposed 3.48e-05 s after the first; exposure: "
     with pytest.raises(ValueError, match=re.escape(text) + ".* is not within the scene"):
         late.measure(moving, BLACK, 0.0)
-    with pytest.raises(
-        ValueError, match=r"line_time: 0.0001 s, expected up to 5.556e-05 s: 30 rows"
-    ):
+    with pytest.raises(ValueError, match=r"line_time: 0.0001 s .* 30 rows .* at most 5.556e-05 s"):
         camera(line_time=1e-4).measure(moving, BLACK, 0.0)
     for wrong in (0.0, -1e-6, 0.01, np.nan):
-        with pytest.raises(ValueError, match=r"line_time: .*, expected"):
+        with pytest.raises(ValueError, match="line_time: "):
             camera(line_time=wrong)

@@ -123,10 +123,10 @@ def test_emissivity_follows_the_temperature():
     ramp = np.linspace(500.0, 800.0, RASTER.columns) * np.ones((RASTER.rows, 1))
     frame = plate(ramp).frame(0)
     expected = np.clip(0.2 + 0.6 * (ramp - 600.0) / 100.0, 0.2, 0.8)
-    np.testing.assert_allclose(metal.on(plate()).emissivity(frame), expected, atol=1e-6)
+    np.testing.assert_allclose(metal.prepare(plate()).emissivity(frame), expected, atol=1e-6)
     melting = TemperatureSurface(((500.0, 0.2), (650.0, 0.2), (650.0, 0.5), (800.0, 0.5)))
     expected = np.where(ramp.astype(np.float32) < 650.0, 0.2, 0.5)
-    np.testing.assert_allclose(melting.on(plate()).emissivity(frame), expected, atol=1e-6)
+    np.testing.assert_allclose(melting.prepare(plate()).emissivity(frame), expected, atol=1e-6)
     for table, wrong in (
         (((600.0, 0.2),), "2 or more"),
         (((700.0, 0.2), (600.0, 0.3)), "ascending"),

@@ -83,4 +83,4 @@ def test_resistivity_grows_with_temperature():
 
 def test_without_a_camera_there_is_no_band():
     with pytest.raises(ValueError, match="spectral: no band"):
-        TABLE.on(scene(500.0))
+        TABLE.prepare(scene(500.0))

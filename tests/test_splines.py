@@ -256,7 +256,7 @@ def test_a_pass_over_splines_is_that_over_their_samples(tmp_path, follow):
     surfaces = [replace(one, follow=follow, grain=7e-6) for one in (CHIP_1, CHIP_2, BOUNDED)]
     for start, duration in ((0.0, 6 * STEP), (0.3 * STEP, 3.1 * STEP)):
         passes = [
-            expose(one, [View(s.on(one), BAND, 500.0) for s in surfaces], start, duration)
+            expose(one, [View(s.prepare(one), BAND, 500.0) for s in surfaces], start, duration)
             for one in (scene, samples)
         ]
         for found, expected in zip(*passes, strict=True):
@@ -271,7 +271,7 @@ def test_a_row_that_begins_later_is_that_of_a_later_exposure(tmp_path):
     delays = np.repeat([0.0, 0.7, 1.5, 3.0], RASTER.rows)[::4][: RASTER.rows] * STEP
     for one in (scene, in_memory(scene)):
         for surface in (CHIP_1, UniformSurface(0.4)):
-            views = [View(surface.on(one), BAND)]
+            views = [View(surface.prepare(one), BAND)]
             (rolling,) = expose(one, views, 0.3 * STEP, 2.2 * STEP, delays)
             for delay in set(delays.tolist()):
                 later, rows = (
@@ -291,7 +291,7 @@ def test_a_row_that_begins_later_is_that_of_a_later_exposure(tmp_path):
 def test_the_pass_is_the_literal_sum(tmp_path):
     scene = open_scene(a_file(tmp_path / "scene.nc"))
     for surface in (CHIP_1, UniformSurface(0.4)):
-        field = surface.on(scene)
+        field = surface.prepare(scene)
         (found,) = expose(scene, [View(field, BAND)], 0.0, 6 * STEP)
         radiance, hottest = [], []
         for frame in scene.frames():
@@ -314,7 +314,7 @@ def test_the_pass_does_not_depend_on_the_number_of_threads(tmp_path):
     try:
         for threads in (1, before):
             numba.set_num_threads(threads)
-            found += expose(scene, [View(CHIP_1.on(scene), BAND)], 0.0, 6 * STEP)
+            found += expose(scene, [View(CHIP_1.prepare(scene), BAND)], 0.0, 6 * STEP)
     finally:
         numba.set_num_threads(before)
     np.testing.assert_array_equal(found[0].mean_radiance, found[1].mean_radiance)
@@ -327,7 +327,7 @@ def test_the_table_of_radiance_is_close_enough():
     temperature[0, 0] = 250.0 + (np.arange(50) + 0.5) / STEPS_PER_KELVIN  # the worst places
     raster = Raster(0.0, 0.0, 1e-6, 40, 50)
     scene = Scene.from_fields(raster, [0.0], {"temperature": temperature})
-    (found,) = expose(scene, [View(UniformSurface(1.0).on(scene), BAND)], 0.0, 1e-6)
+    (found,) = expose(scene, [View(UniformSurface(1.0).prepare(scene), BAND)], 0.0, 1e-6)
     np.testing.assert_allclose(
         found.mean_radiance, BAND.radiance(temperature[0].astype(float)), rtol=6e-7
     )
@@ -347,7 +347,7 @@ def test_only_what_a_surface_needs_is_read(tmp_path, monkeypatch):
             | {"plastic_strain", "plastic_strain_rate"},
         ),
     ):
-        field = surface.on(scene)
+        field = surface.prepare(scene)
         read.clear()
         expose(scene, [View(field, BAND)], 0.0, 6 * STEP)
         assert sorted(read) == sorted((name, index) for name in names for index in range(6))

@@ -69,7 +69,7 @@ CAMERAS = {
     "Distortion(": {"optics": (Distortion(fraction=0.02, radius=3e-4),)},
     "integration time": {"integration_time": 2e-6},
     "500.0": {"frame_rate": 500.0},
-    "shutter rolling, 2e-08 s a row": {"line_time": 2e-8},
+    "shutter rolling, 2e-08 s per row": {"line_time": 2e-8},
     "lower range limit 300 °C": {"lower_limit": 573.15},
     "333.15": {"reflected": 333.15},
     "detector_response EnergyResponse(": reading(),

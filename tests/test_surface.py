@@ -132,7 +132,7 @@ def test_surfaces_beside_each_other_are_those_alone():
     many = [replace(chip, seed=seed) for seed in (3, 1, 2) for chip in (CHIP_1, CHIP_2)]
     low = replace(CHIP_1, chip=Emissivity(0.05, 0.04))
     for surfaces in ([*many, low], [CHIP_1, UniformSurface(0.3), low], [CHIP_2]):
-        fields = [surface.on(scene) for surface in surfaces]
+        fields = [surface.prepare(scene) for surface in surfaces]
         found = EmissivityStack(fields).emissivities(frame)
         for one, field in zip(found, fields, strict=True):
             # The sums of one map and of several are fused in another order: one unit of float32.
@@ -204,7 +204,7 @@ def test_blend_against_plain_numpy(seed):
     # Positions of up to 50 nodes are rounded to float32, by 2^-19 across and down: the steepest
     # slope of a map times that. Besides, some 16 roundings of numbers below 1.
     steepest = max(greatest_slope(CHIP_1.textures[name]) for name in maps)
-    found = CHIP_1.on(scene).emissivity(frame)
+    found = CHIP_1.prepare(scene).emissivity(frame)
     assert found.dtype == np.float32
     tolerance = 2 * steepest * 2.0**-19 + 16 * 2.0**-24
     np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
@@ -218,7 +218,7 @@ def test_void_is_0_and_the_tool_does_not_move():
     moved = (np.stack([x, x - 4e-6, x - 8e-6]), np.stack([y, y, y]))
     scene = a_scene(times, moved, material=material, velocity_x=4.0)
     for follow in ("material", "mean"):
-        field = replace(CHIP_1, follow=follow).on(scene)
+        field = replace(CHIP_1, follow=follow).prepare(scene)
         maps = [field.emissivity(frame) for frame in scene.frames()]
         tool = CHIP_1.textures["tool"].at(x[:, 40:], y[:, 40:])
         for found in maps:
@@ -250,7 +250,7 @@ def test_texture_moves_with_the_material(feature, follow):
         velocity_x=velocity[0],
         velocity_y=velocity[1],
     )
-    field = replace(CHIP_1, follow=follow).on(scene)
+    field = replace(CHIP_1, follow=follow).prepare(scene)
     first, *_, last = (field.emissivity(frame) for frame in scene.frames())
     down, right = RASTER.rows - 3 * up, RASTER.columns - 3 * across
     # Positions in float32 are good to 1e-11 m, and the texture changes by 0.01 a micrometre.
@@ -271,7 +271,7 @@ def test_mean_shift_is_velocity_times_time():
         velocity_x=np.where(upper, np.where(middle, 2.0, 1.0), 4.0),
         velocity_y=np.where(upper, np.where(middle, 1.5, 3.0), 0.5),
     )
-    field = replace(CHIP_1, follow="mean").on(scene)
+    field = replace(CHIP_1, follow="mean").prepare(scene)
     velocity = np.array([[4.0, 0.0], [1.0, 3.0], [2.0, 1.5]])
     for time in (0.0, 0.4e-6, 2e-6, 4e-6):
         np.testing.assert_allclose(field.bare.shift(time), velocity * time, rtol=1e-6, atol=1e-18)
@@ -281,7 +281,7 @@ def test_mean_shift_integrates_a_changing_velocity():
     times = np.linspace(0.0, 4e-6, 5)
     speed = 2.0 + 1e6 * times
     scene = a_scene(times, velocity_x=speed[:, None, None])
-    field = replace(CHIP_1, follow="mean").on(scene)
+    field = replace(CHIP_1, follow="mean").prepare(scene)
     # The trapezoidal rule is exact for a velocity that rises linearly.
     np.testing.assert_allclose(field.bare.shift(4e-6)[0], [2.0 * 4e-6 + 0.5e6 * 4e-6**2, 0.0])
     np.testing.assert_array_equal(field.bare.shift(4e-6)[1:], 0.0)
@@ -291,7 +291,7 @@ def test_a_feature_keeps_its_velocity_while_it_is_not_seen():
     times = np.array([0.0, 1e-6, 2e-6])
     rate = np.array([5e4, 0.0, 5e4])[:, None, None]
     scene = a_scene(times, plastic_strain=0.9, plastic_strain_rate=rate, velocity_y=3.0)
-    field = replace(CHIP_1, follow="mean").on(scene)
+    field = replace(CHIP_1, follow="mean").prepare(scene)
     np.testing.assert_allclose(field.bare.shift(2e-6)[2], [0.0, 6e-6])
 
 
@@ -299,7 +299,7 @@ def test_a_uniform_surface_is_black_but_for_the_void():
     material = np.full(RASTER.shape, WORKPIECE)
     material[0], material[1] = VOID, TOOL
     scene = a_scene(material=material)
-    found = UniformSurface(1.0).on(scene).emissivity(scene.frame(0))
+    found = UniformSurface(1.0).prepare(scene).emissivity(scene.frame(0))
     assert (found[0] == 0).all()
     assert (found[1:] == 1).all()
 

@@ -46,7 +46,7 @@ def main() -> None:
     first, second = (replace(camera.in_band(band), lower_limit=None) for band in (SHORT, LONG))
     pair = RatioCamera(first, second, shift=(1e-6, 0.0))
     errors = ratio_errors(pair, scene, CHIP_1, 379e-6)
-    draw_images(errors, pair.placed(scene.raster)[0].pixels(scene.raster), scene.tool)
+    draw_images(errors, pair.with_common_pixels(scene.raster)[0].pixels(scene.raster), scene.tool)
     grey, metal = (chipglow.wavelengths(study(quick, law)) for law in ("none", METAL))
     draw_wavelengths(grey).savefig(HERE / "ratio-wavelengths.png", dpi=150)
     print_study(grey, metal)

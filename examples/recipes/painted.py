@@ -24,7 +24,7 @@ class PaintedSurface(Surface):
     top: Annotated[float, Parameter("Upper edge of the paint.", POSITION)] = 0.0
     paint: Annotated[float, Parameter("Emissivity of the paint.", least=0.0, most=1.0)] = 0.95
 
-    def on(self, scene, band=None, reflected=None) -> EmissivityField:
+    def prepare(self, scene, band=None, reflected=None) -> EmissivityField:
         """Lay the paint on the samples of a scene: emissivities of shape (y, x), 0 in the void."""
         across = np.abs(scene.raster.x - self.left - self.width / 2) <= self.width / 2
         down = np.abs(self.top - scene.raster.y - self.width / 2) <= self.width / 2

@@ -37,7 +37,7 @@ with style():
     rows = figure.subplots(2, 2, sharex=True, sharey=True)
     surfaces = {"chip 1": chipglow.CHIP_1, "chip 2": chipglow.CHIP_2}
     for axes, (name, surface) in zip(rows, surfaces.items(), strict=True):
-        laid = camera.lay(surface, scene).emissivity(scene.frame(24))
+        laid = camera.prepare(surface, scene).emissivity(scene.frame(24))
         seen = camera.measure(scene, surface, scene.times[24])
         celsius = seen.radiance_temperature()[0] - KELVIN
         left = show_image(axes[0], laid, scene.raster, scene.tool, PLAIN, (0.2, 1.0))

@@ -264,9 +264,9 @@ def _sources(
 ) -> _Sources:
     band, plain = camera.band, _unreflecting(surface)
     views = [
-        View(camera.lay(surface, scene), band, camera.reflected),
-        View(plain.on(scene, band), band),
-        View(UniformSurface(1.0).on(scene, band), band),
+        View(camera.prepare(surface, scene), band, camera.reflected),
+        View(plain.prepare(scene, band), band),
+        View(UniformSurface(1.0).prepare(scene, band), band),
     ]
     delays = camera.row_delays(scene.raster)
     exposures = expose(scene, views, start, camera.integration_time, delays, check)

@@ -180,7 +180,7 @@ def analyse(
     """
     tell = progress or (lambda label, part: None)
     task = _Task(scene, surfaces, camera, plan, tell, effects)
-    fields = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
+    fields = {name: camera.prepare(surface, scene) for name, surface in surfaces.items()}
     cut, missing = _find_cut(task)
     schedule = _scene_schedule(task) if cut is None else _cut_schedule(task, cut)
     looked = look(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
@@ -203,7 +203,7 @@ def analyse(
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
     origins = [surface.origin for surface in surfaces.values()]
-    doubts = dict.fromkeys(text for one in origins for text in one.doubts(camera.band, scene))
+    doubts = dict.fromkeys(text for one in origins for text in one.warnings(camera.band, scene))
     warnings = [*doubts, *_image_warnings(task, looked)]
     if sparse := sparse_frames(scene, camera.integration_time):
         warnings = [sparse, *warnings]

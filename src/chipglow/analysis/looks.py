@@ -239,7 +239,7 @@ def look(
     """Take the images of a schedule and read them; `fields` are the surfaces on the scene."""
     first = {(name, 0): laid for name, laid in fields.items()}
     others = {
-        (view.surface, number): camera.lay(surfaces[view.surface].redrawn(number), scene)
+        (view.surface, number): camera.prepare(surfaces[view.surface].redrawn(number), scene)
         for view in schedule.views
         for number in range(1, view.textures)
     }

@@ -182,7 +182,7 @@ def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: flo
     pixels; with the optics; with the second channel's pixels where they truly are; with its
     exposure when it truly is; and as the detectors read them.
     """
-    first, second = camera.placed(scene.raster)
+    first, second = camera.with_common_pixels(scene.raster)
     aligned = replace(second, offset=first.offset)
     duration, of_second = first.integration_time, second.integration_time
     views = views_of(surface, scene, (first, second))

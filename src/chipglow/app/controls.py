@@ -82,7 +82,7 @@ class ShownStudy(Study):
 
 @dataclass(frozen=True)
 class Option:
-    """A word that a control may have: its label, and the settings that it means."""
+    """A choice of a control: its label, and the settings that it changes."""
 
     label: str
     changes: Mapping[str, object] = field(default_factory=dict)

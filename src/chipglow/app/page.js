@@ -224,7 +224,7 @@ export function render({ view, model, el }) {
   // One picture of all figures as they are: images in a row, lines below.
   let quick = true;
   each("#sheet", "click", () => {
-    if (quick) return showStatus({ text: "The exact picture is not finished: save it when it is.", kind: "error" });
+    if (quick) return showStatus({ text: "The exact picture is not ready; save again when it is shown.", kind: "error" });
     const lines = spec.figures.filter((one) => !spec.images.includes(one));
     const rows = [spec.images, lines].map((row) => row.map((one) => plotOf(one).export("png").canvas));
     const sum = (row) => row.reduce((width, one) => width + one.width, 0);

@@ -209,7 +209,7 @@ class SceneModel:
             reference=study.analysis.reference,
             effects={ALL: CASES[ALL]},
         )
-        laid = {CURSOR: camera.lay(surface.redrawn(0), scene)}
+        laid = {CURSOR: camera.prepare(surface.redrawn(0), scene)}
         looked = look(scene, {CURSOR: surface}, laid, camera, schedule, progress)
         reference, measured, _ = np.moveaxis(looked.read[0, 0], -1, 0)
         error = measured - reference
@@ -275,7 +275,7 @@ class SceneModel:
                 4,
                 "laid",
                 (state.key(*_SURFACE), quick, both, () if surface.is_grey else spectral),
-                lambda: [camera.lay(one, scene) for one in (surface, plain)[: 1 + both]],
+                lambda: [camera.prepare(one, scene) for one in (surface, plain)[: 1 + both]],
             )
             exposure, *others = camera.expose_fields(scene, laid, state.study.start, check)
             exposure = replace(exposure, effects=surface.effects)
@@ -318,7 +318,7 @@ class SceneModel:
             return np.asarray(np.hypot(*(scene.field(f"velocity_{xy}", index) for xy in "xy")))
         if name == "emissivity":
             _, surface = self._on(state, quick=False)
-            return self._camera(state, scene).lay(surface, scene).emissivity(scene.frame(index))
+            return self._camera(state, scene).prepare(surface, scene).emissivity(scene.frame(index))
         if name == "radiance_temperature":
             places = np.stack(np.meshgrid(scene.raster.x, scene.raster.y), axis=-1)
             radiance = nearest(exposure.centre_radiance, exposure.raster, places)

@@ -145,7 +145,7 @@ class Session:
         self._draws.cancel()
 
     def _picture(self, state: State) -> None:
-        """Always send one picture, so that a moving control is followed; then the exact one."""
+        """Send a picture at once, so that it follows a moving control, then the exact one."""
         work, model = self._pictures, self.model
         if model.has_quick_look and not model.is_ready(state):
             self._send(model.picture(state, quick=True))

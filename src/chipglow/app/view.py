@@ -179,7 +179,7 @@ class View:
         if name == "study.yaml":
             data = study_file(model, self.session.state)
         elif picture is None or picture.quick or picture.state != self.session.state:
-            self._say("The exact picture is not finished: save it when it is.", "error")
+            self._say("The exact picture is not ready; save again when it is shown.", "error")
             return
         else:
             data = measurement_file(picture, model)

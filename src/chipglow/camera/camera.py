@@ -37,38 +37,38 @@ from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
 
 BORDER_TOLERANCE: Final = 1.0
-"""Change in K of a pixel at which a warning about the border of the scene is given."""
+"""Pixel change in K above which a border warning is issued."""
 
 PAPER_LIMIT: Final = 573.15
-"""Lower limit in K of the paper's camera."""
+"""Lower range limit in K of the paper's camera."""
 
 Gather: TypeAlias = Callable[[Array, Raster, Raster, float], Array]
 
 _ROUNDING: Final = 1e-13
-_COLD_FLOOR: Final = 373.15
-"""Floor in K up to which a round number is probably one of degrees Celsius."""
+_SUSPECT_LIMIT: Final = 373.15
+"""Lower range limits in K that are probably meant in °C, if round."""
 
 
 class ChipglowWarning(UserWarning):
-    """A setting that is possible, and probably not meant, such as °C where K are due."""
+    """A valid setting that is probably a mistake, such as °C instead of K."""
 
 
 @dataclass(frozen=True)
 class Camera(Part):
-    """An infrared camera looking at a scene (Figure 6 of Heigel and Whitenton, 2010).
+    """An infrared camera (Figure 6 of Heigel and Whitenton, 2010).
 
-    By default it has no lower limit, and its point spread function is the diffraction of a
-    reflecting objective in the camera's band; `paper` returns the paper's camera.
+    The default camera has no lower range limit. Its point spread function is the diffraction of a
+    reflecting objective in the camera's band. `paper` returns the paper's camera.
 
     Raises
     ------
     ValueError
-        If a value is impossible; the message names it and what was expected.
+        If a value is out of its limits; the message names field, value and limits.
 
     Warns
     -----
     ChipglowWarning
-        If the lower range limit is so low and round a number of K that °C is probably meant.
+        If the lower range limit is probably in °C instead of K.
     """
 
     band: Annotated[Band, Parameter("Spectral band; the paper's by default.")] = field(
@@ -76,12 +76,12 @@ class Camera(Part):
     )
     pitch: Annotated[
         float,
-        Parameter("Distance between pixels, as seen on the scene.", LENGTH, over=0.0, most=1e-2),
+        Parameter("Distance between pixels on the scene.", LENGTH, over=0.0, most=1e-2),
     ] = 6e-6
     shape: Annotated[
         tuple[int, int] | None,
         Parameter(
-            "Rows and columns of pixels; None: as many whole pixels as fit the scene.", least=1
+            "Rows and columns of pixels; None: all whole pixels that fit the scene.", least=1
         ),
     ] = None
     offset: Annotated[
@@ -94,7 +94,7 @@ class Camera(Part):
     fill_factor: Annotated[
         float,
         Parameter(
-            "Fraction of a pixel's square that takes light: a square in its centre.",
+            "Sensitive fraction of the pixel area, a centred square.",
             over=0.0,
             most=1.0,
         ),
@@ -102,25 +102,24 @@ class Camera(Part):
     psf: Annotated[
         PointSpreadFunction | None,
         Parameter(
-            "Point spread function; None: an ideal camera. One that includes the footprint is of "
-            "optics and pixel together: a pixel then reads the blurred image at its centre and "
-            "does not integrate again."
+            "Point spread function; None: an ideal camera. If it includes the footprint, a pixel "
+            "samples the blurred image at its centre instead of integrating it."
         ),
     ] = field(default_factory=partial(AnnularAperturePSF, None))
     psf_order: Annotated[
         Literal["optics", "detector"],
         Parameter(
-            "detector (the paper's: on the pixels' values, so that the pixel's footprint counts "
-            "twice) or optics (on the samples, before the pixels integrate)."
+            "optics: blur the samples before the pixels integrate; detector: blur the pixel "
+            "values, as the paper does, so that the footprint counts twice."
         ),
     ] = "optics"
-    integration_time: Annotated[float, Parameter("Exposure.", TIME, over=0.0)] = 10e-6
+    integration_time: Annotated[float, Parameter("Exposure time.", TIME, over=0.0)] = 10e-6
     frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
     line_time: Annotated[
         float | None,
         Parameter(
-            "Rolling shutter: how much later each row's exposure begins than that of the row "
-            "above; none: a global shutter, all rows at once.",
+            "Rolling shutter: delay between the exposures of successive rows; none: global "
+            "shutter.",
             TIME,
             over=0.0,
         ),
@@ -128,8 +127,8 @@ class Camera(Part):
     time_constant: Annotated[
         float | None,
         Parameter(
-            "Thermal time constant of a microbolometer's elements, by which each frame lags; none: "
-            "a photon detector, which has none.",
+            "Thermal time constant of a microbolometer, which makes frames lag; none: a photon "
+            "detector.",
             TIME,
             over=0.0,
         ),
@@ -137,7 +136,7 @@ class Camera(Part):
     lower_limit: Annotated[
         float | None,
         Parameter(
-            "Radiance temperatures under this are flagged, not returned; or none.",
+            "Lower range limit: lower radiance temperatures are flagged, not returned; or none.",
             TEMPERATURE,
             least=COLDEST,
             most=HOTTEST,
@@ -146,7 +145,7 @@ class Camera(Part):
     reflected: Annotated[
         float | None,
         Parameter(
-            "Temperature of the surroundings that the surface reflects, or none.",
+            "Reflected apparent temperature; none: dark surroundings.",
             TEMPERATURE,
             least=COLDEST,
             most=HOTTEST,
@@ -154,13 +153,12 @@ class Camera(Part):
     ] = None
     optics: Annotated[
         tuple[OpticsTerm, ...],
-        Parameter("Other effects of the optics, a list in the order of the light."),
+        Parameter("Other effects of the optics, in the order in which light meets them."),
     ] = ()
     detector: Annotated[
         Detector | None,
         Parameter(
-            "Electrons, noise and counts of the detector, and the camera's own calibration; none: "
-            "the radiance is read as it is.",
+            "Detector with noise, digitiser and calibration; none: an ideal detector.",
             allowed="none, or such as\n"
             "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
             "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
@@ -169,7 +167,7 @@ class Camera(Part):
     seed: Annotated[
         int,
         Parameter(
-            "Seed of the detector noise, which depends only on it and the frame's start time.",
+            "Seed of the detector noise; a frame's noise depends on the seed and its start time.",
             least=0,
         ),
     ] = 2010
@@ -177,62 +175,61 @@ class Camera(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.psf is not None:
-            object.__setattr__(self, "psf", self.psf.of_camera(self.band, None))
+            object.__setattr__(self, "psf", self.psf.for_camera(self.band, None))
         included = self.psf.includes if self.psf else ()
         if included and not set(included) <= {"footprint", *BLURS.kinds}:
             known = ", ".join(("footprint", *BLURS.kinds))
-            raise ValueError(f"Camera.psf.includes: {included!r}, expected any of {known}")
+            raise ValueError(f"Camera.psf.includes: {included!r}, only {known} are known")
         if self.psf_order == "detector" and self._blur_has_footprint:
             raise ValueError(
-                "Camera.psf_order: 'detector', expected optics: the point spread function includes "
-                "the pixel's footprint"
+                "Camera.psf_order: must be 'optics', because the point spread function includes "
+                "the pixel footprint"
             )
         for name in ("integration_time", "line_time"):
             time = getattr(self, name)
             if time is not None and time > 1 / self.frame_rate:
                 raise ValueError(
-                    f"Camera.{name}: {time:g} s, expected up to {1 / self.frame_rate:g} s, the "
-                    "time between frames"
+                    f"Camera.{name}: {time:g} s is longer than the frame period of "
+                    f"{1 / self.frame_rate:g} s"
                 )
         if (
             self.lower_limit is not None
-            and self.lower_limit <= _COLD_FLOOR
+            and self.lower_limit <= _SUSPECT_LIMIT
             and self.lower_limit % 10 == 0
         ):
             warn(
                 f"camera: lower_limit is {self.lower_limit:g} K, which is "
-                f"{self.lower_limit - 273.15:g} °C; if "
-                f"{self.lower_limit:g} °C is meant, it is {self.lower_limit + 273.15:g} K.",
+                f"{self.lower_limit - 273.15:g} °C. If {self.lower_limit:g} °C is meant, write "
+                f"{self.lower_limit + 273.15:g} K.",
                 ChipglowWarning,
                 stacklevel=3,
             )
 
     @classmethod
     def paper(cls) -> "Camera":
-        """Return the camera of the paper's simulation, as far as the paper states it.
+        """Return the camera of the paper's simulation; values that the paper omits are assumed.
 
-        It measures at or above 300 °C. The blur is applied from pixel to pixel (`psf_order` is
-        ``detector``), as in its Figure 6; that changes temperatures by up to 7 K. The point spread
-        function, which the paper prints as a picture only, is an assumption: see
-        `AnnularAperturePSF`.
+        It measures at or above 300 °C. The blur acts on the pixel values (`psf_order` is
+        ``detector``), as in the paper's Figure 6; this changes temperatures by up to 7 K. The point
+        spread function is assumed, see `AnnularAperturePSF`.
         """
         return cls(psf=AnnularAperturePSF(), psf_order="detector", lower_limit=PAPER_LIMIT)
 
     def pixels(self, scene: Raster) -> Raster:
-        """Return the raster of the pixels on a scene."""
+        """Return the raster of pixels on a scene."""
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
 
     def in_band(self, band: Band) -> "Camera":
-        """Return the camera with another band and its diffraction, without a lower range limit."""
+        """Return a copy with another band and its diffraction, without a lower range limit."""
         psf = None if self.psf is None else self.psf.in_band(band)
         return replace(self, band=band, psf=psf, lower_limit=None)
 
     def redrawn(self, number: int) -> "Camera":
-        """Return the camera with other detector noise: its seed increased by `number`."""
+        """Return a copy whose noise seed is increased by `number`."""
         return replace(self, seed=self.seed + number) if number and self.detector else self
 
     def calibration(self, shape: tuple[int, int]) -> FlatFieldCalibration | None:
-        """Return the detector's calibration for pixels of this shape; None without a detector."""
+        """Return the detector calibration for this many rows and columns; None without detector."""
         if self.detector is None:
             return None
         point = OperationPoint(self.band, self.integration_time, self.frame_rate, self.fill_factor)
@@ -243,48 +240,47 @@ class Camera(Part):
         return start + np.arange(count) / self.frame_rate
 
     def row_delays(self, scene: Raster) -> Array:
-        """Return how much later than the first row each row of samples begins to integrate.
+        """Return the delay in s of the integration of each row of samples, shape (y,).
 
-        In s, shape (y,): that of the pixels in which the row's middle lies, or of the nearest ones;
-        0 with a global shutter.
+        The delay is that of the nearest row of pixels; 0 with a global shutter.
         """
         sensors = self.pixels(scene)
         if self.line_time is None:
             return np.zeros(scene.rows)
         if sensors.rows * self.line_time > 1 / self.frame_rate:
             raise ValueError(
-                f"Camera.line_time: {self.line_time:g} s, expected up to "
-                f"{1 / (self.frame_rate * sensors.rows):.4g} s: {sensors.rows} rows within the "
-                f"{1 / self.frame_rate:.4g} s between frames"
+                f"Camera.line_time: {self.line_time:g} s is too long; {sensors.rows} rows within "
+                f"the frame period of {1 / self.frame_rate:.4g} s allow at most "
+                f"{1 / (self.frame_rate * sensors.rows):.4g} s"
             )
         rows = np.floor((sensors.top - scene.y) / self.pitch)
-        return np.asarray(self.line_time * np.clip(rows, 0, sensors.rows - 1), np.float64)
+        return self.line_time * np.clip(rows, 0, sensors.rows - 1)
 
     def frame_duration(self, scene: Raster) -> float:
-        """Return the time in s from the first row's start of integration to the last's end."""
+        """Return the time in s from the start of the first row to the end of the last row."""
         return self.integration_time + float(self.row_delays(scene).max())
 
-    def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
-        """Return a surface laid on a scene, in this camera's band and surroundings."""
+    def prepare(self, surface: Surface, scene: Scene) -> EmissivityField:
+        """Prepare a surface for a scene, in this camera's band and surroundings."""
         if not isinstance(surface, Surface):
             raise ValueError(
-                f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
+                f"surface: {surface!r} is not a Surface such as chipglow.CHIP_1 or "
                 "UniformSurface(0.6)"
             )
-        return surface.on(scene, self.band, self.reflected)
+        return surface.prepare(scene, self.band, self.reflected)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
-        """Return the exposure of a scene from `start` on, in s, over one integration time.
+        """Expose the camera to a scene for one integration time, starting at `start` in s.
 
-        A ValueError if the integration reaches beyond the scene, or the pixels do not fit it.
+        Raises a ValueError if the scene does not cover the integration time or the pixels.
         """
-        return self._expose(scene, surface, self.lay(surface, scene), start)
+        return self._expose(scene, surface, self.prepare(surface, scene), start)
 
     def _expose(
         self, scene: Scene, surface: Surface, field: EmissivityField, start: float
     ) -> Exposure:
         (exposure,) = self.expose_fields(scene, (field,), start)
-        warnings = tuple(surface.origin.doubts(self.band, scene))
+        warnings = tuple(surface.origin.warnings(self.band, scene))
         return replace(exposure, effects=surface.effects, warnings=warnings)
 
     def expose_fields(
@@ -294,45 +290,45 @@ class Camera(Part):
         start: float,
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
-        """Return the exposures of several surfaces, laid by `lay`: each frame is read once.
+        """Expose the camera to several surfaces from `prepare` in one pass over the frames.
 
-        `start` is when the integration of the first row begins in s; an error that `check`, called
-        now and then meanwhile, raises ends the pass.
+        `start` is the start of the first row's integration in s. `check` is called periodically; an
+        exception that it raises aborts the exposure.
         """
         views = [View(field, self.band, self.reflected) for field in fields]
         delays = self.row_delays(scene.raster)
         return expose(scene, views, start, self.integration_time, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
-        """Return the frames that the camera reads from exposures, one for each.
+        """Form one frame from each exposure.
 
-        Size of source, blur and mean over time are linear and commute: the mean, which an exposure
-        holds, is blurred and integrated once. That equals the loop of Figure 6, and any number of
-        cameras with the same band, integration time and surroundings may use the same exposures.
+        Blur, integration over the pixel and mean over time are linear and commute: the mean of an
+        exposure is blurred and integrated once. This equals the loop of Figure 6. Cameras with the
+        same band, integration time and surroundings can share exposures.
 
-        Beyond the scene radiance is taken to be as at the scene's edge. The attribute ``warnings``
-        states where a second assumption, that beyond the scene each pixel sees the like of what it
-        sees within, changes pixels by over `BORDER_TOLERANCE`.
+        Beyond the scene, radiance continues as at the edge. The attribute ``warnings`` states where
+        pixels change by more than `BORDER_TOLERANCE` if the surroundings instead resemble what each
+        pixel sees within the scene.
         """
         images: list[Array] = []
-        alike, starts, effects, grids = [], [], [], set()
+        similar, starts, effects, grids = [], [], [], set()
         warnings: dict[str, None] = {}
         for exposure in [exposures] if isinstance(exposures, Exposure) else exposures:
             scene = exposure.raster
             pixels = self.pixels(scene)
-            image, within = self._both(exposure.mean_radiance, scene)
-            images.append(self._show(image, pixels))
-            alike.append(self._show(within / (1 - self.light_from_beyond(scene)), pixels))
+            image, within = self._received(exposure.mean_radiance, scene)
+            images.append(self._displayed(image, pixels))
+            similar.append(self._displayed(within / (1 - self.light_from_beyond(scene)), pixels))
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
             warnings |= dict.fromkeys(exposure.warnings)
             grids.add(pixels)
         if len(grids) != 1:
-            raise ValueError("camera: one or more exposures of the same grid are required")
+            raise ValueError("camera: at least one exposure, all of the same grid, is required")
         measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
         warnings |= dict.fromkeys(self._lag_warning(measured.times))
-        warnings |= dict.fromkeys(self._border_warning(np.stack(images), np.stack(alike), scene))
+        warnings |= dict.fromkeys(self._border_warning(np.stack(images), np.stack(similar), scene))
         if warnings:
             measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured
@@ -347,63 +343,63 @@ class Camera(Part):
         scene : Scene
             The true temperatures.
         surface : Surface
-            Its emissivity.
+            The emissivity.
         start : float or sequence of float
-            Start of each frame's integration in s; see `frame_times` for a sequence at the frame
+            Start of each frame's integration in s; `frame_times` returns a sequence at the frame
             rate.
 
         Returns
         -------
         Measurement
-            As many frames as starts, with the scene's tool, and attributes of camera and surface.
+            One frame for each start, with the scene's tool and attributes of camera and surface.
         """
         self.pixels(scene.raster)
-        field = self.lay(surface, scene)
+        field = self.prepare(surface, scene)
         measured = self.form_measurement(
             self._expose(scene, surface, field, at)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
         if sparse := sparse_frames(scene, self.integration_time):
-            known = filter(None, (measured.data.attrs.get("warnings"), sparse))
-            measured.data.attrs["warnings"] = "\n".join(known)
+            warnings = filter(None, (measured.data.attrs.get("warnings"), sparse))
+            measured.data.attrs["warnings"] = "\n".join(warnings)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
-    @lru_cache(maxsize=2)  # noqa: B019 - of the last cameras
+    @lru_cache(maxsize=2)  # noqa: B019 - keeps two cameras
     def light_from_beyond(self, scene: Raster) -> Array:
         """Return the fraction of each pixel's light that comes from beyond a scene, (y, x)."""
-        fraction = self._both(np.ones(scene.shape), scene)[1]
+        fraction = self._received(np.ones(scene.shape), scene)[1]
         return np.where(fraction < 1 - _ROUNDING, 1 - fraction, 0.0)
 
     def form_image(self, radiance: Array, scene: Raster, gather: Gather = integrate) -> Array:
-        """Return the image of a radiance map on the pixels: optics, PSF and footprint.
+        """Form the image of a radiance map on the pixels by optics, PSF and footprint.
 
         Parameters
         ----------
         radiance : ndarray
-            Of the scene's samples in W/(m² sr), shape `scene.shape`: the mean over the integration
-            time, such as `Exposure.mean_radiance`.
+            Mean radiance over the integration time in W/(m² sr), shape `scene.shape`, such as
+            `Exposure.mean_radiance`.
         scene : Raster
-            The samples.
+            Grid of the samples.
         gather : callable
-            Takes samples, their raster, that of the pixels and the fill factor, and returns what
-            each pixel receives, such as the mean over its square (`integrate`).
+            Takes samples, their raster, the raster of the pixels and the fill factor. Returns the
+            values that the pixels receive, such as the mean over each square (`integrate`).
 
         Returns
         -------
         ndarray
-            Radiance of every pixel in W/(m² sr), shape `pixels(scene).shape`.
+            Pixel radiance in W/(m² sr), shape `pixels(scene).shape`.
         """
         image = np.asarray(radiance, np.float64)
         if image.shape != scene.shape:
-            raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
+            raise ValueError(f"camera: radiance must have shape {scene.shape}, not {image.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
-            raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
+            raise ValueError("camera: radiance must be finite and not negative")
         if self.psf is None or self.optics or gather is not integrate:
-            return self._show(self._collect(image, scene, "edge", gather), self.pixels(scene))
-        return self._both(image, scene)[0]
+            return self._displayed(self._collect(image, scene, "edge", gather), self.pixels(scene))
+        return self._received(image, scene)[0]
 
-    def _both(self, image: Array, scene: Raster) -> tuple[Array, Array]:
-        """Return the radiance that the pixels receive, as at the edges or nothing beyond."""
+    def _received(self, image: Array, scene: Raster) -> tuple[Array, Array]:
+        """Return the received radiance if the scene's edges continue, and if nothing is beyond."""
         if self.psf is None or self.optics:
             return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
         pixels = self.pixels(scene)
@@ -417,7 +413,7 @@ class Camera(Part):
     def _collect(
         self, image: Array, scene: Raster, beyond: Beyond, gather: Gather = integrate
     ) -> Array:
-        """Return the radiance that the pixels receive: point spread function, optics, footprint."""
+        """Apply point spread function, optics and footprint."""
         pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
         if self.psf is not None and self.psf_order == "optics":
             image = blurred(image, self.psf, scene.spacing)
@@ -425,18 +421,18 @@ class Camera(Part):
             image = term.on_samples(image, scene, pixels, blurred)
         if self.psf is None or self.psf_order == "optics":
             return gather(image, scene, pixels, self._sensitive(scene))
-        # Pixels that are not read out supply the radiance beyond the others.
+        # Pixels that are not read out supply the radiance around the others.
         whole, own = whole_raster(scene, pixels)
         return blurred(gather(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
-    def _show(self, image: Array, pixels: Raster) -> Array:
-        """Return the radiance after the optics' effects on the received radiance."""
+    def _displayed(self, image: Array, pixels: Raster) -> Array:
+        """Apply the optics' effects on pixel radiance."""
         for term in self.optics:
             image = term.on_pixels(image, pixels, self.band)
         return image
 
     def _sensitive(self, scene: Raster) -> float:
-        """Return the fraction of a pixel's square that it integrates, less after a footprint."""
+        """Return the fraction of a pixel to integrate: one sample if the PSF has a footprint."""
         if not self._blur_has_footprint:
             return self.fill_factor
         return min((scene.spacing / self.pitch) ** 2, 1.0)
@@ -446,7 +442,7 @@ class Camera(Part):
         return self.psf is not None and "footprint" in self.psf.includes
 
     def measurement(self, images: Array, starts: Array, scene: Raster) -> Measurement:
-        """Return the frames read from images of `form_image` of a scene, shape (time, y, x)."""
+        """Return the measurement of images by `form_image` of a scene, shape (time, y, x)."""
         pixels = self.pixels(scene)
         radiance, flags = self.read(images, starts)
         attributes = self._attributes(pixels.shape)
@@ -455,9 +451,9 @@ class Camera(Part):
         )
 
     def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
-        """Return radiance and flags of images (time, y, x) after detector and calibration.
+        """Apply detector and calibration to images (time, y, x); return radiance and flags.
 
-        Without a detector the images, with the lag of a thermal time constant, and None.
+        Without a detector, only the lag of a thermal time constant is applied and flags are None.
         """
         if self.time_constant is not None:
             frame_time = 1 / self.frame_rate
@@ -470,29 +466,29 @@ class Camera(Part):
         return calibration.radiance(counts)
 
     def _generator(self, start: float) -> np.random.Generator:
-        """Return the noise of the frame that begins then, however many others are read with it."""
+        """Return the noise generator of the frame with this start time."""
         return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
 
     def _lag_warning(self, starts: Array) -> Iterator[str]:
-        """Warn where no frame follows another, so that there is no lag."""
+        """Yield warnings if lag is modelled but no frame follows another."""
         if follows(starts, 1 / self.frame_rate).any():
             return
         if self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms):
             yield (
-                "Lag: no two frames are one frame period apart, so each frame is taken as its own "
-                "predecessor: there is no lag in them."
+                "Lag: no two frames are one frame period apart, so each frame is its own "
+                "predecessor and shows no lag."
             )
         if self.time_constant is not None:
             yield (
-                f"The elements' thermal time constant is {1e3 * self.time_constant:.3g} ms, and no "
-                "two frames are one frame period apart: each frame is computed as if its scene had "
-                "lasted long. A real one shows far less of what is over sooner."
+                f"The thermal time constant is {1e3 * self.time_constant:.3g} ms, but no two "
+                "frames are one frame period apart: each frame shows its scene in a steady state. "
+                "A real camera shows much less of shorter events."
             )
 
-    def _border_warning(self, images: Array, alike: Array, scene: Raster) -> Iterator[str]:
-        """Warn how far another assumption about what is beyond the scene changes temperatures."""
+    def _border_warning(self, images: Array, similar: Array, scene: Raster) -> Iterator[str]:
+        """Yield a warning if the assumption about the surroundings changes temperatures."""
         kelvins = self.band.temperature(images)
-        change = np.abs(kelvins - self.band.temperature(alike))
+        change = np.abs(kelvins - self.band.temperature(similar))
         change[~(kelvins >= (self.lower_limit or 0.0))] = np.nan
         changed = change > BORDER_TOLERANCE
         if not changed.any():
@@ -502,15 +498,15 @@ class Camera(Part):
         down = np.minimum(top - pixels.y, pixels.y - bottom)
         reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
         yield (
-            "The border of the scene: beyond it the surface is taken to be as at the edge. If the "
+            "The border of the scene: beyond it, the radiance at the edge is assumed. If the "
             "surroundings instead resembled what each pixel sees within the scene, "
             f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
-            f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
-            "most."
+            f"border) would change by more than {BORDER_TOLERANCE:g} K, by at most "
+            f"{np.nanmax(change):.3g} K."
         )
 
     def _attributes(self, shape: tuple[int, int]) -> dict[str, float | str]:
-        """Return the camera's attributes of a measurement, in SI, without those that are None."""
+        """Return the attributes of a measurement that describe the camera, in SI."""
         attributes: dict[str, float | str | None] = {
             "offset_right": self.offset[0],
             "offset_down": self.offset[1],
@@ -521,7 +517,7 @@ class Camera(Part):
             "frame_rate": self.frame_rate,
             "time_constant": self.time_constant,
             "shutter": (
-                "global" if self.line_time is None else f"rolling, {self.line_time:g} s a row"
+                "global" if self.line_time is None else f"rolling, {self.line_time:g} s per row"
             ),
             "reflected": self.reflected,
             "optics": repr(self.optics) if self.optics else None,

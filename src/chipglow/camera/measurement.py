@@ -24,24 +24,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1", "flags": "1"}
-"""The variables that every measurement has, and their units."""
+"""Variables of every measurement, and their units."""
 
 
 class Flag(IntFlag):
-    """Faults of a pixel; only a `REPLACED` one has a radiance temperature."""
+    """Pixel faults; of the flagged pixels, only `REPLACED` ones have a radiance temperature."""
 
     UNDER_RANGE = 1
-    """Colder than the camera measures at its integration time, or without any radiance."""
+    """Below the camera's lower range limit, or without radiance."""
     SATURATED = 2
-    """At the upper end of the camera's counts, or hotter than its calibration reaches."""
+    """At the largest count, or above the calibrated range."""
     DEAD = 4
-    """The pixel does not answer to light."""
+    """The pixel does not respond to light."""
     REPLACED = 8
-    """The pixel does not respond to light; its value is interpolated from neighbours."""
+    """The pixel does not respond to light; its value is interpolated from its neighbours."""
 
 
 UNUSABLE: Final = Flag.UNDER_RANGE | Flag.SATURATED | Flag.DEAD
-"""The flags of pixels without a radiance temperature."""
+"""Flags of pixels without a radiance temperature."""
 
 
 class Measurement:
@@ -50,14 +50,14 @@ class Measurement:
     Parameters
     ----------
     data : xarray.Dataset
-        Variables of `MEASUREMENT_UNITS` with dimensions (time, y, x) and a ``units`` attribute
-        each: ``radiance_temperature``, NaN where flagged; ``radiance``; ``flags``, a sum of
-        `Flag`, uint8. Coordinates as a scene's: ``time`` in s, the start of each integration;
-        ``x`` ascending and ``y`` descending in m, the middles of the pixels. Of the attributes
-        ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper`` in m limit
-        the band. ``response`` over ``wavelength`` in m is the relative spectral response, if it is
-        not that of a box. ``calibration_errors`` over (``calibration_error``,
-        ``calibration_radiance``), in W/(m² sr), are effects as in `CalibrationErrors`.
+        Variables ``radiance_temperature`` (NaN where flagged), ``radiance`` and ``flags`` (sums of
+        `Flag`, uint8), each with dimensions (time, y, x) and the ``units`` of `MEASUREMENT_UNITS`.
+        Coordinates: ``time`` in s, the start of each integration; ``x`` ascending and ``y``
+        descending in m, the pixel centres. Attributes: ``pitch``, the distance between pixels in m;
+        ``band_lower`` and ``band_upper``, the limits of the band in m. Optional variables:
+        ``response`` over ``wavelength`` in m, the relative spectral response;
+        ``calibration_errors`` over (``calibration_error``, ``calibration_radiance``) in W/(m² sr),
+        the effects of `CalibrationErrors`.
 
     Raises
     ------
@@ -69,9 +69,9 @@ class Measurement:
         for name, unit in MEASUREMENT_UNITS.items():
             if name not in data or data[name].dims != ("time", "y", "x"):
                 raise ValueError(f"measurement: {name!r} over ('time', 'y', 'x') is missing")
-            found = data[name].attrs.get("units")
-            if found != unit:
-                raise ValueError(f"measurement: {name!r} has units {found!r}, expected {unit!r}")
+            units = data[name].attrs.get("units")
+            if units != unit:
+                raise ValueError(f"measurement: units of {name!r} must be {unit!r}, not {units!r}")
         if "pitch" not in data.attrs:
             raise ValueError("measurement: attribute 'pitch' is missing")
         self.data = data
@@ -90,7 +90,7 @@ class Measurement:
     ) -> "Measurement":
         """Return a measurement from frames of radiance in W/(m² sr), shape (time, y, x).
 
-        Pixels under `lower_limit` in K, or without radiance, are flagged besides those in `flags`.
+        Pixels below `lower_limit` in K or without radiance are flagged in addition to `flags`.
         """
         temperature = band.temperature(radiance)
         below = ~(temperature >= (lower_limit or 0.0))
@@ -122,33 +122,29 @@ class Measurement:
         return cls(data)
 
     def __len__(self) -> int:
-        """Number of frames."""
         return len(self.times)
 
     def __repr__(self) -> str:
         frames = frames_text(self.times, self.raster, "pixels", self.celsius())
         tool = f"{'with' if self.tool else 'without'} tool"
         count = len(self.notes.warnings)
-        said = f"; {count} warning{'s' if count > 1 else ''}: see .notes" if count else ""
-        return f"<Measurement: {frames}; {tool}{said}>"
+        warnings = f"; {count} warning{'s' if count > 1 else ''}: see .notes" if count else ""
+        return f"<Measurement: {frames}; {tool}{warnings}>"
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>{self.data._repr_html_()}"
 
     @property
     def notes(self) -> Notes:
-        """Assumptions and warnings, and what the camera file states."""
+        """Assumptions, warnings and statements of the camera file."""
         return Notes.from_attrs(self.data.attrs)
 
     @cached_property
     def band(self) -> Band:
-        """The camera's band; a ValueError if the attributes do not state it."""
+        """Spectral band of the camera; a ValueError if the attributes do not state it."""
         for name in ("band_lower", "band_upper"):
             if name not in self.data.attrs:
-                raise ValueError(
-                    f"measurement: the camera's band is needed, and the attribute {name!r} is "
-                    "missing"
-                )
+                raise ValueError(f"measurement: attribute {name!r} of the camera's band is missing")
         limits = float(self.data.attrs["band_lower"]), float(self.data.attrs["band_upper"])
         if "response" not in self.data:
             return Band(*limits)
@@ -166,17 +162,17 @@ class Measurement:
 
     @cached_property
     def raster(self) -> Raster:
-        """The grid of the pixels."""
+        """Grid of the pixels."""
         x, y, pitch = self.data["x"].values, self.data["y"].values, float(self.data.attrs["pitch"])
         return Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
 
     @property
     def tool(self) -> Tool | None:
-        """The tool in the measurement's coordinates, if it is stated."""
+        """Tool in the measurement's coordinates, if stated."""
         return stored_tool(self.data.attrs)
 
     def with_tool(self, tool: Tool) -> "Measurement":
-        """Return the same frames with the attributes of a tool, in their coordinates."""
+        """Return a copy with a tool in the measurement's coordinates."""
         other = {k: v for k, v in self.data.attrs.items() if not str(k).startswith("tool_")}
         data = self.data.copy(deep=False)
         data.attrs = {**other, **tool_attributes(tool)}
@@ -189,7 +185,7 @@ class Measurement:
 
     @property
     def usable(self) -> NDArray[np.bool_]:
-        """Which pixels have a radiance temperature, by their flags, shape (time, y, x)."""
+        """Mask of the pixels with a radiance temperature, shape (time, y, x)."""
         return np.asarray(self.flags & UNUSABLE == 0, np.bool_)
 
     @property
@@ -198,9 +194,9 @@ class Measurement:
         return np.asarray(self.data["radiance"].values, dtype=np.float64)
 
     def radiance_temperature(self, flagged: bool = False) -> Array:
-        """Return the radiance temperature in K, shape (time, y, x); NaN where flagged.
+        """Return the radiance temperature in K, shape (time, y, x); NaN where unusable.
 
-        With `flagged`, unusable pixels have the temperature of their radiance.
+        With `flagged`, unusable pixels return the temperature of their radiance.
         """
         stored = np.asarray(self.data["radiance_temperature"].values, dtype=np.float64)
         if not flagged:
@@ -208,21 +204,21 @@ class Measurement:
         return np.where(self.usable, stored, self.band.temperature(self.radiance))
 
     def celsius(self, frame: int = 0) -> Array:
-        """Return the radiance temperature of one frame in °C, shape (y, x); NaN where flagged."""
+        """Return the radiance temperature of one frame in °C, shape (y, x); NaN where unusable."""
         kelvin = self.data["radiance_temperature"][frame].values
         return np.asarray(kelvin, np.float64) - ZERO_CELSIUS
 
     def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
-        """Draw one frame's radiance temperature in °C over x and y in µm, with the tool's outline.
+        """Plot the radiance temperature of one frame in °C over x and y in µm, with the tool.
 
-        Grey where a pixel has no radiance temperature; on new axes by default.
+        Pixels without a radiance temperature are grey. New axes are made by default.
         """
         time, label = float(self.times[frame]), "radiance temperature / °C"
         return plot_image(self.celsius(frame), self.raster, self.tool, label, time, axes)
 
     @cached_property
     def calibration_errors(self) -> CalibrationErrors | None:
-        """Effects of the calibration's errors on the radiance, if they are known."""
+        """Effects of the calibration errors on the radiance, if known."""
         if "calibration_errors" not in self.data:
             return None
         table = self.data["calibration_errors"]
@@ -232,17 +228,17 @@ class Measurement:
 
     @property
     def calibration_uncertainty(self) -> Array | None:
-        """Standard uncertainty of the radiance from the calibration in W/(m² sr), if known.
+        """Standard uncertainty of the radiance due to the calibration in W/(m² sr), if known.
 
-        Common to all pixels and frames (time, y, x): it does not fall in a mean.
+        It is common to all pixels and frames (time, y, x): averaging does not reduce it.
         """
         errors = self.calibration_errors
         return None if errors is None else errors.standard_uncertainty(self.radiance)
 
     def calibration_effects(self, frame: int) -> Array:
-        """Return the change of a frame's temperatures in K by each error of the calibration.
+        """Return the signed temperature changes in K due to each calibration error.
 
-        By an error of one standard uncertainty, with its sign, (errors, y, x); NaN where flagged.
+        Each error is one standard uncertainty. Shape (errors, y, x); NaN where unusable.
         """
         kelvins = np.asarray(self.data["radiance_temperature"][frame].values, np.float64)
         if self.calibration_errors is None:
@@ -251,10 +247,11 @@ class Measurement:
         return self.calibration_errors.at(self.data["radiance"][frame].values) / slope
 
     def estimate(self, values: Array, effects: ArrayLike) -> Estimate:
-        """Return results in K of the frames with the component ``calibration``.
+        """Return results in K with the uncertainty component ``calibration``.
 
-        `values` (frames, ...) are NaN where there is none; `effects` (frames, errors, ...) are what
-        became of `calibration_effects`. Without errors the component is stated as not evaluated.
+        `values` (frames, ...) are NaN where undefined; `effects` (frames, errors, ...) are their
+        changes with each error, derived from `calibration_effects`. Without errors, the component
+        is marked as not evaluated.
         """
         if self.calibration_errors is None:
             return Estimate(values).with_unevaluated(CALIBRATION)
@@ -266,14 +263,14 @@ _ERRORS: Final = ("calibration_error", "calibration_radiance")
 
 
 def _errors(errors: CalibrationErrors) -> dict[str, xr.DataArray]:
-    """Return the calibration's errors as a file states them."""
+    """Return the variable of the calibration errors."""
     units = {"units": MEASUREMENT_UNITS["radiance"]}
     coords = {_ERRORS[1]: (_ERRORS[1], errors.radiance, units)}
     return {"calibration_errors": xr.DataArray(errors.effects, coords, _ERRORS, attrs=units)}
 
 
 def _response(band: Band) -> dict[str, xr.DataArray]:
-    """Return a band's response at its quadrature nodes, so that a file states the same integral."""
+    """Return the response at the band's quadrature nodes, which keeps the integral."""
     assert band.response is not None
     wavelength = ("wavelength", band.wavelengths, {"units": "m"})
     values = np.asarray(band.response(band.wavelengths), np.float64)

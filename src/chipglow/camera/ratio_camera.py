@@ -81,7 +81,7 @@ class RatioCamera(Part):
         """Thermometer of the two bands."""
         return RatioThermometer(self.first.band, self.second.band, self.emissivity_ratio)
 
-    def placed(self, scene: Raster) -> tuple[Camera, Camera]:
+    def with_common_pixels(self, scene: Raster) -> tuple[Camera, Camera]:
         """Return the channels with the pixels that both have on a scene."""
         right, up = self.shift
         corner = self.first.offset[0] + max(0.0, -right), self.first.offset[1] + max(0.0, up)
@@ -114,7 +114,7 @@ class RatioCamera(Part):
         first, second = (
             camera.form_measurement(of_one)
             for camera, of_one in zip(
-                self.placed(scene.raster), zip(*exposed, strict=True), strict=True
+                self.with_common_pixels(scene.raster), zip(*exposed, strict=True), strict=True
             )
         )
         told = self.thermometer.temperature(first.radiance, second.radiance)
@@ -134,7 +134,7 @@ def views_of(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> list[
                 "compared: a global shutter"
             )
     if surface.is_grey:
-        fields = [surface.on(scene)] * len(cameras)
+        fields = [surface.prepare(scene)] * len(cameras)
     else:
-        fields = [camera.lay(surface, scene) for camera in cameras]
+        fields = [camera.prepare(surface, scene) for camera in cameras]
     return [View(f, c.band, c.reflected) for f, c in zip(fields, cameras, strict=True)]

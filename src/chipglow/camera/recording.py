@@ -1,4 +1,4 @@
-"""Contents of a real camera file, before calibration."""
+"""Contents of a camera file, before calibration."""
 
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, TypeAlias
@@ -18,7 +18,7 @@ QUANTITIES: Final = ("counts", "radiance", "temperature")
 class PlanckConversion:
     """A factory conversion between counts S and the temperature of a blackbody in K.
 
-    T = b / ln(r1 / (r2 (S + o)) + f); r1, r2 and b, in K, are over 0.
+    T = b / ln(r1 / (r2 (S + o)) + f); r1, r2 and b (in K) are positive.
     """
 
     r1: float
@@ -31,10 +31,10 @@ class PlanckConversion:
         for name, value in vars(self).items():
             possible = np.isfinite(value) and (value > 0 or name in ("f", "o"))
             if not possible:
-                raise ValueError(f"Planck conversion: {name} is {value!r}, expected over 0")
+                raise ValueError(f"Planck conversion: {name} must be positive, not {value!r}")
 
     def temperature(self, counts: NDArray[Any]) -> Array:
-        """Return the temperature in K of the blackbody that gives these counts, or NaN."""
+        """Return the temperature in K of a blackbody with these counts; NaN if undefined."""
         signal = np.asarray(counts, np.float64) + self.o
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithm = np.log(self.r1 / (self.r2 * signal) + self.f)
@@ -49,50 +49,50 @@ class Recording:
     signal: NDArray[Any]
     """Frames, shape (time, y, x), of any real type; row 0 at the top."""
     quantity: Quantity
-    """Counts, in-band radiance in W/(m² sr) or K, the file's object parameters included."""
+    """Quantity of `signal`: counts, in-band radiance in W/(m² sr), or temperature in K as computed
+    by the camera with its object parameters."""
     times: Array
     """Time of each frame in s, shape (time,)."""
     camera: str
     """Name of the camera."""
     integration_time: float | None = None
-    """In s."""
+    """Integration time in s."""
     saturation: float | None = None
-    """The largest signal that is not saturated."""
+    """Largest unsaturated signal."""
     band: Band | None = None
     pitch: float | None = None
     """Distance between pixels on the object in m."""
     conversion: PlanckConversion | None = None
     """Factory conversion of counts."""
     object_parameters: ObjectParameters | None = None
-    """Those set in the camera; temperatures depend on them, counts do not."""
+    """Object parameters set in the camera; temperatures depend on them, counts do not."""
     range_name: str | None = None
-    """Measuring range, as the maker calls it."""
+    """Manufacturer's name of the measuring range."""
     fill_factor: float | None = None
-    """Fraction of a pixel's square that takes light."""
+    """Sensitive fraction of the pixel area."""
     stated_band: Band | None = None
-    """Band that the file states, in a unit that it does not: it is compared, not used."""
+    """Band in the file, whose unit is assumed: it is compared, not used."""
     notes: Notes = field(default_factory=Notes)
-    """Assumptions and warnings of reading the file, and what else the file states."""
+    """Assumptions and warnings of reading the file, and its other statements."""
 
     def __post_init__(self) -> None:
         if self.signal.ndim != 3 or 0 in self.signal.shape:
             raise ValueError(
-                f"recording: signal has shape {self.signal.shape}, expected (time, y, x)"
+                f"recording: signal must have shape (time, y, x), not {self.signal.shape}"
             )
         if self.quantity not in QUANTITIES:
             raise ValueError(
-                f"recording: quantity is {self.quantity!r}, expected {', '.join(QUANTITIES)}"
+                f"recording: quantity must be one of {', '.join(QUANTITIES)}, not {self.quantity!r}"
             )
         if self.times.shape != self.signal.shape[:1]:
             raise ValueError(
-                f"recording: {self.times.size} times for {len(self.signal)} frames, "
-                "expected as many"
+                f"recording: {self.times.size} times for {len(self.signal)} frames, must be equal"
             )
         for name in ("integration_time", "pitch"):
             value = getattr(self, name)
             if value is not None and not 0 < value < np.inf:
-                raise ValueError(f"recording: {name} is {value!r}, expected over 0, or None")
+                raise ValueError(f"recording: {name} must be positive, not {value!r}")
         if self.fill_factor is not None and not 0 < self.fill_factor <= 1:
             raise ValueError(
-                f"recording: fill_factor is {self.fill_factor!r}, expected over 0 to 1, or None"
+                f"recording: fill_factor must be above 0 and at most 1, not {self.fill_factor!r}"
             )

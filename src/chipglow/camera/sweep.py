@@ -1,14 +1,11 @@
-"""Sums over the sub-frames of an exposure: the rows in blocks, with time inside.
+"""Sums over the sub-frames of an exposure.
 
-A block's sums stay in the processor's cache while its sub-frames go by, and a sub-frame's fields
-are made, blended and summed row by row. Blocks are shared among threads (`in_blocks`); none of
-the sums depends on their number.
-
-The kernels are functions of arrays alone and work on one block each: a graphics processor would
-take them block by block, with the loops over columns as its threads.
+The outer loop runs over blocks of rows, the inner one over time, so that the sums of a block stay
+in the processor's cache. Blocks are distributed among threads (`in_blocks`); the sums do not depend
+on the number of threads.
 """
 
-# Kernels have no types: Numba finds them.
+# Kernels are untyped: Numba infers their types.
 # mypy: allow-untyped-defs
 
 from collections.abc import Callable, Sequence
@@ -26,10 +23,10 @@ from chipglow.surface import EmissivityStack, Features
 from chipglow.surface.blend import SCRATCH, blend_row, in_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
-"""Values of the table of radiance in a kelvin; a straight line between them is exact enough."""
+"""Values per kelvin of the radiance table, which is interpolated linearly."""
 
 BATCH: Final = 8
-"""Frames that are summed together where their samples are in memory."""
+"""Number of frames summed in one pass if their samples are in memory."""
 
 _VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
 _STRAIN, _RATE, _X, _Y = (
@@ -38,11 +35,11 @@ _STRAIN, _RATE, _X, _Y = (
 )
 _MEAN: Final = 3
 _VIEWS: Final = 7
-"""Places of the mean and of the views among what the kernels get of their sums: `Sums`."""
+"""Positions of the mean and of the views in the tuple that `Sums` passes to the kernels."""
 
 Indices: TypeAlias = NDArray[np.intp]
 Check: TypeAlias = Callable[[], None]
-"""Called now and then in a long pass, which it ends by raising an error."""
+"""Called periodically during an exposure; an exception that it raises aborts the exposure."""
 
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
@@ -50,10 +47,10 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 class Sums:
     """Sums over the sub-frames; see `Exposure`.
 
-    `views` are numbers of the surface and of the band of every view, shape (view, 2); `tables` hold
-    radiance in every band at 200 K and above, and its change to the next value, (band, n, 2);
-    `environments` is the radiance of every view's surroundings in W/(m² sr). `mean`, `centre` and
-    `peak` are of shape (view, y, x), `hottest` of (y, x).
+    `views` are the indices of each view's surface and band, shape (view, 2). `tables` contain each
+    band's radiance at 200 K and above, and its change to the next value, shape (band, n, 2).
+    `environments` is the radiance of each view's surroundings in W/(m² sr). `mean`, `centre` and
+    `peak` have shape (view, y, x), `hottest` has (y, x).
     """
 
     def __init__(
@@ -66,9 +63,9 @@ class Sums:
         check: Check | None,
     ) -> None:
         self.mean, self.centre = (np.zeros((len(views), *shape)) for _ in range(2))
-        self.peak, self.hottest = (np.zeros(of, np.float32) for of in (self.mean.shape, shape))
+        self.peak, self.hottest = (np.zeros(size, np.float32) for size in (self.mean.shape, shape))
         sums = self.mean, self.centre, self.peak, self.hottest
-        self._own = tables, environments, np.float32(max_emissivity), *sums, views
+        self._sums = tables, environments, np.float32(max_emissivity), *sums, views
         self._check = check
 
     def add_given(
@@ -76,8 +73,8 @@ class Sums:
     ) -> None:
         """Add up to `BATCH` frames.
 
-        `weights` (row, frame) are fractions of each row's exposure; `middles` (row,) is the frame
-        in the middle of each row's exposure, if any is.
+        `weights` (row, frame) are fractions of each row's exposure; `middles` (row,) is the index
+        of the frame in the middle of each row's exposure, if it is in the batch.
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
         emissivities = [stack.emissivities(frame) for frame in frames]
@@ -87,7 +84,7 @@ class Sums:
     def add_features(
         self, frames: Sequence[Frame], stack: Features, weights: Array, middles: Indices
     ) -> None:
-        """Add frames as `add_given`, whose emissivities are stored nowhere."""
+        """Add frames like `add_given`, but compute emissivities row by row."""
         temperature, material, strain, rate = (
             _batch(frames, name)
             for name in ("temperature", "material", "plastic_strain", "plastic_strain_rate")
@@ -101,11 +98,11 @@ class Sums:
     def add_splines(
         self, frames: Sequence[SplineFrame], stack: Features, weights: Array, middles: Indices
     ) -> None:
-        """Add any number of frames of splines on one lattice: their samples are stored nowhere."""
+        """Add any number of spline frames on one lattice; samples are computed row by row."""
         lattice = frames[0].lattice
         nodes = np.stack([frame.nodes for frame in frames])
         limits = np.stack([frame.limits for frame in frames])
-        # Without fixed positions textures are looked up by the material coordinates.
+        # Without fixed positions, textures are interpolated at the material coordinates.
         fixed = stack.fixed_positions or (np.empty((0, 0), np.float32),) * 2
         grid = (*lattice.down, *lattice.across, lattice.in_tool)
         shifts, textures = np.stack([stack.shift(frame.time) for frame in frames]), stack.textures
@@ -117,13 +114,13 @@ class Sums:
         def add(first: int, last: int) -> None:
             if self._check is not None:
                 self._check()
-            kernel(*arguments, first, last, self._own)
+            kernel(*arguments, first, last, self._sums)
 
         in_blocks(len(self.hottest), add)
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
-    """Return as many arrays as a kernel was compiled for; those at the end count for nothing."""
+    """Return `BATCH` arrays, the number that kernels are compiled for; the last ones are unused."""
     return tuple((arrays + [arrays[-1]] * BATCH)[:BATCH])
 
 
@@ -136,11 +133,11 @@ def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
 
 @njit(**_FAST)
 def _find(temperature, last, number, past):
-    """Find the table's entry before a temperature, and how far past it that is, or NaN."""
+    """Compute the table index below each temperature, and the remaining fraction or NaN."""
     for i in range(temperature.size):
         position = (temperature[i] - np.float32(COLDEST)) * np.float32(STEPS_PER_KELVIN)
         inside = min(max(position, np.float32(0.0)), np.float32(last))
-        # A value that is not finite becomes the smallest integer, or any.
+        # A non-finite value can become any integer.
         number[i] = min(max(np.int32(inside), np.int32(0)), np.int32(last - 1))
         off = position - inside
         past[i] = inside - np.float32(number[i]) if off == np.float32(0.0) else np.float32(np.nan)
@@ -154,18 +151,18 @@ def _look_up(table, number, past, black):
 
 
 @njit(**_FAST)
-def _heat(temperature, kind, hottest):
+def _raise_temperature(temperature, kind, hottest):
     for i in range(hottest.size):
         there = temperature[i] if kind[i] != _VOID else np.float32(0.0)
         hottest[i] = max(hottest[i], there)
 
 
 @njit(**_FAST)
-def _apparent(emissivity, black, kind, environment, most, apparent):
+def _apparent(emissivity, black, kind, environment, max_emissivity, apparent):
     for i in range(apparent.size):
         e = emissivity[i]
         radiance = environment + e * (black[i] - environment)
-        radiance = radiance if (e >= 0.0) & (e <= most) else np.float32(np.nan)
+        radiance = radiance if (e >= 0.0) & (e <= max_emissivity) else np.float32(np.nan)
         apparent[i] = radiance if kind[i] != _VOID else np.float32(0.0)
 
 
@@ -176,34 +173,34 @@ def _sum(apparent, weight, mean):
 
 
 @njit(**_FAST)
-def _raise(apparent, peak):
+def _raise_peak(apparent, peak):
     for i in range(peak.size):
         peak[i] = max(peak[i], apparent[i])
 
 
 @njit(**_FAST)
-def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number, own):
-    """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
-    tables, environments, most, mean, centre, peak, hottest, views = own
+def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number, sums):
+    """Add row `row` of a sub-frame, with the emissivities (surface, x), to the sums."""
+    tables, environments, max_emissivity, mean, centre, peak, hottest, views = sums
     past, black, apparent = work[0], work[1], work[2]
     _find(temperature, tables.shape[1] - 1, number, past)
-    _heat(temperature, kind, hottest[row])
-    looked_up = -1
+    _raise_temperature(temperature, kind, hottest[row])
+    current = -1
     for n in range(views.shape[0]):
         surface, band = views[n]
-        if band != looked_up:
+        if band != current:
             _look_up(tables[band], number, past, black)
-            looked_up = band
-        _apparent(emissivity[surface], black, kind, environments[n], most, apparent)
+            current = band
+        _apparent(emissivity[surface], black, kind, environments[n], max_emissivity, apparent)
         _sum(apparent, weight, mean[n, row])
-        _raise(apparent, peak[n, row])
+        _raise_peak(apparent, peak[n, row])
         if is_middle:
             centre[n, row, :] = apparent
 
 
 @njit(cache=True, **_FAST)
-def _add_given(temperature, material, emissivities, weights, middles, first, last, own):
-    columns = own[_MEAN].shape[2]
+def _add_given(temperature, material, emissivities, weights, middles, first, last, sums):
+    columns = sums[_MEAN].shape[2]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
@@ -212,14 +209,14 @@ def _add_given(temperature, material, emissivities, weights, middles, first, las
                 continue
             _add_row(
                 temperature[k][row], material[k][row], emissivities[k][:, row], weights[row, k],
-                k == middles[row], row, work, number, own,
+                k == middles[row], row, work, number, sums,
             )  # fmt: skip
 
 
 @njit(cache=True, **_FAST)
-def _add_features(fields, shifts, textures, weights, middles, first, last, own):
+def _add_features(fields, shifts, textures, weights, middles, first, last, sums):
     temperature, material, strain, rate, x, y = fields
-    surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
+    surfaces, columns = sums[_VIEWS][:, 0].max() + 1, sums[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
@@ -235,7 +232,7 @@ def _add_features(fields, shifts, textures, weights, middles, first, last, own):
             )  # fmt: skip
             _add_row(
                 temperature[k][row], material[k][row], emissivity, weights[row, k],
-                k == middles[row], row, work, number, own,
+                k == middles[row], row, work, number, sums,
             )  # fmt: skip
 
 
@@ -251,28 +248,28 @@ def _combine(wide, base, u, v, w, result):
 
 
 @njit(**_FAST)
-def _tell(filled, in_tool, kind):
+def _classify(filled, in_tool, kind):
     for i in range(kind.size):
-        seen = np.uint8(_WORKPIECE) if filled[i] > np.float32(0.5) else np.uint8(_VOID)
-        kind[i] = np.uint8(_TOOL) if in_tool[i] else seen
+        outside = np.uint8(_WORKPIECE) if filled[i] > np.float32(0.5) else np.uint8(_VOID)
+        kind[i] = np.uint8(_TOOL) if in_tool[i] else outside
 
 
 @njit(**_FAST)
-def _keep_within(values, least, most):
+def _limit(values, lower, upper):
     for i in range(values.size):
-        values[i] = min(max(values[i], least), most)
+        values[i] = min(max(values[i], lower), upper)
 
 
 @njit(**_FAST)
-def _take(tool, kind, temperature):
+def _set_tool(tool, kind, temperature):
     for i in range(kind.size):
         temperature[i] = tool[i] if kind[i] == _TOOL else temperature[i]
 
 
 @njit(cache=True, **_FAST)
-def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles, first, last, own):
+def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles, first, last, sums):
     first_down, down, first_across, across, in_tool = grid
-    surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
+    surfaces, columns = sums[_VIEWS][:, 0].max() + 1, sums[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
@@ -295,13 +292,13 @@ def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles,
             base = first_down[row] - top
             u, v, w = down[0, row], down[1, row], down[2, row]
             _combine(wide[FILLED_SPLINE], base, u, v, w, values[FILLED_SPLINE])
-            _tell(values[FILLED_SPLINE], in_tool[row], kind)
+            _classify(values[FILLED_SPLINE], in_tool[row], kind)
             for f in (0, _STRAIN, _RATE, _X, _Y):
                 _combine(wide[f], base, u, v, w, values[f])
-                _keep_within(values[f], limits[k, f, 0], limits[k, f, 1])
+                _limit(values[f], limits[k, f, 0], limits[k, f, 1])
             if in_tool[row].any():
                 _combine(wide[TOOL_SPLINE], base, u, v, w, values[TOOL_SPLINE])
-                _take(values[TOOL_SPLINE], kind, values[0])
+                _set_tool(values[TOOL_SPLINE], kind, values[0])
             if fixed[0].size > 0:
                 values[_X, :] = fixed[0][row]
                 values[_Y, :] = fixed[1][row]
@@ -311,5 +308,5 @@ def _add_splines(nodes, limits, grid, fixed, shifts, textures, weights, middles,
             )  # fmt: skip
             _add_row(
                 values[0], kind, emissivity, weights[row, k], k == middles[row], row, work, number,
-                own,
+                sums,
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The commands ``chipglow calibrate`` and ``psf``: what a camera is, from its own images."""
+"""The commands ``chipglow calibrate`` and ``psf``: properties of a camera, from its images."""
 
 from functools import partial
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The commands of a study: the whole of it, its cut alone, its camera alone, its wavelengths."""
+"""The commands of a study: complete run, error, cut, measurement and wavelengths."""
 
 import sys
 from collections.abc import Iterable

@@ -1,1 +1,1 @@
-"""How figures look, and which frame they show."""
+"""Style of figures, and the frame that they show."""

@@ -1,11 +1,11 @@
 """Style of figures: sizes, colours, images on micrometre axes."""
 
 from base64 import b64encode
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import pairwise
+from math import ceil, floor
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -17,6 +17,8 @@ from matplotlib.colors import Colormap, LogNorm, Normalize, to_rgba
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
+from PIL.Image import Image, open as open_image
+from PIL.ImageOps import invert
 
 from chipglow.drawing.scales import GREEN, HEAT, KELVIN, PLAIN, VOID, round_limit
 from chipglow.scene import Material, Raster, Scene, Tool
@@ -24,10 +26,8 @@ from chipglow.scene import Material, Raster, Scene, Tool
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
 
-_NARROW: Final = 4.2
-"""Width of a figure of stacked panels in inches: a telephone's screen."""
-
-_STACKED: Final = ContextVar("stacked", default=False)
+_MARGIN: Final = 3
+"""Pixels on the left of a column of panels."""
 
 _LARGEST_IN_MICRONS: Final = 5e-3
 
@@ -55,39 +55,9 @@ def style() -> Any:
     return matplotlib.rc_context(_STYLE)
 
 
-@contextmanager
-def stacked() -> Iterator[None]:
-    """Stack the panels of the figures that are drawn within in one column."""
-    token = _STACKED.set(True)
-    try:
-        yield
-    finally:
-        _STACKED.reset(token)
-
-
-class _PanelFigure(Figure):
-    """A figure of the page, whose panels may be stacked."""
-
-    columns = 1
-
-    def subplots(self, nrows: int = 1, ncols: int = 1, **options: Any) -> Any:
-        self.columns = ncols
-        if ncols == 1 or not _STACKED.get():
-            return super().subplots(nrows, ncols, **options)
-        squeeze = options.pop("squeeze", True)
-        self.set_size_inches(_NARROW, self.get_figheight() * ncols)
-        panels = super().subplots(nrows * ncols, 1, squeeze=False, **options)
-        return panels.reshape(nrows, ncols).squeeze() if squeeze else panels.reshape(nrows, ncols)
-
-    def legend(self, *arguments: Any, **options: Any) -> Any:
-        if _STACKED.get():
-            options |= {"loc": "outside lower center", "ncols": 1}
-        return super().legend(*arguments, **options)
-
-
 def new_figure(height: float) -> Figure:
     """Return an empty figure of the page's width and a height in inches."""
-    figure = _PanelFigure(figsize=(WIDTH, height), layout="constrained")
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -95,7 +65,7 @@ def new_figure(height: float) -> Figure:
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
     """Return an empty figure of the page's width for rows of images of a width in inches."""
     panel = panel_width * raster.rows / raster.columns
-    figure = _PanelFigure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
+    figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
     FigureCanvasAgg(figure)
     return figure
 
@@ -112,16 +82,47 @@ def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
     return png, svg
 
 
-def narrow_png(figure: Figure) -> bytes:
-    """Return the PNG of a figure of stacked panels at 100 dots per inch."""
+def panels(figure: Figure, png: Path) -> tuple[list[Image], Image | None]:
+    """Cut the PNG of a saved figure into its columns of panels and the legend below them."""
+    picture = open_image(png)
+    width, height = picture.size
+    legends = [legend.get_window_extent().extents for legend in figure.legends]
+    lefts: dict[int, float] = {}
+    for axes in figure.axes:
+        if spec := axes.get_subplotspec():
+            left, column = axes.get_tightbbox().x0, spec.colspan.start  # type: ignore[union-attr]
+            lefts[column] = min(left, lefts.get(column, left))
+    cuts = [0, *(floor(lefts[column]) - _MARGIN for column in sorted(lefts)[1:]), width]
+    below = round(height - max((top for *_, top in legends), default=0.0))
+    _, first, _, _ = _content(picture)
+    columns = [picture.crop((left, first, right, below)) for left, right in pairwise(cuts)]
+    columns = [column.crop((0, 0, column.width, _content(column)[3])) for column in columns]
+    if not legends:
+        return columns, None
+    left, _, right, _ = legends[0]
+    return columns, picture.crop((floor(left), below, ceil(right), height))
+
+
+def _content(picture: Image) -> tuple[int, int, int, int]:
+    """Return the left, upper, right and lower end of the part that is not white."""
+    return invert(picture.convert("L")).getbbox() or (0, 0, *picture.size)
+
+
+def label_panels(figure: Figure) -> None:
+    """Label the vertical axis of every panel, as each may stand alone on a narrow screen."""
+    labels: dict[int, str] = {}
+    for axes in figure.axes:
+        if spec := axes.get_subplotspec():
+            first = labels.setdefault(spec.rowspan.start, axes.get_ylabel())
+            axes.tick_params(labelleft=True)
+            axes.set_ylabel(axes.get_ylabel() or first)
+
+
+def data_url(image: Image) -> str:
+    """Return an image as a data URL of a PNG."""
     file = BytesIO()
-    figure.savefig(file, dpi=100)
-    return file.getvalue()
-
-
-def data_url(png: bytes) -> str:
-    """Return the address of a PNG that holds the PNG itself."""
-    return f"data:image/png;base64,{b64encode(png).decode('ascii')}"
+    image.save(file, "PNG")
+    return f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
 
 
 def show_image(

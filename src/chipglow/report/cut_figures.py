@@ -84,11 +84,10 @@ def rake_profiles(facts: Facts) -> Figure | None:
                 marker=".",
                 label=f"{grid.depth[row] * 1e6:.0f} µm",
             )
-        axes.set_title(name)
+        axes.set(title=name, xlabel="distance along the rake face / µm")
     panels[0].set_ylabel("radiance temperature / °C")
-    figure.supxlabel("distance from the edge along the rake face / µm", fontsize=9.5)
     handles = panels[0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside right center", title="depth")
+    figure.legend(*handles, loc="outside lower center", ncols=5, title="depth")
     return figure
 
 
@@ -150,10 +149,10 @@ def band_curves(facts: Facts) -> Figure:
         if facts.analysis.camera.lower_limit is not None:
             limit = facts.analysis.camera.lower_limit - KELVIN
             axes.axhline(limit, color=GREY, linestyle="--", linewidth=1.0)
-        axes.set_title(name)
+        axes.set(title=name, xlabel="distance along the band / µm")
     panels[0].set_ylabel("radiance temperature / °C")
-    figure.supxlabel("distance from the cutting edge along the band / µm", fontsize=9.5)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", title="time")
+    handles = panels[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=6, title="time")
     return figure
 
 

@@ -48,7 +48,7 @@ def environment() -> Environment:
         undefined=StrictUndefined,
     )
     made.filters |= {
-        "data_url": lambda png: data_url(png.read_bytes()),
+        "data_url": data_url,
         "degrees": degrees,
         "mean": lambda values: float(np.mean(list(values))),
         "median": lambda values: float(np.median(list(values))),

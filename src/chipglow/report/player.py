@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from math import floor, log10
 from typing import Any, Final, NamedTuple
 
@@ -66,9 +65,7 @@ class View:
         palette = np.concatenate([[to_rgb(scales.VOID)], colours])
         image = Image.fromarray(np.nan_to_num(index).astype(np.uint8))
         image.putpalette(np.round(palette * 255).astype(np.uint8).tobytes())
-        file = BytesIO()
-        image.save(file, "PNG", optimize=True)
-        return drawing.data_url(file.getvalue())
+        return drawing.data_url(image)
 
 
 @dataclass(frozen=True)

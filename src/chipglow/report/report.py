@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
+from PIL.Image import Image
 
 from chipglow import __version__
 from chipglow.analysis import Analysis, with_errors
@@ -25,15 +26,15 @@ from chipglow.text import json_schema
 
 
 class FigureFile(NamedTuple):
-    """A figure as written: file name without ending, heading, figure of the paper, texts, PNGs."""
+    """A figure as written: file name without ending, heading, the paper's figure, texts, images."""
 
     name: str
     title: str
     paper: str
     caption: str
     alt: str
-    png: Path
-    narrow: str  # address of the picture with its panels stacked; empty for one column
+    columns: Sequence[Image]  # of panels, beside each other or stacked on a narrow screen
+    legend: Image | None
 
 
 class Failure(NamedTuple):
@@ -181,12 +182,8 @@ def _figure(
             return None
         number, more = paper.FIGURES.get(name, ("", "")) if facts.is_compared else ("", "")
         file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
+        drawing.label_panels(figure)
         png, _ = drawing.save(figure, folder, file)
-        narrow = ""
-        if getattr(figure, "columns", 1) > 1:
-            with drawing.stacked():
-                same = draw(facts)
-            assert same is not None
-            narrow = drawing.data_url(drawing.narrow_png(same))
+        columns, legend = drawing.panels(figure, png)
     caption, alt = (facts.text(texts()["figures"][name][key]) for key in ("caption", "alt"))
-    return FigureFile(file, title, number, f"{caption} {more}".strip(), alt, png, narrow)
+    return FigureFile(file, title, number, f"{caption} {more}".strip(), alt, columns, legend)

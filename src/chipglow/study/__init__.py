@@ -1,4 +1,4 @@
-"""Studies: what to cut, look at and analyse, as a YAML file or in Python."""
+"""Studies: settings of cut, camera and analysis, as a YAML file or in Python."""
 
 from chipglow.study.cache import (
     CachedScene as CachedScene,

@@ -34,26 +34,28 @@ def cache_folder() -> Path:
 
 
 def scene_path(inputs: Mapping[str, Any]) -> Path:
-    """Return where the scene computed from these inputs is, or would be."""
+    """Return the path of the scene computed from these inputs; it may not exist yet."""
     text = dumps(inputs, sort_keys=True, allow_nan=False)
     return cache_folder() / f"scene-{sha256(text.encode()).hexdigest()[:32]}.nc"
 
 
 def cached_scenes() -> list[CachedScene]:
-    """Return scenes in the cache, the latest first, with what ended runs left of scenes."""
+    """Return the scenes in the cache, the latest first, and those of interrupted runs."""
     scenes = []
     for path in cache_folder().glob("scene-*.nc"):
         with suppress(FileNotFoundError):  # another process cleared it meanwhile
             status = path.stat()
             scenes.append(CachedScene(path, status.st_size, status.st_mtime))
-    for left in _unfinished():
+    for unfinished in _unfinished():
         with suppress(FileNotFoundError):
-            scenes.append(CachedScene(left.part, left.size, left.part.stat().st_mtime))
+            scenes.append(
+                CachedScene(unfinished.part, unfinished.size, unfinished.part.stat().st_mtime)
+            )
     return sorted(scenes, key=lambda scene: scene.modified, reverse=True)
 
 
 def clear_cache() -> int:
-    """Delete the cached scenes; return the bytes that this gave back."""
+    """Delete the cached scenes; return the number of bytes freed."""
     scenes = cached_scenes()
     for scene in scenes:
         scene.path.unlink(missing_ok=True)

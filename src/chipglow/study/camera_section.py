@@ -46,8 +46,8 @@ class CameraSection(Part):
     preset: Annotated[
         str | None,
         Parameter(
-            "A camera by name: its data sheet's numbers where this section says nothing. Its "
-            "lens's magnification is given beside it.",
+            "Named camera, whose data sheet supplies the values that this section omits. State the "
+            "magnification of the lens separately.",
             allowed=f"none, {', '.join(CAMERAS)}",
         ),
     ] = None
@@ -64,7 +64,7 @@ class CameraSection(Part):
     detector_pitch: Annotated[
         float | None,
         Parameter(
-            "The same on the detector, of its data sheet, instead of pitch; with magnification.",
+            "Pixel pitch on the detector, by the data sheet; replaces pitch, with magnification.",
             LENGTH,
             over=0.0,
         ),
@@ -78,8 +78,8 @@ class CameraSection(Part):
     array: Annotated[
         tuple[int, int] | None,
         Parameter(
-            "Columns and rows of the detector; none, and where the scene is smaller: as many as "
-            "see the scene.",
+            "Columns and rows of the detector, at most as many as cover the scene; none: as many "
+            "as cover it.",
             least=1,
             allowed="none, or such as [640, 512]",
         ),
@@ -113,8 +113,8 @@ class CameraSection(Part):
         float | Literal["detector"] | None,
         replace(
             Camera.parameter("lower_limit"),
-            meaning="Radiance temperatures under this are flagged, not returned; or none. With a "
-            "detector it is the detector's, unless it is given.",
+            meaning="Radiance temperatures below this are flagged, not returned; or none. Default "
+            "with a detector: the limit of the detector.",
             allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
     ] = PAPER_LIMIT
@@ -127,7 +127,7 @@ class CameraSection(Part):
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
-        """Return the data with what preset, detector and lens make."""
+        """Return the data, completed by preset, detector and lens."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("preset")
@@ -169,19 +169,16 @@ class CameraSection(Part):
         if self.lower_limit != FROM_DETECTOR:
             return self.lower_limit
         if self.detector is None:
-            raise ValueError("lower_limit: detector, expected a detector beside it")
+            raise ValueError("lower_limit: detector requires a detector")
         point = OperationPoint(band, self.integration_time, self.frame_rate, self.fill_factor)
         return lower_range_limit(self.detector, point)
 
     def _psf(self, band: Band) -> PointSpreadFunction | None:
         if self.psf is None:
             if self.blur:
-                raise ValueError(
-                    "blur: is given with psf: none, expected a point spread function that it is "
-                    "part of"
-                )
+                raise ValueError("blur: requires a point spread function, got psf: none")
             return None
-        psf = self.psf.of_camera(band, self.magnification)
+        psf = self.psf.for_camera(band, self.magnification)
         return BlurredPSF(psf, self.blur) if self.blur else psf
 
 

@@ -37,7 +37,7 @@ class FieldOfViewSection(Part):
     spacing: Annotated[
         float,
         Parameter(
-            "Side of a sample. A whole number of them should make camera.pitch: the paper has 9.",
+            "Side of a sample. camera.pitch should be a whole multiple of it; the paper has 9.",
             LENGTH,
             over=0.0,
         ),
@@ -60,8 +60,8 @@ class CutToolSection(ToolSection):
     temperature: Annotated[
         float | Literal["steady"] | None,
         Parameter(
-            "Temperature of the tool when the cut begins; steady: after a long cut; none: "
-            "as cold as the workpiece, as the paper's.",
+            "Temperature of the tool at the start of the cut; steady: of the steady state; none: "
+            "of the workpiece, as in the paper.",
             TEMPERATURE,
             least=INITIAL_TEMPERATURE.least,
             most=INITIAL_TEMPERATURE.most,

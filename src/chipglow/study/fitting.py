@@ -1,4 +1,4 @@
-"""A study's surfaces and tool on a scene that someone else may have made."""
+"""A study's surfaces and tool on an existing scene."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -54,8 +54,8 @@ def fit(study: Study, scene: Scene) -> Fitted:
         assumed.append("The scene has no tool: the study's section cutting.tool defines it.")
     if scene.tool is not None and not (scene.frame(0).material == Material.TOOL).any():
         assumed.append(
-            "The scene shows no tool: beyond the rake face nothing shines into the blur of the "
-            "chip, and errors there are larger than with a warm tool."
+            "The scene shows no tool: no radiation from beyond the rake face blurs into the chip, "
+            "so errors there are larger than with a warm tool."
         )
     follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"
     changed = {name: _following(surface, follow) for name, surface in surfaces.items()}
@@ -109,16 +109,15 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
     if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
         yield (
-            f"Nothing moves between the scene's frames: one of them stands for "
-            f"{spacing * 1e6:.3g} us of the exposure's {exposure * 1e6:.3g} us. Motion in that "
-            "time makes no error here."
+            f"Each frame of the scene represents {spacing * 1e6:.3g} us of the exposure's "
+            f"{exposure * 1e6:.3g} us: motion within that time is neglected."
         )
     cutting = study.cutting
     cells = cutting.feed / cutting.numerics.cell
     if study.scene is None and cells < _FEW_CELLS * (1 - 1e-9):
         yield (
-            f"The feed is {cells:.3g} cells: too coarse for the forces and shear bands of this "
-            f"cut, {_FEW_CELLS} or more are not (cutting.numerics.cell)."
+            f"The feed is {cells:.3g} cells: too coarse for forces and shear bands; use "
+            f"{_FEW_CELLS} or more (cutting.numerics.cell)."
         )
 
 

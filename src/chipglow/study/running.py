@@ -1,4 +1,4 @@
-"""Running a study: the cut (or the scene that was cut before), the camera, the analysis."""
+"""Running a study: cut or cached scene, camera, analysis."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -54,14 +54,14 @@ def cut(
     resume: bool = False,
     on_preview: Callable[[Frame], None] | None = None,
 ) -> Path:
-    """File of the study's scene: computed now, or found in the cache.
+    """Return the file of the study's scene, from the cache or newly computed.
 
     Parameters
     ----------
     study : Study
         Only its section `cutting` matters.
     progress : callable, optional
-        Told how far the simulation is; not called if the scene is found.
+        Called with the progress of the simulation; not called if the scene is cached.
     resume : bool
         Go on from the last checkpoint of a run of the same cut that was interrupted or killed, if
         there is one. The scene is the same to the last bit.
@@ -77,7 +77,7 @@ def cut(
     Raises
     ------
     SolverError
-        If the simulation goes wrong; the message names the last checkpoint, which is kept.
+        If the simulation fails; the message names the last checkpoint, which is kept.
     """
     path = scene_path(scene_inputs(study))
     if not _is_whole(path):
@@ -118,14 +118,14 @@ def run(
     progress: Progress | None = None,
     resume: bool = False,
 ) -> Analysis:
-    """Run a study from the cut, or from the scene that takes its place, to the analysis.
+    """Run a study: cut or open its scene, measure and analyse.
 
     Parameters
     ----------
     study : Study
         The study; the paper's is ``Study()``.
     progress : callable, optional
-        Told which step is under way and how much of it is done.
+        Called with the current step and its completed fraction, 0 to 1.
     resume : bool
         As for `cut`.
 
@@ -139,7 +139,7 @@ def run(
     Raises
     ------
     ValueError
-        If the scene cannot be analysed as the study wants it; the message names the scene file.
+        If the scene cannot be analysed as the study requires; the message names the scene file.
     """
     with _fitted(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
@@ -162,7 +162,7 @@ def wavelengths(
     progress: Progress | None = None,
     resume: bool = False,
 ) -> xr.Dataset:
-    """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
+    """Compute the errors of the study's spectral bands, alone and as ratios of two.
 
     They are read at the rake face and in the shear band of a cut, or at the points of the section
     analysis, if given. The study's camera is given each band in turn.
@@ -197,7 +197,7 @@ def wavelengths(
             text
             for band in study.wavelengths.bands
             for surface in fitted.surfaces.values()
-            for text in surface.origin.doubts(band, scene)
+            for text in surface.origin.warnings(band, scene)
         ]
         return data.assign_attrs((fitted.notes + Notes(warnings=doubts)).attrs())
 

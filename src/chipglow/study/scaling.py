@@ -112,7 +112,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
 
 
 def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """Return a camera's data with the pitch on the scene that its data sheet makes."""
+    """Return a camera's data with the pitch on the scene that follows from its data sheet."""
     detector, magnification = (camera.get(name) for name in ("detector_pitch", "magnification"))
     if detector in (None, "none"):
         return dict(camera)
@@ -124,7 +124,7 @@ def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, A
     given = LENGTH.parse(camera["pitch"], si=not from_file) if "pitch" in camera else pitch
     if abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(
-            f"pitch: {camera['pitch']} beside a detector_pitch that makes {LENGTH.text(pitch)}, "
-            "expected one of them"
+            f"pitch: {camera['pitch']} contradicts detector_pitch / magnification, "
+            f"{LENGTH.text(pitch)}; state only one of them"
         )
     return {**camera, "magnification": float(magnification), "pitch": LENGTH.text(pitch)}

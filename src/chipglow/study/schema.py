@@ -41,9 +41,8 @@ class Study(Part):
     scene: Annotated[
         FileBeside | None,
         Parameter(
-            "File of a scene that takes the place of the cut, such as one of chipglow import. Its "
-            "own times and samples count; of the section cutting only the tool, if the scene has "
-            "none.",
+            "Scene file to measure instead of a cut, such as the output of chipglow import. The "
+            "section cutting is then ignored, except for its tool if the scene has none.",
             allowed="none, or a file beside this one: scene.nc",
         ),
     ] = None

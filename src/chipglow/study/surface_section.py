@@ -117,7 +117,7 @@ class FeaturesSection(Part):
     ] = None
     measured_in: Annotated[
         tuple[float, float],
-        Parameter("Band in which they are as they stand here.", WAVELENGTHS),
+        Parameter("Band in which these emissivities were measured.", WAVELENGTHS),
     ] = (3.8e-6, 5.1e-6)
     measured_on: Annotated[
         str | None,

@@ -104,10 +104,10 @@ class FeatureSurface(Surface, Part):
             "texture": f"grain {self.grain:g} m, follow {self.follow}, seed {self.seed}{restored}",
         }
 
-    def on(
+    def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        """See `Surface.on`; with `follow` "mean", all frames of the scene are read once."""
+        """See `Surface.prepare`; with `follow` "mean", all frames of the scene are read once."""
         if "plastic_strain" not in scene.fields:
             raise ValueError(
                 "surface: the scene has no plastic strain, by which chip and workpiece are told "
@@ -259,7 +259,7 @@ class EmissivityStack:
         return not any(field.changes for field in self.fields)
 
     @property
-    def needed(self) -> frozenset[str] | None:
+    def required_fields(self) -> frozenset[str] | None:
         """Fields of a frame that are read in addition to temperature and material; None: all."""
         sets = [field.fields for field in self.fields]
         known = [one for one in sets if one is not None]

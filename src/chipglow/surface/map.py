@@ -97,7 +97,7 @@ class MapSurface(Surface):
         if not 0 <= self.elsewhere <= 1:
             raise ValueError(f"emissivity map: elsewhere is {self.elsewhere!r}, expected 0 to 1")
 
-    def on(
+    def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
         image, shape = self.at(scene.raster), scene.raster.shape

@@ -56,7 +56,7 @@ class Oxide(Modifier):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        history = OxideHistory.of(scene, self)
+        history = OxideHistory.from_scene(scene, self)
 
         def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             return self.of_thickness(emissivity, history.thickness(frame))
@@ -112,7 +112,7 @@ class OxideHistory:
 
     @classmethod
     @lru_cache(maxsize=1)
-    def of(cls, scene: Scene, oxide: Oxide) -> "OxideHistory":
+    def from_scene(cls, scene: Scene, oxide: Oxide) -> "OxideHistory":
         """Follow the material of a scene; many surfaces share that of the last scene and oxide."""
         if not scene.has_material_coordinates:
             raise ValueError(

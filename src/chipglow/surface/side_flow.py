@@ -15,7 +15,7 @@ from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
 from chipglow.surface.directional import Direction
 from chipglow.surface.exchange import Exchange
-from chipglow.surface.spectral import known_band
+from chipglow.surface.spectral import required_band
 from chipglow.surface.surface import Change, ModifiedSurface, Modifier, Surface
 
 REFLECTIONS: Final = Family("reflections")
@@ -195,7 +195,7 @@ class SideShape(Modifier):
                 "reflections: the scene does not state its tool, expected one, between whose rake "
                 "face and the chip light is reflected"
             )
-        black_in_band, cosines = known_band(self.effect, band).radiance, self.elements.cosines
+        black_in_band, cosines = required_band(self.effect, band).radiance, self.elements.cosines
         surroundings = 0.0 if reflected is None else float(black_in_band(reflected))
         modifiers = surface.modifiers if isinstance(surface, ModifiedSurface) else ()
         directions = [one for one in modifiers if isinstance(one, Direction)]

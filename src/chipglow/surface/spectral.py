@@ -65,10 +65,10 @@ class SpectralSurface(Surface):
         values = np.clip((weights * emissivity).sum(axis=1) / weights.sum(axis=1), 0.0, 1.0)
         return TemperatureSurface(tuple(zip(temperature.tolist(), values.tolist(), strict=True)))
 
-    def on(
+    def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        return self.in_band(known_band(self.kind, band), reflected).on(scene)
+        return self.in_band(required_band(self.kind, band), reflected).prepare(scene)
 
 
 @SPECTRA.part
@@ -174,7 +174,7 @@ class Dispersion(Modifier):
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
         known = self.law.in_band(self.measured_in, None)
-        seen = self.law.in_band(known_band(self.effect, band), reflected)
+        seen = self.law.in_band(required_band(self.effect, band), reflected)
         here, there = (np.clip(one.columns[1], _LEAST, 1 - _LEAST) for one in (known, seen))
         temperatures, odds = seen.columns[0], there / (1 - there) * (1 - here) / here
 
@@ -186,7 +186,7 @@ class Dispersion(Modifier):
         return changed
 
 
-def known_band(name: str, band: Band | None) -> Band:
+def required_band(name: str, band: Band | None) -> Band:
     """Return the camera's band, without which what is not grey has no emissivity."""
     if band is None:
         raise ValueError(f"{name}: no band is given, expected that of a camera")

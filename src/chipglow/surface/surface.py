@@ -28,7 +28,7 @@ Change: TypeAlias = Callable[[NDArray[np.float32], Frame], NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class EmissivityField:
-    """The emissivity of one scene's samples, frame by frame; made by `Surface.on`.
+    """The emissivity of one scene's samples, frame by frame; made by `Surface.prepare`.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Origin:
     """Limits in m."""
     metal: str = ""
 
-    def doubts(self, band: Band, scene: Scene) -> Iterator[str]:
+    def warnings(self, band: Band, scene: Scene) -> Iterator[str]:
         """Yield where a camera's band or the metal of a scene is another, a sentence each."""
         seen, metal = (band.lower, band.upper), str(scene.data.attrs.get("metal", ""))
         if self.band is not None and not np.allclose(self.band, seen, rtol=_SAME_BAND, atol=0.0):
@@ -96,7 +96,7 @@ class Surface(Part, ABC):
         return True
 
     @abstractmethod
-    def on(
+    def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
         """Lay the surface on a scene; what depends on the whole scene is computed here.
@@ -164,7 +164,7 @@ class Modifier(Part, ABC):
         surface : Surface
             The surface that is modified.
         scene, band, reflected
-            As for `Surface.on`.
+            As for `Surface.prepare`.
 
         Returns
         -------
@@ -202,10 +202,10 @@ class ModifiedSurface(Surface):
     def modified(self, *modifiers: Modifier) -> "ModifiedSurface":
         return replace(self, modifiers=(*self.modifiers, *modifiers))
 
-    def on(
+    def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        field, surface = self.bare.on(scene, band, reflected), self.bare
+        field, surface = self.bare.prepare(scene, band, reflected), self.bare
         for one in self.modifiers:
             field = EmissivityField(
                 field.bare,

@@ -22,7 +22,7 @@ class HomogeneousSurface(Surface):
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
         """Return the emissivity at true temperatures in K."""
 
-    def on(
+    def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
         return EmissivityField(self._emissivity, frozenset())

@@ -1,4 +1,4 @@
-"""Blurs besides the optics: charge that diffuses, and a camera that moves."""
+"""Blurs in addition to the optics: charge diffusion and camera motion."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -24,27 +24,24 @@ from chipglow.quantities.units import ANGLE, LENGTH
 from chipglow.radiometry import Band
 
 BLURS: Final = Family("blur")
-"""Blurs by their kind; other packages add theirs in the group ``chipglow.blur``."""
+"""Blurs by kind; other packages register theirs in the group ``chipglow.blur``."""
 
 _SQUARES_PER_WIDTH: Final = 4
-"""Squares to a point spread function's width, so that hardly any of its detail is finer."""
+"""Minimum number of squares across the width of a point spread function."""
 
 _NEAR: Final = 32
-"""Widths of a point spread function within which a blur changes it."""
+"""Range of a blur's change in widths of the point spread function."""
 
 _WIDTH_SQUARES: Final = 24
 
 
 class BlurTerm(Part, ABC):
-    """An effect that moves the light of a point about, the same wherever it is.
-
-    Lengths are on the scene, as those of a point spread function.
-    """
+    """A shift-invariant blur; lengths are on the scene."""
 
     @property
     @abstractmethod
     def reach(self) -> float:
-        """Distance in m over which it carries light."""
+        """Largest displacement of light in m."""
 
     @abstractmethod
     def transfer(self, across: Array, up: Array) -> Array:
@@ -53,7 +50,7 @@ class BlurTerm(Part, ABC):
         Parameters
         ----------
         across, up : ndarray
-            Spatial frequencies to the right and upwards in 1/m, broadcast against each other.
+            Spatial frequencies to the right and up in 1/m, broadcast against each other.
         """
 
 
@@ -67,13 +64,13 @@ Direction = Annotated[
 
 @dataclass(frozen=True)
 class _RandomBlur(BlurTerm):
-    """Normally distributed displacements: the transfer function is exp(−2π² σ² f²)."""
+    """Normally distributed displacements with the transfer function exp(−2π² σ² f²)."""
 
     standard_deviation: Deviation
 
     @property
     def reach(self) -> float:
-        """Eight standard deviations: beyond them there is 1e-15 of the light."""
+        """Eight standard deviations, beyond which 1e-15 of the light falls."""
         return 8 * self.standard_deviation
 
     def transfer(self, across: Array, up: Array) -> Array:
@@ -83,7 +80,7 @@ class _RandomBlur(BlurTerm):
 @BLURS.part
 @dataclass(frozen=True)
 class ChargeDiffusion(_RandomBlur):
-    """Charge that diffuses into neighbouring detector elements before it is collected."""
+    """Diffusion of charge into neighbouring detector elements before it is collected."""
 
     kind = "charge-diffusion"
     example = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
@@ -92,7 +89,7 @@ class ChargeDiffusion(_RandomBlur):
 @BLURS.part
 @dataclass(frozen=True)
 class Jitter(_RandomBlur):
-    """Vibration at random with many periods in an integration time."""
+    """Random vibration with many periods within the integration time."""
 
     kind = "jitter"
     example = "{kind: jitter, standard_deviation: 1 um}"
@@ -101,12 +98,12 @@ class Jitter(_RandomBlur):
 @BLURS.part
 @dataclass(frozen=True)
 class LinearMotion(BlurTerm):
-    """Camera and scene that move against each other, evenly, while the camera integrates."""
+    """Uniform motion between camera and scene during the integration time."""
 
     kind = "linear-motion"
     example = "{kind: linear-motion, distance: 4 um, direction: 0 deg}"
     distance: Annotated[
-        float, Parameter("Way within an integration time, on the scene.", LENGTH, over=0.0)
+        float, Parameter("Path during the integration time, on the scene.", LENGTH, over=0.0)
     ]
     direction: Direction = 0.0
 
@@ -121,7 +118,7 @@ class LinearMotion(BlurTerm):
 @BLURS.part
 @dataclass(frozen=True)
 class Vibration(BlurTerm):
-    """Sinusoidal vibration along a line with many periods in an integration time."""
+    """Sinusoidal vibration along a line with many periods within the integration time."""
 
     kind = "vibration"
     example = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
@@ -146,22 +143,22 @@ def _along(direction: float, across: Array, up: Array) -> Array:
 
 @dataclass(frozen=True)
 class BlurredPSF(PointSpreadFunction):
-    """A point spread function with further blurs: the transfer functions are multiplied.
+    """A point spread function with further blurs, whose transfer functions are multiplied.
 
     Parameters
     ----------
     psf : PointSpreadFunction
-        The blur of the optics, or a measured one.
+        Blur of the optics, or a measured one.
     blurs : tuple of BlurTerm
-        Further blurs; a ValueError if one is in the point spread function already.
+        Further blurs; a ValueError if the point spread function includes one already.
 
     Notes
     -----
-    `fwhm` is the mean of the widths along the row and the column through the peak. What the blurs
-    change is computed within 32 widths of the middle and their reach, on squares of at most a
-    quarter of the width, and summed on the squares that are asked for: the squares themselves
-    count once. Farther away a blur of standard deviation σ changes the light at a radius r by a
-    fraction of some (σ / r)², which is left out. No light is lost.
+    `fwhm` is the mean of the widths along the row and the column through the peak. The change due
+    to the blurs is computed within 32 widths plus the reach of the blurs, on squares of at most a
+    quarter of the width, and summed over the requested squares. Farther out, at a radius r, a blur
+    of standard deviation σ changes the light by a fraction of about (σ / r)², which is neglected.
+    The total light is conserved.
     """
 
     psf: PointSpreadFunction
@@ -172,8 +169,7 @@ class BlurredPSF(PointSpreadFunction):
         for one in self.blurs:
             if one.kind in self.psf.includes:
                 raise ValueError(
-                    f"blur: {one.kind} is in the point spread function already (includes), "
-                    "expected it once"
+                    f"blur: the point spread function already includes {one.kind}; remove it here"
                 )
 
     def __str__(self) -> str:
@@ -181,7 +177,7 @@ class BlurredPSF(PointSpreadFunction):
 
     @property
     def includes(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Kinds of effects in it besides the optics."""
+        """Kinds of effects in addition to the optics."""
         return (*self.psf.includes, *(one.kind for one in self.blurs))
 
     @cached_property
@@ -190,7 +186,7 @@ class BlurredPSF(PointSpreadFunction):
         spacing = self.psf.fwhm / _WIDTH_SQUARES
         half = ceil((self.psf.fwhm + self._reach) / spacing)
         kernel = self.view_kernel(spacing, half, half)
-        kernel = kernel[1:-1, 1:-1]  # the outermost squares hold what goes farther
+        kernel = kernel[1:-1, 1:-1]  # the border squares contain the light beyond
         return kernel_fwhm(kernel, spacing)
 
     def in_band(self, band: Band) -> "BlurredPSF":
@@ -211,13 +207,13 @@ class BlurredPSF(PointSpreadFunction):
         return normalised(np.maximum(sum_of_both, 0.0))
 
     def _change(self, spacing: float) -> Array:
-        """Return what the blurs change in the fractions on squares, of sum 0."""
+        """Return the change of the fractions due to the blurs, of sum 0."""
         half = half_size(_NEAR * self.psf.fwhm + self._reach, spacing)
         parts = 1 + 2 * ceil(max(_SQUARES_PER_WIDTH * spacing / self.psf.fwhm - 1, 0) / 2)
         fine = spacing / parts
         reach = half * parts + parts // 2
         half_size(reach * fine, fine)
-        # The outermost squares of a view hold all that goes farther: those are left out.
+        # The border squares contain the light beyond and are cut off.
         kernel = resized(self.psf.view_kernel(fine, reach + 1, reach + 1), reach, reach)
         frequency = fft.fftfreq(kernel.shape[0], fine)
         # Rows go down, frequencies go up.

@@ -1,4 +1,4 @@
-"""Kernels on squares."""
+"""Kernels on a grid of squares."""
 
 from collections.abc import Callable
 from math import ceil, hypot, pi, sqrt
@@ -11,37 +11,37 @@ from numba import njit
 from chipglow.quantities import Array
 
 LARGEST_KERNEL: Final = 4097
-"""Squares along a side that a kernel has at most."""
+"""Largest number of squares along a side of a kernel."""
 
 _EQUAL: Final = 1e-9
 _INFINITE: Final = 1e9
 
 _STEPS: Final = 64
-"""Steps of the amplitude's table over which its fastest wave moves on by one radian."""
+"""Table steps per radian of the shortest wave of the amplitude."""
 
 _KERNEL: Final[Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 def normalised(kernel: Array) -> Array:
-    """Return a kernel of sum 1."""
+    """Scale a kernel to a sum of 1."""
     return np.asarray(kernel / kernel.sum())
 
 
 def folded(kernel: Array, rows: int, columns: int) -> Array:
-    """Return a kernel cut to this size; its outermost squares hold what was beyond."""
+    """Cut a kernel to a half size; its border squares contain the light beyond."""
     for axis, reach in enumerate((rows, columns)):
         line = np.moveaxis(kernel, axis, 0)
         beyond = line.shape[0] // 2 - reach
         if beyond > 0:
-            kept = line[beyond:-beyond].copy()
-            kept[0] += line[:beyond].sum(axis=0)
-            kept[-1] += line[-beyond:].sum(axis=0)
-            kernel = np.moveaxis(kept, 0, axis)
+            inner = line[beyond:-beyond].copy()
+            inner[0] += line[:beyond].sum(axis=0)
+            inner[-1] += line[-beyond:].sum(axis=0)
+            kernel = np.moveaxis(inner, 0, axis)
     return kernel
 
 
 def resized(kernel: Array, rows: int, columns: int) -> Array:
-    """Return a kernel cut or padded with zeros to a number of squares around the centre."""
+    """Cut a kernel to a half size, or pad it with zeros."""
     for axis, reach in enumerate((rows, columns)):
         more = reach - kernel.shape[axis] // 2
         line = np.moveaxis(kernel, axis, 0)
@@ -51,14 +51,14 @@ def resized(kernel: Array, rows: int, columns: int) -> Array:
 
 
 def half_size(reach: float, spacing: float) -> int:
-    """Return the number of squares on each side of the middle one that hold all within `reach`."""
+    """Return the number of squares on each side of the central one that cover `reach`."""
     check_length("spacing", spacing)
-    # A kernel that ends on a square's edge but for rounding needs no square more.
+    # The tolerance absorbs rounding if a kernel ends on the edge of a square.
     half = max(0, ceil(reach / spacing - 0.5 - 1e-9))
     if 2 * half + 1 > LARGEST_KERNEL:
         raise ValueError(
-            f"psf: spacing is {spacing:g} m, expected {2 * reach / LARGEST_KERNEL:.3g} m or more "
-            f"for a kernel of {2 * reach:.3g} m"
+            f"psf: spacing of {spacing:g} m is too fine for a kernel of {2 * reach:.3g} m; use "
+            f"{2 * reach / LARGEST_KERNEL:.3g} m or more"
         )
     return half
 
@@ -66,11 +66,11 @@ def half_size(reach: float, spacing: float) -> int:
 def poisson_squares(
     spacing: float, rows: int, columns: int, tail: float, width: float, beyond: bool
 ) -> Array:
-    """Return the fractions on squares of light of transfer (1 + 2π (b − a) f) exp(−2π b f).
+    """Return the fractions on squares of the transfer function (1 + 2π (b − a) f) exp(−2π b f).
 
-    Far away it falls as a / (2π r³); a is `tail` and b `width`. That of exp(−2π b f) alone within
-    0 to x and 0 to y is atan(x y / (b R)) / 2π with R² = x² + y² + b², and f times it is its
-    derivative by b.
+    a is `tail` and b `width`; far away the light falls as a / (2π r³). The fraction of
+    exp(−2π b f) within 0 to x and 0 to y is atan(x y / (b R)) / 2π with R² = x² + y² + b²; the
+    factor f differentiates it with respect to b.
     """
     x, y = (spacing * (np.arange(-n, n + 2) - 0.5) for n in (columns, rows))
     if beyond:
@@ -88,10 +88,9 @@ def light_on_squares(
 ) -> Array:
     """Integrate the square of an amplitude over squares, shape (rows + 1, columns + 1).
 
-    The first square's middle is at radius 0; `nodes` are Gauss nodes along a side. The amplitude
-    holds no wave shorter than 2π, as that of a pupil of radius 1 does not. It is evaluated at even
-    radii only, and between them is the cubic through the four nearest: with a step h it is off by
-    3 h⁴ / 128 of the waves' amplitude there, 1.4e-9.
+    The first square is centred at radius 0; `nodes` is the number of Gauss nodes along a side. The
+    amplitude contains no wave shorter than 2π, as for a pupil of radius 1. It is tabulated at equal
+    steps h of the radius and interpolated by cubics, with a relative error of 3 h⁴ / 128 = 1.4e-9.
     """
     node, weight = np.polynomial.legendre.leggauss(nodes)
     down, across = (side * (np.arange(n + 1)[:, None] + node / 2) for n in (rows, columns))
@@ -120,15 +119,15 @@ def _add_light(table, down, across, weight, sums):  # type: ignore[no-untyped-de
 
 @njit(inline="always")
 def _between(before, first, last, after, t):  # type: ignore[no-untyped-def]
-    """Return the value at 0 ≤ t ≤ 1 between the middle two of four even values, by their cubic."""
+    """Interpolate between the middle two of four equidistant values, 0 ≤ t ≤ 1, by a cubic."""
     near = before * t * (t - 1.0) * (2.0 - t) + after * t * (t - 1.0) * (t + 1.0)
     far = (first * (1.0 - t) + last * t) * 3.0 * (2.0 - t) * (t + 1.0)
     return (near + far) / 6.0
 
 
 def peak(weights: Array) -> tuple[int, int]:
-    """Return row and column of the largest value; of equal ones, of the most central."""
-    # Values that differ by rounding alone are equal: the top of a disc is flat.
+    """Return row and column of the largest value; of equal values, the most central."""
+    # Values that differ by rounding are equal: the top of a disc is flat.
     places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
     from_middle = np.hypot(*(places - places.mean(axis=0)).T)
     row, column = places[int(np.argmin(from_middle))].tolist()
@@ -136,7 +135,7 @@ def peak(weights: Array) -> tuple[int, int]:
 
 
 def kernel_fwhm(kernel: Array, spacing: float) -> float:
-    """Return the mean full width at half maximum of row and column through the peak, in m."""
+    """Return the mean full width at half maximum along row and column through the peak, in m."""
     row, column = peak(kernel)
     widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
     return float(np.mean(widths)) * spacing
@@ -154,6 +153,8 @@ def half_maximum_width(line: Array) -> float:
 
 
 def check_length(name: str, value: float) -> None:
-    """Raise a ValueError unless a length is over 0 to 0.1 m."""
+    """Raise a ValueError unless a length is positive and at most 0.1 m."""
     if not (isinstance(value, Real) and 0.0 < value <= 0.1):
-        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 0.1 m; 8 um is 8e-6")
+        raise ValueError(
+            f"psf: {name} must be positive and at most 0.1 m, not {value!r}; 8 um is 8e-6"
+        )

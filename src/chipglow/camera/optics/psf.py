@@ -30,33 +30,34 @@ from chipglow.text import check_own_data
 from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
-"""Fraction of a Gaussian's light that its kernel holds: all but rounding.
+"""Fraction of a Gaussian's light within its kernel: all but rounding.
 
-With 0.9999 a surface at 573 K beside one at 1300 K lacked, in a band of 1.0 to 1.7 um, all of the
-light that it gets from there: the hot one sends 10 000 times as much.
+A smaller fraction such as 0.9999 is not enough: in a band of 1.0 to 1.7 um, a surface at 1300 K
+radiates 10 000 times as much as one at 573 K next to it.
 """
 
 ANNULAR_ENERGY: Final = 0.99
-"""The same for diffraction, whose light beyond a radius r falls only as 1/r.
+"""Fraction of diffracted light within `AnnularAperturePSF.kernel`.
 
-The camera's blur has no use for it: `PointSpreadFunction.view_kernel` leaves out nothing.
+The fraction beyond a radius r falls only as 1/r. `PointSpreadFunction.view_kernel` contains all
+light.
 """
 
 FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
-"""Full width at half maximum of a Gaussian over its standard deviation."""
+"""Ratio of full width at half maximum to standard deviation of a Gaussian."""
 
 _FAR: Final = 30.0
-"""Radius, as v, from which on the mean of diffraction's rings falls as 1/r³: within 2 %."""
+"""Radius v beyond which the mean irradiance of diffraction rings falls as 1/r³, within 2 %."""
 
 
 PSFS: Final = Family("psf")
-"""Point spread functions by their kind; other packages add theirs in the group ``chipglow.psf``."""
+"""Point spread functions by kind; other packages register theirs in the group ``chipglow.psf``."""
 
 
 DiffractionWavelength = Annotated[
     float | None,
     Parameter(
-        "Wavelength of the diffraction; none: the middle of the camera's band.",
+        "Wavelength of the diffraction; none: the centre of the camera's band.",
         WAVELENGTH,
         over=0.0,
         most=0.1,
@@ -65,32 +66,32 @@ DiffractionWavelength = Annotated[
 
 
 class PSFChoice(Part, ABC):
-    """A description's choice of a camera's point spread function."""
+    """Settings from which a camera's point spread function is made."""
 
     @abstractmethod
-    def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
-        """Return the point spread function on the scene, by the band and the lens's magnification.
+    def for_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
+        """Return the point spread function on the scene for a band and a magnification of the lens.
 
-        A ValueError if that is not possible, such as without a magnification where it is needed.
+        Raises a ValueError if a required magnification is missing.
         """
 
 
 class PointSpreadFunction(PSFChoice):
-    """Distribution of a point's light over the scene's plane, `fwhm` m wide at half maximum.
+    """Distribution of a point's light over the scene's plane.
 
-    `includes` are effects in it besides the optics: ``footprint`` for the pixel's sensitive square,
-    or kinds of `chipglow.camera.BLURS`. A camera adds none of them again.
+    `fwhm` is its full width at half maximum in m. `includes` names effects that it contains in
+    addition to the optics: ``footprint`` for the sensitive area of a pixel, or kinds of
+    `chipglow.camera.BLURS`. A camera does not apply them again.
     """
 
     fwhm: float
     includes: tuple[str, ...] = ()
 
-    def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
-        """Return itself: it is given on the scene."""
+    def for_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
         return self
 
     def in_band(self, band: Band) -> "PointSpreadFunction":
-        """Return that of the same optics in another band; itself where it is not by diffraction."""
+        """Return the point spread function in another band; itself if it is not diffraction."""
         return self
 
     @abstractmethod
@@ -100,30 +101,30 @@ class PointSpreadFunction(PSFChoice):
         Parameters
         ----------
         spacing : float
-            Side of a square in m. The point is in the middle of the middle square.
+            Side of a square in m. The point is at the centre of the central square.
 
         Returns
         -------
         ndarray
-            A square array of odd side, first row on top. What its sum lacks of 1 falls outside:
-            `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
+            A square array with an odd number of rows, first row on top. Its sum is less than 1 by
+            the light outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
         """
 
     def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
-        """Return the fractions of a point's light in a view, of which none is left out.
+        """Return the fractions of all of a point's light on a grid of limited size.
 
         Parameters
         ----------
         spacing : float
-            Side of a square in m. The point is in the middle of the middle square.
+            Side of a square in m. The point is at the centre of the central square.
         rows, columns : int
-            Squares up and down from the middle one, and to either side.
+            Largest number of squares on each side of the central one.
 
         Returns
         -------
         ndarray
-            Of sum 1, shape (2 m + 1, 2 n + 1) with up to `rows` and `columns`. The outermost
-            squares hold, besides their own, the light that goes farther in their direction.
+            Fractions of sum 1, shape (2 m + 1, 2 n + 1) with m ≤ `rows` and n ≤ `columns`. The
+            border squares also contain the light beyond them.
         """
         return folded(normalised(self.kernel(spacing)), rows, columns)
 
@@ -133,14 +134,12 @@ class PointSpreadFunction(PSFChoice):
 class AnnularAperturePSF(PointSpreadFunction):
     """Diffraction of a reflecting microscope objective.
 
-    Its pupil is round with a central round obstruction. The closed form, with v = 2π NA r / λ
-    and the obscuration o, is [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² (Born and Wolf, Principles
-    of Optics, 8.6.2). It holds no aberration and nothing of the detector. `fwhm` is its full width
-    at half maximum in m.
+    The pupil is round with a central round obstruction o. The irradiance is
+    [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² with v = 2π NA r / λ (Born and Wolf, Principles of
+    Optics, 8.6.2). Aberrations and the detector are not included.
 
-    The paper prints the point spread function of its camera as a picture only (Figure 2). The
-    default values are an assumption: those usual for a reflecting (Schwarzschild) microscope
-    objective of 15 times.
+    The paper shows the point spread function of its camera as a figure only (Figure 2). The default
+    values are assumed; they are typical of a 15x reflecting (Schwarzschild) objective.
     """
 
     kind = "annular-aperture"
@@ -150,7 +149,8 @@ class AnnularAperturePSF(PointSpreadFunction):
         float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
     ] = 0.28
     obscuration: Annotated[
-        float, Parameter("Diameter of the central obstruction, as a fraction.", least=0.0, most=0.9)
+        float,
+        Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9),
     ] = 0.35
 
     def __str__(self) -> str:
@@ -163,11 +163,11 @@ class AnnularAperturePSF(PointSpreadFunction):
         half = scipy.optimize.brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         return 2 * float(half) * self._unit
 
-    def of_camera(self, band: Band, magnification: float | None) -> "AnnularAperturePSF":
+    def for_camera(self, band: Band, magnification: float | None) -> "AnnularAperturePSF":
         return self if self.wavelength is not None else self.in_band(band)
 
     def in_band(self, band: Band) -> "AnnularAperturePSF":
-        """Return the diffraction at the band's middle wavelength."""
+        """Return the diffraction at the band's central wavelength."""
         return replace(self, wavelength=(band.lower + band.upper) / 2)
 
     def kernel(self, spacing: float) -> Array:
@@ -182,7 +182,7 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     def _fractions(self, spacing: float, rows: int, columns: int) -> Array:
         """Return fractions of the light on squares around the centre."""
-        # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
+        # Gauss nodes: two, and three more for each ring (π in v) across a square.
         count = 2 + ceil(3 * spacing / (pi * self._unit))
         side = spacing / self._unit
         quadrant = light_on_squares(self._amplitude, side, rows, columns, count)
@@ -194,13 +194,13 @@ class AnnularAperturePSF(PointSpreadFunction):
     def _unit(self) -> float:
         """Radius in m where v is 1."""
         if self.wavelength is None:
-            raise ValueError("psf: wavelength is none, expected it or a camera with a band")
+            raise ValueError("psf: wavelength is none; set it, or use the psf in a camera")
         return self.wavelength / (2 * pi * self.numerical_aperture)
 
     @property
     def _reach(self) -> float:
-        """Radius, as v, that encircles `ANNULAR_ENERGY`."""
-        # Beyond the rings' first few, the fraction outside is 2 / (π v (1 − o)).
+        """Radius v that encircles `ANNULAR_ENERGY`."""
+        # Beyond the first rings, the fraction outside is 2 / (π v (1 − o)).
         far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
         v = np.linspace(0.0, far, ceil(20 * far))
         clear = 1 - self.obscuration**2
@@ -210,7 +210,6 @@ class AnnularAperturePSF(PointSpreadFunction):
         return float(v[np.searchsorted(inside, ANNULAR_ENERGY)])
 
     def _profile(self, v: Array) -> Array:
-        """Return the irradiance over that in the middle."""
         return self._amplitude(v) ** 2
 
     def _amplitude(self, v: Array) -> Array:
@@ -241,28 +240,28 @@ class GaussianPSF(PointSpreadFunction):
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPSF(PointSpreadFunction):
-    """A measured kernel, such as one found with a knife edge.
+    """A measured kernel, such as from a knife edge.
 
     Parameters
     ----------
     weights : array_like
-        Fraction of a point's light on each square of a grid, in any unit; a square array of odd
-        side, first row on top, the point in the middle of the middle square.
+        Light of a point on each square of a grid, in any unit: a square array with an odd number
+        of rows, first row on top. The point is at the centre of the central square.
     spacing : float
-        Side of those squares in m, on the scene.
+        Side of a square in m, on the scene.
     components : tuple of Component
-        What independent errors change in the weights, in their unit; those of ``chipglow psf`` are
-        in its files. None by default: then nothing is known of them.
+        Uncertainty of the weights as effects of independent errors, in the unit of the weights;
+        ``chipglow psf`` writes them to its files. Unknown by default.
     includes : tuple of str
-        Effects in it besides the optics, because it was measured through them: ``footprint`` for
-        the pixel's sensitive square, and kinds of `chipglow.camera.BLURS`.
+        Effects that the measurement contains in addition to the optics: ``footprint`` for the
+        sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`.
 
     Notes
     -----
-    Its `fwhm` is the mean of the widths along the row and the column through the greatest value; of
-    equal ones, through the one nearest to the middle of them all. At another spacing the light is
-    taken as even within each measured square and shared among the new squares by area. The weights
-    are scaled to a sum of 1: what the measurement did not reach is not there.
+    `fwhm` is the mean of the widths along the row and the column through the peak; of several equal
+    values, the most central is the peak. For another spacing, the light within each measured square
+    is taken as uniform and distributed by area. The weights are scaled to a sum of 1, so that light
+    outside the measured kernel is neglected.
     """
 
     weights: Array = field(repr=False)
@@ -294,24 +293,25 @@ class MeasuredPSF(PointSpreadFunction):
     ) -> "MeasuredPSF":
         """Read a kernel from a NumPy array (``.npy``), a table (``.csv``) or a NetCDF file.
 
-        A ``.nc`` is of ``chipglow psf``. `spacing` is the side of its squares in m on the scene,
-        None for a ``.nc``, which states it; `includes` are by default those that a ``.nc`` states.
-        A ValueError names the file if it holds no kernel.
+        A ``.nc`` file comes from ``chipglow psf`` and states its spacing; for other files `spacing`
+        in m on the scene is required. `includes` overrides the effects that a ``.nc`` file states.
+        Raises a ValueError that names the file if it does not contain a kernel.
         """
         path = Path(path)
         kind = path.suffix.lower()
         if kind not in (".npy", ".csv", ".nc"):
-            raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy, .csv or .nc")
+            raise ValueError(f"psf: {path} must be a .npy, .csv or .nc file")
         if (spacing is None) != (kind == ".nc"):
             raise ValueError(
-                f"psf: spacing is {spacing!r} for {path}, expected "
-                + ("none: the file states it" if kind == ".nc" else "a length such as 1e-6 m")
+                f"psf: {path} states its spacing; omit spacing"
+                if kind == ".nc"
+                else f"psf: {path} requires a spacing such as 1e-6 m"
             )
         try:
             if spacing is None:
                 estimate, spacing, stated = _read_netcdf(path)
-                held = stated if includes is None else includes
-                return cls(estimate.values, spacing, estimate.components, held)
+                included = stated if includes is None else includes
+                return cls(estimate.values, spacing, estimate.components, included)
             return cls(_read_array(path), spacing, includes=includes or ())
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
@@ -329,7 +329,7 @@ class MeasuredPSF(PointSpreadFunction):
 
 @dataclass(frozen=True)
 class ApertureChoice(PSFChoice):
-    """Diffraction by the data sheet of a lens; one of the two is given."""
+    """Aperture from the data sheet of a lens: either of the two numbers."""
 
     numerical_aperture: Annotated[
         float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
@@ -337,7 +337,7 @@ class ApertureChoice(PSFChoice):
     f_number: Annotated[
         float | None,
         Parameter(
-            "F-number of the lens, focused at infinity; with the camera's magnification m the "
+            "F-number of the lens, focused at infinity; at the camera's magnification m, the "
             "numerical aperture is m / (2 f_number (1 + m)).",
             over=0.0,
         ),
@@ -346,28 +346,28 @@ class ApertureChoice(PSFChoice):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.numerical_aperture is None) == (self.f_number is None):
-            raise ValueError("expected one of numerical_aperture and f_number")
+            raise ValueError("pass either numerical_aperture or f_number")
 
     def aperture(self, magnification: float | None) -> float:
-        """Return the numerical aperture on the scene's side; an f-number needs a magnification."""
+        """Return the numerical aperture on the scene's side."""
         if self.numerical_aperture is not None:
             return self.numerical_aperture
         assert self.f_number is not None
         if magnification is None:
-            raise ValueError("magnification: is missing, expected it with psf.f_number")
+            raise ValueError("magnification: is missing but required for psf.f_number")
         return magnification / (2 * self.f_number * (1 + magnification))
 
 
 @PSFS.part
 @dataclass(frozen=True)
 class AiryAperture(ApertureChoice):
-    """Diffraction of a round aperture, by the data sheet of a lens."""
+    """Diffraction of a round aperture."""
 
     kind = "airy"
     example = "{kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture"
     wavelength: DiffractionWavelength = None
 
-    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
+    def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         wavelength = self.wavelength or (band.lower + band.upper) / 2
         return AnnularAperturePSF(wavelength, self.aperture(magnification), 0.0)
 
@@ -383,7 +383,7 @@ class MeasuredPSFFile(PSFChoice):
     spacing: Annotated[
         float | None,
         Parameter(
-            "Side of the kernel's samples; none for a .nc, which states it.",
+            "Distance between the samples of the kernel; a .nc file states it.",
             LENGTH,
             over=0.0,
             most=0.1,
@@ -393,8 +393,8 @@ class MeasuredPSFFile(PSFChoice):
     includes: Annotated[
         tuple[str, ...] | None,
         Parameter(
-            "What it holds besides the optics, because it was measured through it: footprint for "
-            "the pixel's sensitive square, and kinds of blur; none: what a .nc says, or nothing."
+            "Effects that the measured kernel contains in addition to the optics: footprint for "
+            "the sensitive area of a pixel, and kinds of blur; none: as stated by a .nc file."
         ),
     ] = None
 
@@ -405,7 +405,7 @@ class MeasuredPSFFile(PSFChoice):
         psf = MeasuredPSF.from_file(self.file, self.spacing, self.includes)
         object.__setattr__(self, "psf", psf)
 
-    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
+    def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         return self.psf
 
 
@@ -416,11 +416,10 @@ def _jinc(v: Array) -> Array:
 
 
 def _with_the_rest(kernel: Array, spacing: float) -> Array:
-    """Return a kernel with one more ring of squares that holds all that it lacks of 1.
+    """Surround a kernel with a ring of squares that contain the rest of the light.
 
-    Far away the mean of diffraction's rings falls as 1/r³. The integral of that over all x > X and
-    y > Y is (X + Y − R) / XY, and over all x > X and y of 0 to Y it is (R − X) / XY, with
-    R² = X² + Y².
+    Far away, the mean of the diffraction rings falls as 1/r³. Its integral over x > X and y > Y is
+    (X + Y − R) / XY, and over x > X and 0 < y < Y it is (R − X) / XY, with R² = X² + Y².
     """
     y, x = (spacing * (np.arange(n + 1) - n / 2) for n in kernel.shape)
     corner = np.hypot(x[-1], y[-1])
@@ -434,9 +433,11 @@ def _with_the_rest(kernel: Array, spacing: float) -> Array:
 def _checked_weights(weights: ArrayLike) -> Array:
     array = np.asarray(weights, dtype=np.float64)
     if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] % 2 == 0:
-        raise ValueError(f"psf: kernel has shape {array.shape}, expected a square of odd side")
+        raise ValueError(
+            f"psf: kernel must be square with an odd number of rows, but has shape {array.shape}"
+        )
     if not (array >= 0.0).all() or not 0.0 < array.sum() < inf:
-        raise ValueError("psf: kernel must be finite, 0 or more, and not 0 everywhere")
+        raise ValueError("psf: kernel must be finite, not negative, and not 0 everywhere")
     return array
 
 
@@ -449,9 +450,9 @@ def _read_array(path: Path) -> Array:
 
 
 def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
-    """Return kernel, with the components of its uncertainty if any, spacing and `includes`."""
+    """Return kernel with uncertainty components, spacing and `includes`."""
     if not path.is_file():
-        raise FileNotFoundError(ENOENT, "there is no such file", str(path))
+        raise FileNotFoundError(ENOENT, "no such file", str(path))
     try:
         check_own_data(path)
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
@@ -459,4 +460,4 @@ def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
             stated = tuple(str(kernel.get("includes", "")).split())
             return from_xarray(data, "kernel"), float(kernel["spacing"]), stated
     except OSError as error:
-        raise ValueError(f"cut short, or no NetCDF-4 file: {error}") from error
+        raise ValueError(f"truncated, or not a NetCDF-4 file: {error}") from error

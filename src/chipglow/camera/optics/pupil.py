@@ -1,4 +1,4 @@
-"""Point spread function of a pupil: obscuration, defocus and aberrations, over a band."""
+"""Point spread function of a pupil with obscuration, defocus and aberrations, over a band."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -29,12 +29,12 @@ from chipglow.quantities.units import POSITION, TEMPERATURE
 from chipglow.radiometry import Band
 
 PUPIL_ENERGY: Final = 0.99
-"""Fraction of a pupil's light that `PupilPSF.kernel` holds; `PupilPSF.view_kernel` holds all."""
+"""Fraction of a pupil's light within `PupilPSF.kernel`; `PupilPSF.view_kernel` contains all."""
 
 _WAVELENGTHS: Final = 12
 _FINEST_PUPIL: Final = 256
 _COARSEST_STEP: Final = 0.25
-"""Change of the phase in rad between neighbouring samples of a pupil, at most."""
+"""Largest phase step in rad between neighbouring samples of a pupil."""
 
 _LARGEST_PUPIL: Final = 1024
 _NEAR: Final = 100.0
@@ -42,48 +42,48 @@ _FAR: Final = 300.0
 _TAIL: Final = 6.0
 _FINEST: Final = 2.0
 _PERIOD: Final = 3.0
-_MOST_ZERNIKE: Final = 120
-_STRONGEST: Final = 1e-3
+_MAX_NOLL_INDEX: Final = 120
+_MAX_RMS: Final = 1e-3
 _POINT: Final = 1e-12
 _WIDTH_SQUARES: Final = 128
 
 
 def _zernike(value: Any) -> Any:
-    """Return pairs of index and m, of such pairs or of a mapping from index to length."""
+    """Validate pairs of Noll index and rms in m, or a mapping from index to length."""
     if isinstance(value, Mapping):
         pairs = tuple((_whole(index), POSITION.parse(rms)) for index, rms in value.items())
     elif isinstance(value, tuple):
         pairs = value
     else:
-        raise ValueError(f"{value!r}, expected lengths by Noll's index such as {{11: 0.2 um}}")
-    seen: set[int] = set()
+        raise ValueError(f"{value!r} is not a mapping of Noll indices such as {{11: 0.2 um}}")
+    used: set[int] = set()
     for pair in pairs:
         index, rms = pair if isinstance(pair, tuple) and len(pair) == 2 else (None, None)
         if (
-            not (isinstance(index, Integral) and 4 <= int(index) <= _MOST_ZERNIKE)
-            or index in seen
-            or not (isinstance(rms, Real) and abs(float(rms)) <= _STRONGEST)
+            not (isinstance(index, Integral) and 4 <= int(index) <= _MAX_NOLL_INDEX)
+            or index in used
+            or not (isinstance(rms, Real) and abs(float(rms)) <= _MAX_RMS)
         ):
             raise ValueError(
-                f"{pair!r}, expected Noll's index, 4 to {_MOST_ZERNIKE}, each once, and its rms "
+                f"{pair!r}, expected Noll's index, 4 to {_MAX_NOLL_INDEX}, each once, and its rms "
                 "in m"
             )
-        seen.add(index)
+        used.add(index)
     return pairs
 
 
 def _whole(index: object) -> Any:
-    """Return the whole number written as text, as the keys of JSON are."""
+    """Convert an index written as text, such as a JSON key."""
     return int(index) if isinstance(index, str) and re.fullmatch("[0-9]{1,3}", index) else index
 
 
 Obscuration = Annotated[
-    float, Parameter("Diameter of the central obstruction, as a fraction.", least=0.0, most=0.9)
+    float, Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9)
 ]
 Defocus = Annotated[
     float,
     Parameter(
-        "Distance of the surface from the plane of best focus, away from the lens.",
+        "Distance of the surface behind the plane of best focus, seen from the lens.",
         POSITION,
         least=-0.01,
         most=0.01,
@@ -102,8 +102,8 @@ Aberrations = Annotated[
         }
     ),
     Parameter(
-        f"Zernike aberrations by Noll's index, 4 to {_MOST_ZERNIKE}: optical path difference as\n"
-        "the root of its mean square over the unobscured pupil."
+        f"Zernike aberrations by Noll's index, 4 to {_MAX_NOLL_INDEX}: root mean square of the\n"
+        "optical path difference over the unobscured pupil."
     ),
 ]
 SourceTemperature = Annotated[
@@ -121,36 +121,33 @@ SourceTemperature = Annotated[
 class PupilPSF(PointSpreadFunction):
     """Diffraction of a pupil with obscuration, defocus and aberrations, over a camera's band.
 
-    Wavelengths count as they do in the in-band radiance of a blackbody: by the spectral radiance
-    and by the band's response, relative to energy (a photon detector's is proportional to the
-    wavelength, times its quantum efficiency). `fwhm` is the mean of the widths along the row and
-    the column through the peak.
+    Wavelengths are weighted by the spectral radiance of a blackbody and by the band's response
+    relative to energy (for a photon detector: proportional to wavelength times quantum efficiency).
+    `fwhm` is the mean of the widths along the row and the column through the peak.
 
     Parameters
     ----------
     band : Band
-        The camera's band, with its response.
+        Band of the camera, with its response.
 
     Raises
     ------
     ValueError
-        If a value is impossible, or the aberrations are more than a pupil of 1024 samples across
-        can hold, some 10 wavelengths.
+        If a value is out of its limits, or the aberrations exceed about 10 wavelengths.
 
     Notes
     -----
-    With the pupil's coordinate ρ (the sine of the angle over the aperture, as an aplanatic lens
-    has it), the path difference W and P = 1 within the pupil, light of the wavelength λ that leaves
-    a point falls on the scene's plane with the density ``|∫ P exp(2πi (W − NA ρ·x) / λ) d²ρ|²``
-    (Born and Wolf, Principles of Optics, 9.1; scalar, as the paraxial theory has it). A
-    ray lands at ∇W / NA. Defocus by z is W = z (√(1 − NA² ρ²) − 1) (Hanser et al., J. Microsc. 216
-    (2004) 32), and Zernike polynomials are those of Noll, J. Opt. Soc. Am. 66 (1976) 207.
+    With the pupil coordinate ρ (the sine of the angle over the aperture, for an aplanatic lens),
+    the path difference W and P = 1 within the pupil, light of the wavelength λ from a point has the
+    density ``|∫ P exp(2πi (W − NA ρ·x) / λ) d²ρ|²`` on the scene's plane (Born and Wolf, Principles
+    of Optics, 9.1; scalar paraxial theory). A ray arrives at ∇W / NA. Defocus by z is
+    W = z (√(1 − NA² ρ²) − 1) (Hanser et al., J. Microsc. 216 (2004) 32). The Zernike polynomials
+    are by Noll, J. Opt. Soc. Am. 66 (1976) 207.
 
-    The transfer function is that of the pupil without aberrations in closed form (O'Neill, J. Opt.
-    Soc. Am. 46 (1956) 285), and what they change in it, computed on a grid of the pupil. The part
-    of the light far away, which falls as a / (2π r³) with a = λ / (π² NA (1 − o)) whatever the
-    aberrations, is subtracted in closed form before the sum over frequencies and added after it, so
-    that all light is there, however far it goes.
+    The transfer function of the pupil without aberrations is in closed form (O'Neill, J. Opt. Soc.
+    Am. 46 (1956) 285); its change due to aberrations is computed on a grid. Far away, the light
+    falls as a / (2π r³) with a = λ / (π² NA (1 − o)) for any aberrations. This tail is subtracted
+    in closed form before the sum over frequencies and added after it, so that no light is lost.
     """
 
     band: Band
@@ -175,9 +172,8 @@ class PupilPSF(PointSpreadFunction):
         super().__post_init__()
         if self._samples > _LARGEST_PUPIL:
             raise ValueError(
-                f"psf: defocus and aberrations change the path by {self._slope:.3g} m from the "
-                "middle to the edge of the pupil at their steepest, expected some 10 wavelengths "
-                "or less"
+                f"psf: defocus and aberrations have a slope of {self._slope:.3g} m per pupil "
+                "radius; the limit is some 10 wavelengths"
             )
 
     @cached_property
@@ -188,13 +184,13 @@ class PupilPSF(PointSpreadFunction):
         return kernel_fwhm(kernel, spacing)
 
     def transfer(self, across: Array, up: Array) -> NDArray[np.complex128]:
-        """Return the complex optical transfer function: 1 at zero frequency, 0 from 2 NA / λ on.
+        """Return the complex optical transfer function: 1 at zero frequency, 0 above 2 NA / λ.
 
         Frequencies `across` and `up` are in 1/m and are broadcast against each other.
         """
         across, up = np.broadcast_arrays(across, up)
         frequency = np.hypot(across, up)
-        found = np.zeros(frequency.shape, np.complex128)
+        result = np.zeros(frequency.shape, np.complex128)
         for wavelength, weight, change in zip(*self._spectrum, self._changes, strict=True):
             scale = wavelength / self.numerical_aperture
             passed = scale * frequency < 2.0
@@ -203,8 +199,8 @@ class PupilPSF(PointSpreadFunction):
                 step = 2.0 / self._samples
                 places = np.stack([up[passed], across[passed]]) * scale / step + self._samples
                 part += _interpolated(change, places)
-            found[passed] += weight * part
-        return found
+            result[passed] += weight * part
+        return result
 
     def in_band(self, band: Band) -> "PupilPSF":
         return replace(self, band=band)
@@ -218,7 +214,7 @@ class PupilPSF(PointSpreadFunction):
         return normalised(self._squares(spacing, rows, columns, beyond=True))
 
     def _squares(self, spacing: float, rows: int, columns: int, beyond: bool) -> Array:
-        """Return fractions of the light on squares; the outermost may hold what goes farther."""
+        """Return fractions of the light on squares; with `beyond`, border squares have the rest."""
         unit = self._shortest / (2 * pi * self.numerical_aperture)
         near = _NEAR * unit + 2 * self._geometric
         reach = max(near, min((max(rows, columns) + 0.5) * spacing, _FAR * unit))
@@ -231,7 +227,7 @@ class PupilPSF(PointSpreadFunction):
         return np.maximum(core + tail, 0.0)
 
     def _core(self, spacing: float, half: int) -> Array:
-        """Return fractions of the light on squares less those of the tail."""
+        """Return fractions of the light on squares, minus the tail."""
         step = 1 / (_PERIOD * (2 * half + 1) * spacing)
         count = ceil(_FINEST * 2 * self.numerical_aperture / self._shortest / step)
         up = step * np.arange(-count, count + 1, dtype=np.float64)
@@ -240,11 +236,11 @@ class PupilPSF(PointSpreadFunction):
         spread = 2 * pi * self._width
         tail = np.exp(-spread * frequency) * (1 + (spread - 2 * pi * self._tail) * frequency)
         image = self.transfer(across, up[:, None]) - tail
-        # The image is real: frequencies to the left are in those to the right.
+        # The image is real: frequencies to the left equal those to the right.
         image[:, 1:] *= 2.0
-        place = spacing * np.arange(-half, half + 1)
+        position = spacing * np.arange(-half, half + 1)
         rows, columns = (
-            np.exp(2j * pi * np.outer(place, f)) * np.sinc(spacing * f) for f in (up, across)
+            np.exp(2j * pi * np.outer(position, f)) * np.sinc(spacing * f) for f in (up, across)
         )
         # The first row is on top.
         return np.asarray(((rows[::-1] @ image) @ columns.T).real * (spacing * step) ** 2)
@@ -265,12 +261,12 @@ class PupilPSF(PointSpreadFunction):
 
     @property
     def _width(self) -> float:
-        """Length b in m of the tail's transfer function, see `poisson_squares`."""
+        """Length b in m of the tail's transfer function; see `poisson_squares`."""
         return _TAIL * self._tail * (1 - self.obscuration)
 
     @cached_property
     def _slope(self) -> float:
-        """Largest slope of the path difference in m for one radius of the pupil."""
+        """Largest slope of the path difference in m per radius of the pupil."""
         x = np.linspace(-1.0, 1.0, _FINEST_PUPIL + 1)
         difference = self._path(x, x[:, None])
         steep = np.hypot(*np.gradient(difference, x[1] - x[0]))
@@ -278,7 +274,7 @@ class PupilPSF(PointSpreadFunction):
 
     @property
     def _geometric(self) -> float:
-        """Return the displacement of rays in the image in m."""
+        """Largest displacement of rays in the image in m."""
         return self._slope / self.numerical_aperture
 
     @cached_property
@@ -289,9 +285,9 @@ class PupilPSF(PointSpreadFunction):
 
     @property
     def _changes(self) -> Iterator[NDArray[np.complex128] | None]:
-        """Yield what the path difference changes in the transfer function at each wavelength.
+        """Change of the transfer function due to the path difference, for each wavelength.
 
-        On steps of the pupil's samples, the middle at [samples, samples].
+        The grid has the spacing of the pupil samples; zero frequency is at [samples, samples].
         """
         if not self._slope:
             yield from [None] * _WAVELENGTHS
@@ -299,20 +295,20 @@ class PupilPSF(PointSpreadFunction):
         count = self._samples
         x = (np.arange(count) - (count - 1) / 2) * 2 / count
         radius = np.hypot(x, x[:, None])
-        # A sample on the edge counts as the part of it that is inside.
+        # A sample on the edge is weighted by the fraction inside.
         pupil = np.clip((1 - radius) * count / 2 + 0.5, 0.0, 1.0)
         pupil -= np.clip((self.obscuration - radius) * count / 2 + 0.5, 0.0, 1.0)
         path = self._path(x, x[:, None])
         plain = _autocorrelation(pupil.astype(np.complex128))
         for wavelength in self._spectrum[0]:
-            bent = _autocorrelation(
+            aberrated = _autocorrelation(
                 np.asarray(pupil * np.exp(2j * pi / wavelength * path), np.complex128)
             )
-            # Not by the middle value: there a sample on the edge counts by its square.
-            yield (bent - plain) / pupil.sum()
+            # Divided by the sum: in the central value, a sample on the edge has its squared weight.
+            yield (aberrated - plain) / pupil.sum()
 
     def _path(self, x: Array, y: Array) -> Array:
-        """Return the optical path difference in m at coordinates of the pupil."""
+        """Return the optical path difference in m at pupil coordinates."""
         radius = np.hypot(x, y)
         inside = np.maximum(1 - (self.numerical_aperture * radius) ** 2, 0.0)
         path = self.defocus * (np.sqrt(inside) - 1)
@@ -336,7 +332,7 @@ class Pupil(ApertureChoice):
     zernike: Aberrations = ()
     temperature: SourceTemperature = 1000.0
 
-    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
+    def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         return PupilPSF(
             band,
             self.aperture(magnification),
@@ -350,7 +346,7 @@ class Pupil(ApertureChoice):
 def annular_transfer(frequency: Array, obscuration: float) -> Array:
     """Return the transfer function of an annular pupil without aberrations.
 
-    `frequency` is over 2 NA / λ (O'Neill, J. Opt. Soc. Am. 46 (1956) 285).
+    `frequency` is relative to 2 NA / λ (O'Neill, J. Opt. Soc. Am. 46 (1956) 285).
     """
     apart = 2 * frequency
     shared = (
@@ -362,10 +358,9 @@ def annular_transfer(frequency: Array, obscuration: float) -> Array:
 
 
 def zernike_polynomial(index: int, radius: Array, angle: Array) -> Array:
-    """Return Noll's Zernike polynomial, of mean square 1 over the unit disc.
+    """Return Noll's Zernike polynomial, normalised to a mean square of 1 over the unit disc.
 
-    Polar coordinates, the angle in rad from the right: Noll, J. Opt. Soc. Am. 66 (1976) 207,
-    Equations 1 to 3.
+    `angle` is in rad from the right (Noll, J. Opt. Soc. Am. 66 (1976) 207, Equations 1 to 3).
     """
     n, m = _noll(index)
     value = np.zeros(np.broadcast(radius, angle).shape)
@@ -379,16 +374,16 @@ def zernike_polynomial(index: int, radius: Array, angle: Array) -> Array:
 
 
 def _noll(index: int) -> tuple[int, int]:
-    """Return degree and order of Noll's index."""
+    """Convert a Noll index to degree and order."""
     n = 0
     while (n + 1) * (n + 2) // 2 < index:
         n += 1
-    place = index - n * (n + 1) // 2
-    return n, 2 * (place // 2) if n % 2 == 0 else 2 * ((place - 1) // 2) + 1
+    rank = index - n * (n + 1) // 2
+    return n, 2 * (rank // 2) if n % 2 == 0 else 2 * ((rank - 1) // 2) + 1
 
 
 def _shared_area(apart: Array, first: float, second: float) -> Array:
-    """Return the area that two discs share, by their radii and the distance of their middles."""
+    """Return the common area of two discs with the given radii and distance of centres."""
     if second < _POINT:
         return np.zeros(apart.shape)
     d = np.clip(apart, max(abs(first - second), _POINT), first + second)
@@ -397,7 +392,7 @@ def _shared_area(apart: Array, first: float, second: float) -> Array:
     kite = ((first + second) ** 2 - d**2) * (d**2 - (first - second) ** 2)
     area = first**2 * one + second**2 * two - np.sqrt(np.maximum(kite, 0.0)) / 2
     area = np.where(apart <= abs(first - second), pi * min(first, second) ** 2, area)
-    # Rounding would leave a trace of discs that do not meet.
+    # Without this, rounding leaves a rest where the discs do not overlap.
     return np.where(apart >= first + second, 0.0, area)
 
 

@@ -1,4 +1,4 @@
-"""Size of source: what each pixel integrates, by exact area weights."""
+"""Integration of samples over the pixels, by exact area weights."""
 
 from functools import lru_cache
 from math import sqrt
@@ -12,7 +12,7 @@ from chipglow.quantities import Array
 from chipglow.scene import Raster
 
 _ROUNDING: Final = 1e-6
-"""Fraction of a pixel or a sample that is taken for rounding of lengths."""
+"""Lengths below this fraction of a pixel or sample are rounding errors."""
 
 LEAST_COVERED: Final = 0.05
 """Part of a sample's width that a pixel must cover for the sample to count in its maximum.
@@ -23,21 +23,21 @@ neighbours' samples. A single hot one would be the reference of the whole pixel.
 
 
 def overlap_lengths(left: Array, width: float, samples: int, spacing: float) -> Array:
-    """Return the length in m that each interval shares with each sample of a line, (n, samples).
+    """Return the overlap in m of each interval with each sample of a line, shape (n, samples).
 
-    Intervals begin at `left` (n,) in m from the beginning of the first sample.
+    Intervals start at `left` (n,) in m from the start of the first sample.
     """
     edges = spacing * np.arange(samples + 1, dtype=np.float64)
     begin = np.maximum(left[:, None], edges[None, :-1])
     end = np.minimum(left[:, None] + width, edges[None, 1:])
-    # Where edges meet, rounding would leave a trace of the neighbour.
-    return np.asarray(np.where(end - begin > _ROUNDING * min(width, spacing), end - begin, 0.0))
+    # Edges that coincide overlap by rounding.
+    return np.where(end - begin > _ROUNDING * min(width, spacing), end - begin, 0.0)
 
 
 def sensor_raster(
     scene: Raster, pitch: float, offset: tuple[float, float], shape: tuple[int, int] | None
 ) -> Raster:
-    """Return the raster of the pixels; as many whole pixels as fit by default."""
+    """Return the raster of the pixels; all whole pixels that fit by default."""
     left, right, bottom, top = scene.extent
     room = (top - bottom - offset[1], right - left - offset[0])
     rows, columns = (int(length / pitch + _ROUNDING) for length in room)
@@ -49,8 +49,8 @@ def sensor_raster(
         )
     if shape is not None and (shape[0] > rows or shape[1] > columns):
         raise ValueError(
-            f"camera: shape is {shape[0]} x {shape[1]} pixels, but only {rows} x {columns} of "
-            f"{1e6 * pitch:g} um fit the scene of {1e6 * (right - left):g} x "
+            f"camera: shape is {shape[0]} x {shape[1]} pixels, but only {rows} x {columns} pixels "
+            f"of {1e6 * pitch:g} um fit the scene of {1e6 * (right - left):g} x "
             f"{1e6 * (top - bottom):g} um"
         )
     rows, columns = shape or (rows, columns)
@@ -58,7 +58,7 @@ def sensor_raster(
 
 
 def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, slice]]:
-    """Return all whole pixels that fit a scene, in line with some, and where those are in it."""
+    """Extend a raster to all whole pixels that fit a scene; also return its slices in them."""
     pitch = sensors.spacing
     down, right = scene.top - sensors.top, sensors.left - scene.left
     above, before = (int(length / pitch + _ROUNDING) for length in (down, right))
@@ -68,9 +68,9 @@ def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, s
 
 
 def integrate(radiance: Array, scene: Raster, sensors: Raster, fill_factor: float) -> Array:
-    """Return the mean radiance over every pixel's sensitive square, shape `sensors.shape`."""
+    """Return the mean radiance over each pixel's sensitive square, shape `sensors.shape`."""
     down, across = line_weights(scene, sensors, fill_factor)
-    # Sparse products are summed in one order, whatever the number of threads.
+    # Sparse products do not depend on the number of threads.
     return np.asarray((across @ (down @ radiance).T).T)
 
 
@@ -99,7 +99,7 @@ def _covered(centres: Array, side: float, samples: int, spacing: float) -> list[
 def line_weights(
     scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[sparse.csr_array, sparse.csr_array]:
-    """Return the weights of a column's and a row's samples in the pixels, each row of sum 1."""
+    """Return the weights of samples in pixels down and across; each row has sum 1."""
     down = _line_weights(
         scene.top - sensors.top, scene.rows, sensors.rows, scene, sensors, fill_factor
     )
@@ -112,7 +112,7 @@ def line_weights(
 def _line_weights(
     begin: float, samples: int, count: int, scene: Raster, sensors: Raster, fill_factor: float
 ) -> sparse.csr_array:
-    """Return the weights of a line of samples in a line of pixels, each row of sum 1."""
+    """Return the weights of a line of samples in a line of pixels; each row has sum 1."""
     side = sensors.spacing * sqrt(fill_factor)
     first = begin + (sensors.spacing - side) / 2
     left = first + sensors.spacing * np.arange(count, dtype=np.float64)

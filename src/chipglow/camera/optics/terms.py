@@ -1,4 +1,4 @@
-"""Effects of the optics besides spreading a point: each a small term, chosen by its kind."""
+"""Effects of the optics in addition to the point spread function, selected by kind."""
 
 from abc import ABC
 from collections.abc import Callable
@@ -17,16 +17,16 @@ from chipglow.radiometry import Band
 from chipglow.scene import Raster
 
 Blur: TypeAlias = Callable[[Array, PointSpreadFunction, float], Array]
-"""A convolution with a point spread function: `chipglow.camera.blur`."""
+"""A convolution with a point spread function, such as `chipglow.camera.blur`."""
 
 OPTICS_TERMS: Final = Family("optics_term")
-"""Terms by their kind; other packages add theirs in the group ``chipglow.optics_term``."""
+"""Terms by kind; other packages register theirs in the group ``chipglow.optics_term``."""
 
 
 class OpticsTerm(Part, ABC):
-    """An effect of the optics; a term overrides what it changes.
+    """An effect of the optics on radiance in W/(m² sr), shape (y, x).
 
-    Radiance is in W/(m² sr), of shape (y, x).
+    Subclasses override either method or both.
     """
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
@@ -35,40 +35,39 @@ class OpticsTerm(Part, ABC):
         Parameters
         ----------
         radiance : ndarray
-            Of the samples.
+            Radiance of the samples.
         scene, pixels : Raster
-            The samples, and the pixels.
+            Grids of the samples and of the pixels.
         blurred : Blur
-            Convolution, by what is taken to be beyond the scene.
+            Convolution, which includes the assumption about radiance beyond the scene.
         """
         return radiance
 
     def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
-        """Return the radiance that the camera shows for what its pixels received in its band."""
+        """Return the displayed radiance for the radiance that the pixels received."""
         return radiance
 
 
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class OpticalElement(OpticsTerm):
-    """A lens, filter or window that does not pass all light, and sends its own.
+    """A lens, filter or window that absorbs and emits.
 
-    Of the radiance L it passes τ L, and sends (1 − τ) L(T) by its temperature T: what it does not
-    pass it absorbs, or it reflects what is as warm as itself. A calibration that saw it at T' takes
-    τ L + (1 − τ) L(T') for L: then L + (L(T) − L(T')) (1 − τ) / τ is shown.
+    It transmits τ L of the radiance L and emits (1 − τ) L(T) at its temperature T; light that it
+    reflects is taken to come from surroundings at T. If the camera was calibrated with the element
+    at T', the displayed radiance is L + (L(T) − L(T')) (1 − τ) / τ.
     """
 
     kind = "element"
     example = "{kind: element, transmittance: 0.9, temperature: 40 degC, calibrated_at: 25 degC}"
     transmittance: Annotated[
-        float, Parameter("Fraction of the light in the band that it passes.", over=0.0, most=1.0)
+        float, Parameter("Transmitted fraction of the light in the band.", over=0.0, most=1.0)
     ]
     temperature: Annotated[float, Parameter("Temperature of the element.", TEMPERATURE)] = 293.15
     calibrated_at: Annotated[
         float | None,
         Parameter(
-            "Temperature that it had when the camera was calibrated; none: the calibration was "
-            "without it.",
+            "Temperature of the element during the calibration; none: calibrated without it.",
             TEMPERATURE,
         ),
     ] = None
@@ -78,20 +77,21 @@ class OpticalElement(OpticsTerm):
         lost = 1 - self.transmittance
         if self.calibrated_at is None:
             return self.transmittance * radiance + lost * own
-        seen = float(band.radiance(self.calibrated_at))
-        return radiance + (own - seen) * lost / self.transmittance
+        calibrated = float(band.radiance(self.calibrated_at))
+        return radiance + (own - calibrated) * lost / self.transmittance
 
 
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Narcissus(OpticsTerm):
-    """The cooled detector's reflection in the lenses, round the optical axis.
+    """Reflection of the cooled detector in the lenses, around the optical axis.
 
-    Where the detector sees itself by a reflectance R, the warm housing's light L(T) is missing:
-    R (L(T) − L(T')) exp(−ln 2 r² / h²) is taken from the radiance, T' the detector's temperature
-    (Howard and Abel, Appl. Opt. 21 (1982) 3393). A correction of non-uniformity takes it away as it
-    was then: T' is then the temperature that the housing had. The axis is the pixels' middle; that
-    it is a Gaussian is an assumption.
+    Where the detector sees itself with a reflectance R, radiation of the warm housing is missing:
+    R (L(T) − L(T')) exp(−ln 2 r² / h²) is subtracted from the radiance, with the temperatures T of
+    the housing and T' of the detector (Howard and Abel, Appl. Opt. 21 (1982) 3393). A
+    non-uniformity correction removes the effect at that time: T' is then the temperature of the
+    housing during the correction. The axis is the centre of the image; the Gaussian is an
+    assumption.
     """
 
     kind = "narcissus"
@@ -101,15 +101,17 @@ class Narcissus(OpticsTerm):
     )
     reflectance: Annotated[
         float,
-        Parameter("Reflection of all surfaces, as a fraction.", least=0.0, most=1.0),
+        Parameter("Total reflectance of the lens surfaces.", least=0.0, most=1.0),
     ]
-    radius: Annotated[float, Parameter("Where half of it is left, on the scene.", LENGTH, over=0.0)]
+    radius: Annotated[
+        float, Parameter("Radius at half of the maximum, on the scene.", LENGTH, over=0.0)
+    ]
     housing: Annotated[float, Parameter("Temperature of the housing.", TEMPERATURE)] = 293.15
     detector: Annotated[float, Parameter("Temperature of the detector.", TEMPERATURE)] = 77.0
     corrected_at: Annotated[
         float | None,
         Parameter(
-            "Temperature of the housing when non-uniformity was corrected; none: it was not.",
+            "Temperature of the housing during the non-uniformity correction; none: uncorrected.",
             TEMPERATURE,
         ),
     ] = None
@@ -124,10 +126,10 @@ class Narcissus(OpticsTerm):
 
 @dataclass(frozen=True)
 class VeilPSF(PointSpreadFunction):
-    """Density of scattered light: h / (2π √3 (r² + h² / 3)^(3/2)) per area."""
+    """Scattered light with the density h / (2π √3 (r² + h² / 3)^(3/2)) per area."""
 
     radius: float
-    """Radius h in m within which half of it falls."""
+    """Radius h in m that contains half of the light."""
 
     @property
     def fwhm(self) -> float:  # type: ignore[override]
@@ -148,20 +150,21 @@ class VeilPSF(PointSpreadFunction):
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Veil(OpticsTerm):
-    """Light that surfaces scatter far away: the size-of-source effect.
+    """Light scattered over long distances: the size-of-source effect.
 
-    (1 − s) L + s (L convolved with `VeilPSF`): of a uniform disc of radius ρ a pixel in its middle
-    sees the fraction 1 − s / √(1 + 3 ρ² / h²). The size-of-source effect is defined in IEC TS
-    62492-1; the kernel, which falls as 1/r³ as diffraction does, is an assumption.
+    The image is (1 − s) L + s (L convolved with `VeilPSF`). At the centre of a uniform disc of
+    radius ρ, a pixel receives the fraction 1 − s / √(1 + 3 ρ² / h²). IEC TS 62492-1 defines the
+    size-of-source effect; the kernel, which falls as 1/r³ like diffraction, is an assumption.
     """
 
     kind = "veil"
     example = "{kind: veil, fraction: 0.03, radius: 300 um}"
-    fraction: Annotated[
-        float, Parameter("Fraction of the light that is scattered.", least=0.0, under=1.0)
-    ]
+    fraction: Annotated[float, Parameter("Scattered fraction of the light.", least=0.0, under=1.0)]
     radius: Annotated[
-        float, Parameter("Within which half of it falls, on the scene.", LENGTH, over=0.0)
+        float,
+        Parameter(
+            "Radius that contains half of the scattered light, on the scene.", LENGTH, over=0.0
+        ),
     ]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
@@ -172,11 +175,11 @@ class Veil(OpticsTerm):
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class Distortion(OpticsTerm):
-    """Pixels that see another place than where they are taken to be.
+    """Radial distortion of the image.
 
-    A pixel at the distance r from the optical axis, the pixels' middle, sees what is at
-    r (1 + d r² / R²) (Brown, Photogramm. Eng. 37 (1971) 855, first term): a lens's distortion with
-    the other sign. Beyond the scene it sees the nearest edge.
+    A pixel at the distance r from the optical axis, the centre of the image, sees the scene at
+    r (1 + d r² / R²) (Brown, Photogramm. Eng. 37 (1971) 855, first term). Lens data use the
+    opposite sign. Beyond the scene, a pixel sees the nearest edge.
     """
 
     kind = "distortion"
@@ -184,41 +187,43 @@ class Distortion(OpticsTerm):
     fraction: Annotated[
         float,
         Parameter(
-            "How much farther out pixels at the radius see, as a fraction of it: over 0 for a "
-            "barrel.",
+            "Displacement d of the view at the radius, as a fraction of it: positive for barrel "
+            "distortion.",
             least=-0.3,
             most=0.3,
         ),
     ]
-    radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
+    radius: Annotated[float, Parameter("Radius R, on the scene.", LENGTH, over=0.0)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
-        farther = self.fraction * (x**2 + y**2) / self.radius**2
+        shift = self.fraction * (x**2 + y**2) / self.radius**2
         rows, columns = (np.arange(count, dtype=np.float64) for count in scene.shape)
-        places = np.stack(
-            [rows[:, None] - farther * y / scene.spacing, columns + farther * x / scene.spacing]
+        positions = np.stack(
+            [rows[:, None] - shift * y / scene.spacing, columns + shift * x / scene.spacing]
         )
-        return np.asarray(map_coordinates(radiance, places, order=1, mode="nearest"))
+        return np.asarray(map_coordinates(radiance, positions, order=1, mode="nearest"))
 
 
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
 class FieldBlur(OpticsTerm):
-    """A blur that grows from the optical axis to the field's border.
+    """Field curvature: a blur that grows from the optical axis to the border of the field.
 
-    At the distance r from the axis, the pixels' middle, light is spread by a Gaussian of the
-    standard deviation s r² / R²: where the image is a curved surface and the detector a plane,
-    defocus grows with r² (Petzval's curvature). Between images of variances that double, a value is
+    At the distance r from the axis, the centre of the image, light is spread by a Gaussian with the
+    standard deviation s r² / R², because the defocus of a curved image on a plane detector grows
+    with r² (Petzval curvature). Images are computed for variances in steps of a factor of two and
     interpolated linearly in the variance.
     """
 
     kind = "field-blur"
     example = "{kind: field-blur, standard_deviation: 6 um, radius: 400 um}"
     standard_deviation: Annotated[
-        float, Parameter("Width of the blur at the radius, on the scene.", LENGTH, least=0.0)
+        float, Parameter("Standard deviation s of the blur, on the scene.", LENGTH, least=0.0)
     ]
-    radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
+    radius: Annotated[
+        float, Parameter("Radius R at which it holds, on the scene.", LENGTH, over=0.0)
+    ]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
@@ -234,6 +239,6 @@ class FieldBlur(OpticsTerm):
 
 
 def _from_axis(raster: Raster, pixels: Raster) -> tuple[Array, Array]:
-    """Return places of a raster's values right of and above the pixels' middle in m."""
+    """Return positions right of and above the centre of the image in m."""
     left, right, bottom, top = pixels.extent
     return raster.x - (left + right) / 2, (raster.y - (bottom + top) / 2)[:, None]
