@@ -319,7 +319,7 @@ def counted(radiance):
 
 
 def apart(image, expected):
-    """Return RMS and greatest difference of radiance temperature in K."""
+    """Return RMS and largest difference of radiance temperature in K."""
     inner = (slice(BORDER, -BORDER),) * 2
     found, ours = (CAMERA.band.temperature(one[inner]) for one in (image, expected))
     differences = np.abs(found - ours)[ours > LEAST]

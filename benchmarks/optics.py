@@ -2,7 +2,7 @@
 
     python benchmarks/optics.py [--samples 512]
 
-Prysm is optional (``pip install prysm``). Each row is the greatest difference of a kernel of
+Prysm is optional (``pip install prysm``). Each row is the largest difference of a kernel of
 81 x 81 squares of 1 um over its peak, and the times of one kernel. Closed forms are in
 tests/test_pupil.py.
 """

@@ -101,13 +101,13 @@ def test_nothing_is_measured_over_the_maximum_without_a_psf(seed, pitch, offset,
     camera = Camera(band=BAND, pitch=pitch, offset=(offset, offset / 2), fill_factor=fill, psf=None)
     exposure = random_exposure(seed)
     measured = camera.form_measurement(exposure).radiance[0]
-    greatest = BAND.radiance(reference_temperature(camera, exposure, "maximum"))
+    largest = BAND.radiance(reference_temperature(camera, exposure, "maximum"))
     # A mean of samples is not over their maximum, but for the slivers on four sides that the
     # maximum leaves out: they cover this part of the pixel at most.
     side = pitch * np.sqrt(fill)
     slivers = min(1.0, 4 * LEAST_COVERED * min(GRID.spacing, side) / side)
     brightest = exposure.peak_radiance.max()
-    assert (measured <= (1 - slivers) * greatest + slivers * brightest + 1e-3).all()
+    assert (measured <= (1 - slivers) * largest + slivers * brightest + 1e-3).all()
 
 
 @given(
@@ -212,7 +212,7 @@ def test_a_band_that_leaves_the_view_says_so():
 
 def test_without_a_band_there_is_none():
     _, workpiece, _ = ridge_scene(radians(38.0), 16e-6)
-    with pytest.raises(NoShearBandError, match="greatest plastic strain rate"):
+    with pytest.raises(NoShearBandError, match="largest plastic strain rate"):
         find_shear_band(GRID, np.full(GRID.shape, 100.0), workpiece, TOOL)
     with pytest.raises(NoShearBandError, match="no path"):
         find_shear_band(GRID, np.full(GRID.shape, 1e5), np.zeros(GRID.shape, bool), TOOL)

@@ -263,8 +263,8 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
 @pytest.mark.parametrize(
     ("texts", "said"),
     [
-        ({"camera.pitch": "-3 um"}, "Pixel pitch: -3 um is not over 0"),
-        ({"camera.pitch": "5 kg"}, "expected one such as 6 um"),
+        ({"camera.pitch": "-3 um"}, "Pixel pitch: -3 um must be more than 0"),
+        ({"camera.pitch": "5 kg"}, "expected a value such as 6 um"),
         ({"camera.psf.numerical_aperture": "1.5"}, "expected"),
         ({"surface": OWN, f"surface.chips.{OWN}.body.mean": "2"}, "mean: 2, expected 0 to 1"),
         ({"camera.band.0": "6"}, "Band from: 6-5.1 um is reversed"),

@@ -94,7 +94,7 @@ def test_the_interval_covers_as_often_as_it_says(model, case):
     # Binomial: 0.95 of 200 is 190 with a standard deviation of 3.1.
     assert (covered >= 0.95 * repeats - 10).all()
     if case != "scatter":
-        # Birge's factor is never under 1 and makes them a tenth smaller in the mean.
+        # Birge's factor is never under 1 and makes them a tenth smaller on average.
         np.testing.assert_allclose(np.std(scores, axis=0), 0.93, atol=3 / np.sqrt(2 * repeats))
 
 

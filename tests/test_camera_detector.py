@@ -284,7 +284,9 @@ def test_a_study_may_give_the_lower_limit_itself():
 
 
 def test_a_source_that_saturates_is_refused():
-    with pytest.raises(ValueError, match=r"Detector.hot: 1227 °C fills the detector .* under 50"):
+    with pytest.raises(
+        ValueError, match=r"Detector.hot: 1227 °C fills the detector .* less than 50"
+    ):
         camera(hot=1500.0).calibration((4, 4))
     with pytest.raises(ValueError, match=r"sources .* expected the second brighter"):
         camera(cold=770.0).calibration((4, 4))

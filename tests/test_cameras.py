@@ -417,7 +417,7 @@ def test_what_is_not_known_must_be_told_and_must_be_possible(tmp_path, told, tex
 
 def test_a_camera_file_says_itself_what_was_measured(tmp_path):
     path = make(tmp_path, "a.fff", files.fff(PICTURES[0]))
-    with pytest.raises(ValueError, match="says itself what was measured"):
+    with pytest.raises(ValueError, match="states itself what was measured"):
         read_recording(path, quantity="temperature")
 
 

@@ -52,7 +52,7 @@ def test_period_spacing_and_speeds(metrics):
 
 
 def test_the_mean_is_over_the_chips_length_not_over_time():
-    """A chip that is slow while thin is thinner in the mean over time of a fixed line."""
+    """A chip that is slow while thin is thinner on average over time of a fixed line."""
     metrics = chip_metrics(replace(CHIP, unsteadiness=-0.8).scene())
     over_time = float(metrics.scan.thickness.mean())
     assert abs(over_time - CHIP.thickness) > 3 * SAMPLE

@@ -279,7 +279,9 @@ def test_a_quantity_without_a_unit_is_refused(command, option):
 def test_a_bad_study_is_refused_and_writes_nothing(folder, runs):
     (folder / "study.yaml").write_text("cutting: {feed: -0.3 mm}")
     result = chipglow("run", "study.yaml", "--out", "results")
-    assert_refused(result, "study.yaml: cutting.feed: -0.3 mm is not over 0, expected a length")
+    assert_refused(
+        result, "study.yaml: cutting.feed: -0.3 mm must be more than 0, expected a length"
+    )
     assert_refused(chipglow("run", "no.yaml", "--out", "results"), "no.yaml: No such file")
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
 

@@ -374,7 +374,7 @@ def test_the_command_writes_what_it_says(folder):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ((*FILES, "one.nc", "one.nc", *USUAL), "one.nc: is there twice"),
+        ((*FILES, "one.nc", "one.nc", *USUAL), "one.nc: is given twice"),
         (
             (*FILES, "--reference", "1 s"),
             "--reference: 1000000 us is not in the measurement, expected 0 us to 20 us",

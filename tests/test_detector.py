@@ -262,5 +262,5 @@ def test_a_recording_knows_the_camera():
     assert (recording.integration_time, recording.pitch) == (10e-6, 6e-6)
     assert (recording.band, recording.saturation) == (Camera().band, 4094)
     measured.data.attrs["detector"] = "another"
-    with pytest.raises(ValueError, match="the measurement has one already"):
+    with pytest.raises(ValueError, match="the measurement already contains one"):
         made.record(measured, generator())

@@ -287,7 +287,7 @@ def test_impossible_emissivities_are_told():
     put_in[1, :7] = -0.0005
     row = of_whole(measured(put_in))
     assert row.outside == (7, 40)
-    assert "7 of 1200 pixels have an emissivity under 0" in row.estimate.warnings[0]
+    assert "7 of 1200 pixels have an emissivity below 0" in row.estimate.warnings[0]
     assert "40 of 1200 pixels have an emissivity over 1" in row.estimate.warnings[1]
     bright = of_whole(measured(np.full(RASTER.shape, 1.2)))
     assert bright.estimate.warnings[-1] == "all: the mean emissivity is not within 0 to 1."
@@ -305,7 +305,7 @@ DARK = np.full((1, *RASTER.shape), Flag.SATURATED, np.uint8)
         (lambda: Heating(300.0, 293.0, 3.0), "by 5 standard uncertainties of 3 K or more"),
         (
             lambda: of_whole(measured(EVEN, lower_limit=700.0)),
-            "reference: 391 °C is under the camera's lower range limit of 426.85 °C",
+            "reference: 391 °C is below the camera's lower range limit of 426.85 °C",
         ),
         (lambda: determine_emissivity([measured(EVEN), SMALL], HEATING), "image 2: has other pix"),
         (

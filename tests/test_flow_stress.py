@@ -187,7 +187,7 @@ def test_marusich_ortiz_by_hand():
     assert law.at(0.31, 1e6, 1500.0) == pytest.approx(678.052e6 / 60, rel=1e-5)
     assert law.melting_temperature == 1300.0
     assert replace(law, thermal_softening=0.0).melting_temperature == 3000.0
-    with pytest.raises(ValueError, match=r"MarusichOrtiz\.rate_exponent: -1, expected over 0"):
+    with pytest.raises(ValueError, match=r"MarusichOrtiz\.rate_exponent: -1, expected more than 0"):
         replace(law, rate_exponent=-1)
 
 

@@ -392,7 +392,7 @@ def test_a_wrong_unit_of_length_is_noticed(tmp_path):
     refused(CloudSource(str(tmp_path / "p.csv"), names={"x": "X1"}), "no column 'X1'")
     refused(CloudSource(str(tmp_path / "p.csv"), names={"time": "t"}), "no column 't' for time")
     write_csv(tmp_path / "p.csv", {**table, "volume": -np.ones(600)})
-    refused(CloudSource(str(tmp_path / "p.csv")), "volume: expected over 0")
+    refused(CloudSource(str(tmp_path / "p.csv")), "volume: must be positive")
 
 
 @pytest.mark.parametrize(
@@ -467,9 +467,9 @@ def test_a_dump_without_times_or_units_says_what_is_assumed(tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda text: text[:-40], "cut short"),
-        (lambda text: text[:-3], "cut short"),
-        (lambda text: text[:-10] + "\n", "expected 600 of 9: it is cut short"),
+        (lambda text: text[:-40], "truncated"),
+        (lambda text: text[:-3], "truncated"),
+        (lambda text: text[:-10] + "\n", "expected 600 of 9: it is truncated"),
         (lambda text: text.replace(" 3 1 0 ", " 3 1\n", 1), "damaged"),
         (lambda text: text.replace("ITEM: NUMBER OF ATOMS\n600", "ITEM: NUMBER OF ATOMS\nmany"),
          "head is damaged"),
@@ -500,7 +500,7 @@ ROWS_OF_TABLE = [(x, y, linear(x, y)) for x, y in lattice(5, 4)]
 def test_a_number_that_is_cut_at_the_end_is_refused(tmp_path, form, lost):
     text = table(ROWS_OF_TABLE, form, newline=False)
     (tmp_path / "p.csv").write_text(text[:-lost])
-    with pytest.raises(SourceError, match=r"p\.csv: ends with .* cut short"):
+    with pytest.raises(SourceError, match=r"p\.csv: ends with .* truncated"):
         CloudSource(str(tmp_path / "p.csv")).survey()
 
 

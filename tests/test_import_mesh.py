@@ -274,7 +274,7 @@ def test_values_of_integration_points_are_averaged(tmp_path):
         ({"names": {"temperature": "TEMP"}}, "fields: .*no field 'TEMP'"),
         ({"times": (0.0, 1.0)}, "2 for 1 frames"),
         ({"displacement": "U"}, "no node has 'U'"),
-        ({"displacement": "NT11"}, "'NT11' is no vector"),
+        ({"displacement": "NT11"}, "'NT11' is not a vector"),
     ],
 )
 def test_what_does_not_fit_a_file_is_refused(tmp_path, changed, said):
@@ -283,7 +283,7 @@ def test_what_does_not_fit_a_file_is_refused(tmp_path, changed, said):
     grid.save(tmp_path / "chip.vtu")
     with pytest.raises(SourceError, match=rf"chip\.vtu: .*{said}"):
         MeshSource(tmp_path / "chip.vtu", **changed).survey()
-    with pytest.raises(SourceError, match="no mesh, expected"):
+    with pytest.raises(SourceError, match="not a mesh, expected"):
         MeshSource(tmp_path / "chip.doc").survey()
 
 
@@ -493,7 +493,7 @@ def test_one_instance_of_a_part_is_read_and_no_more(tmp_path):
     path.write_text(plain + ASSEMBLY.format(moved=""))
     assert MeshSource(path).survey().extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
     path.write_text(plain + ASSEMBLY.format(moved="1., 0., 0.\n"))
-    with pytest.raises(SourceError, match="instance is moved"):
+    with pytest.raises(SourceError, match="instance that is moved"):
         MeshSource(path).survey()
     path.write_text(plain + 2 * ASSEMBLY.format(moved=""))
     with pytest.raises(SourceError, match="one instance at most"):

@@ -260,7 +260,7 @@ def test_frames_times_and_places(tmp_path):
 def test_the_playing_time_is_told(tmp_path):
     found = a_source(a_movie(tmp_path / "a.avi")).survey()
     assert found.times == pytest.approx([0, 0.05, 0.1])
-    assert any("playing the movie, 0.05 s" in text for text in found.notes.assumed)
+    assert any("playing times of the movie, 0.05 s" in text for text in found.notes.assumed)
     assert any("standard uncertainty of 1.25 K" in text for text in found.notes.assumed)
 
 
@@ -459,7 +459,7 @@ SAME_POINT = {"scale_from": (1, 1), "scale_to": (1, 1), "scale_length": 1.0, "pi
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"pixel": 0.0}, "pixel: 0 m, expected|pixel: .* is not over 0"),
+        ({"pixel": 0.0}, "pixel: 0 m, expected|pixel: .* must be more than 0"),
         (
             {
                 "scale_from": (1, 1),

@@ -214,7 +214,7 @@ def test_sources_of_which_no_scene_can_be_made(source, wrong):
 
 @pytest.mark.parametrize("interval", [0.0, -1e-6, float("nan"), float("inf")])
 def test_an_impossible_interval_is_refused(interval):
-    with pytest.raises(SourceError, match=r"interval: .* expected over 0"):
+    with pytest.raises(SourceError, match=r"interval: .* expected more than 0"):
         even_times(3, interval, Notes())
 
 

@@ -225,7 +225,7 @@ def test_a_file_cut_short_is_named(tmp_path, kept):
     path = a_file(tmp_path)
     whole = path.read_bytes()
     path.write_bytes(whole[: int(kept * len(whole))])
-    with pytest.raises(SceneError, match=r"scene\.nc: not a scene, or cut short"):
+    with pytest.raises(SceneError, match=r"scene\.nc: not a scene, or truncated"):
         open_scene(path)
 
 
@@ -234,7 +234,7 @@ def test_a_foreign_file_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"foreign\.nc: there is no such file"):
         open_scene(path)
     path.write_text("not a scene")
-    with pytest.raises(SceneError, match=r"foreign\.nc: not a scene, or cut short") as caught:
+    with pytest.raises(SceneError, match=r"foreign\.nc: not a scene, or truncated") as caught:
         open_scene(path)
     assert "\n" not in str(caught.value)
     xr.Dataset({"a": ("time", [1.0])}).to_netcdf(path, engine="h5netcdf")
@@ -382,7 +382,7 @@ def test_a_foreign_measurement_is_named(tmp_path):
         read_measurement(path)
     write_measurement(a_measurement(), path)
     path.write_bytes(path.read_bytes()[:-500])
-    with pytest.raises(ValueError, match=r"m\.nc: not a measurement, or cut short"):
+    with pytest.raises(ValueError, match=r"m\.nc: not a measurement, or truncated"):
         read_measurement(path)
     scene = a_file(tmp_path)
     shutil.copy(scene, path)

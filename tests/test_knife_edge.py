@@ -103,7 +103,7 @@ def test_a_model_with_the_sensor_is_the_mean_over_its_square(name, normal):
     angle = radians(normal)
     distance = x * cos(angle) + y * np.sin(angle) - 1e-6
     response = edge_response(lambda f: model.transfer(values, f, angle), angle, PITCH, 250e-6)
-    # Tails of diffraction that wrap around the table are the greatest of the errors.
+    # Tails of diffraction that wrap around the table are the largest of the errors.
     np.testing.assert_allclose(response(distance), measured, atol=1e-5)
 
 
@@ -199,11 +199,11 @@ def test_a_round_spread_is_found_from_edges_of_several_orientations(clean):
 
 def test_an_elliptical_spread_is_told_from_a_round_one():
     # 14 um along 30 deg, 8 um across it.
-    greatest, least, direction = 14e-6, 8e-6, radians(30.0)
+    largest, least, direction = 14e-6, 8e-6, radians(30.0)
 
     def width(normal):
         turned = radians(normal) - direction
-        return sqrt((greatest * cos(turned)) ** 2 + (least * np.sin(turned)) ** 2)
+        return sqrt((largest * cos(turned)) ** 2 + (least * np.sin(turned)) ** 2)
 
     normals = (4.0, 64.0, 126.0)
     images = [an_image(n, gaussian_edge(width(n)), seed=k) for k, n in enumerate(normals)]
@@ -211,7 +211,7 @@ def test_an_elliptical_spread_is_told_from_a_round_one():
     assert found.best.model.name == "elliptical gaussian"
     x, y, both = found.best.values
     squares, axes = np.linalg.eigh([[x**2, both * x * y], [both * x * y, y**2]])
-    assert np.sqrt(squares) == pytest.approx((least, greatest), rel=0.03)
+    assert np.sqrt(squares) == pytest.approx((least, largest), rel=0.03)
     assert degrees(np.arctan(axes[1, 1] / axes[0, 1])) == pytest.approx(30.0, abs=1.5)
     for edge, normal in zip(found.edges, normals, strict=True):
         assert abs(edge.fwhm - width(normal)) < 3 * edge.fwhm_uncertainty
@@ -219,7 +219,7 @@ def test_an_elliptical_spread_is_told_from_a_round_one():
     x = np.arange(len(kernel)) - len(kernel) // 2
     # First row on top: y goes up as the row number goes down.
     across = np.sum(kernel * x * -x[:, None]) * 1e-12
-    expected = (greatest**2 - least**2) / 2 * np.sin(2 * direction) / FWHM_PER_SIGMA**2
+    expected = (largest**2 - least**2) / 2 * np.sin(2 * direction) / FWHM_PER_SIGMA**2
     assert across == pytest.approx(expected, rel=0.1)
     flat = knife_edge([an_image(4.0, gaussian_edge(12e-6)), an_image(94.0, gaussian_edge(9e-6))])
     assert flat.best.model.name == "elliptical gaussian"
@@ -450,7 +450,7 @@ def test_images_and_apertures_that_are_not_there_are_errors():
         knife_edge([edge], [flat, *others])
     with pytest.raises(ValueError, match="no aperture of 20 um within the image"):
         knife_edge([edge], [replace(hole, diameter=20e-6, name="hole"), *others])
-    with pytest.raises(ValueError, match=r"hole: diameter is -1\.0 m, expected over 0"):
+    with pytest.raises(ValueError, match=r"hole: diameter is -1\.0 m, expected more than 0"):
         aperture_image(measurement_of(hole.radiance * 100), -1.0, "hole")
 
 

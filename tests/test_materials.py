@@ -22,7 +22,7 @@ from chipglow.cutting import (
 from chipglow.cutting.damage import Damage, strain_to_failure
 from chipglow.cutting.library import FOLDER, read_material
 from chipglow.study import Study, load_study
-from chipglow.study.running import _inputs
+from chipglow.study.running import scene_inputs
 
 RATES = "[[1 1/s, 0.6], [1000 1/s, 0.9]]"
 SETS = [
@@ -102,8 +102,8 @@ def test_the_rooms_data_are_files_of_the_package() -> None:
     ("name", "message"),
     [
         ("cheese", "'cheese' is unknown, expected one of aisi-1045, aisi-4140"),
-        ("aisi-1045/cheese", "aisi-1045: 'cheese' is no set, expected one of segmented"),
-        ("aisi-1045/", "aisi-1045: '' is no set"),
+        ("aisi-1045/cheese", "aisi-1045: 'cheese' is not a set, expected one of segmented"),
+        ("aisi-1045/", "aisi-1045: '' is not a set"),
         ("carbide", "carbide: kind: 'tool', expected workpiece"),
         ("../materials/aisi-1045", "'..' is unknown"),
     ],
@@ -139,14 +139,18 @@ def _write(path: Path, old: str, new: str) -> Path:
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
         ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "duplicate key 'loss'"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K' is not a strain rate"),
-        ("value: 0.9\n", f"value: {RATES}\n".replace("1000", "0.1"), "rates must ascend"),
+        (
+            "value: 0.9\n",
+            f"value: {RATES}\n".replace("1000", "0.1"),
+            "rates must be positive and ascend",
+        ),
         (
             "  pantale:\n",
             "  pantale:\n    law: cheese\n",
             "law: 'cheese', expected one of johnson-cook",
         ),
         ("  pantale:\n", "  pantale:\n    law: tanh\n", "pantale.hardening_limit: is missing"),
-        ("  pantale:\n", "  pantale:\n    damage: mine\n", "pantale.damage: 'mine', expected none"),
+        ("  pantale:\n", "  pantale:\n    damage: mine\n", "pantale.damage: 'mine', must be none"),
         ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
     ],
 )
@@ -195,7 +199,7 @@ def test_elastic_constants_over_the_temperature(tmp_path: Path) -> None:
     cold = [moving.shear_modulus_at(293.15), moving.bulk_modulus_at(293.15)]
     hot = [moving.shear_modulus_at(700.0), moving.bulk_modulus_at(700.0)]
     assert ratios[500, :2] == pytest.approx(np.divide(hot, cold), rel=1e-12)
-    # K is greatest where Poisson's ratio has risen and E has not yet fallen much.
+    # K is largest where Poisson's ratio has risen and E has not yet fallen much.
     kelvins = np.arange(200.0, 3001.0)
     stiffness = moving.bulk_modulus_at(kelvins) + 4 / 3 * moving.shear_modulus_at(kelvins)
     assert stiffness.argmax() == 300
@@ -209,7 +213,7 @@ def test_elastic_constants_over_the_temperature(tmp_path: Path) -> None:
 
 def test_limits_hold_for_every_value_of_a_table() -> None:
     table = replace(AISI_1045.conductivity, values=(-1.0,) * len(AISI_1045.conductivity.values))
-    with pytest.raises(ValueError, match=r"Material\.conductivity: -1 W/m/K, expected over 0"):
+    with pytest.raises(ValueError, match=r"Material\.conductivity: -1 W/m/K, expected more than 0"):
         replace(AISI_1045, conductivity=table)
     with pytest.raises(ValueError, match=r"Material\.taylor_quinney: 1\.5, expected 0 to 1"):
         replace(AISI_1045, taylor_quinney=RateTable((1.0, 2.0), (0.5, 1.5)))
@@ -224,7 +228,7 @@ def test_heat_fraction_over_the_strain_rate(tmp_path: Path) -> None:
     shown = CliRunner().invoke(app, ["materials", str(path)])
     assert "0.9 at 1000 1/s" in shown.output
     study = Study(**{"cutting": {"workpiece": str(path)}})
-    assert "0.6" in json.dumps(_inputs(study)["workpiece"]["taylor_quinney"])
+    assert "0.6" in json.dumps(scene_inputs(study)["workpiece"]["taylor_quinney"])
 
 
 def test_a_number_needs_a_source(tmp_path: Path) -> None:
@@ -246,11 +250,11 @@ def test_a_study_takes_a_file_beside_it(tmp_path: Path) -> None:
 def test_the_cache_knows_a_materials_numbers(tmp_path: Path) -> None:
     path = _write(tmp_path / "steel.yaml", "212 GPa", "200 GPa")
     study = Study(**{"cutting": {"workpiece": str(path)}})
-    before = json.dumps(_inputs(study))
+    before = json.dumps(scene_inputs(study))
     path.write_text(path.read_text(encoding="utf-8").replace("name: AISI", "name: my"))
-    assert json.dumps(_inputs(study)) == before
+    assert json.dumps(scene_inputs(study)) == before
     _write(path, "212 GPa", "201 GPa")
-    assert json.dumps(_inputs(study)) != before
+    assert json.dumps(scene_inputs(study)) != before
 
 
 def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -259,11 +263,11 @@ def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch: pytest.Monk
 
     study = Study(**{"cutting": {"workpiece": "aisi-1045/jaspers-dautzenberg"}})
     simulation = study.cutting.simulation()
-    before = _inputs(study)
+    before = scene_inputs(study)
     mine = Mine(**asdict(simulation.workpiece.flow_stress))
     simulation = replace(simulation, workpiece=replace(simulation.workpiece, flow_stress=mine))
     monkeypatch.setattr(type(study.cutting), "simulation", lambda self: simulation)
-    assert json.dumps(_inputs(study)) != json.dumps(before)
+    assert json.dumps(scene_inputs(study)) != json.dumps(before)
 
 
 def test_a_study_chooses_a_set() -> None:

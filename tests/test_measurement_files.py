@@ -329,7 +329,7 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
     with pytest.raises(ValueError, match="--set: 'pitch=6 um' describes nothing"):
         load_measurement(tmp_path / "measured.nc", ["pitch=6 um"])
     write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
-    with pytest.raises(DescriptionError, match=r"scene\.nc: is a scene, .* measure makes one"):
+    with pytest.raises(DescriptionError, match=r"scene\.nc: is a scene, .* measure creates one"):
         load_measurement(tmp_path / "scene.nc")
 
 
@@ -351,7 +351,7 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
         (["quarter_turns=5"], "quarter_turns: 5, expected 0 to 3"),
         (["tip=[1, 2, 3]"], "tip"),
         (["tip=10.5,a"], "tip"),
-        (["object_parameters.emissivity=2"], "emissivity: 2, expected over 0"),
+        (["object_parameters.emissivity=2"], "emissivity: 2, expected more than 0"),
         (["colour=red"], "unknown key 'colour'"),
         (["file=none"], "file: is missing"),
         (["unit=K", "calibration=none", "band=3-5 um"], "not linear in light"),

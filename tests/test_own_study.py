@@ -57,7 +57,7 @@ MEASURED = [
     (10, 518e-6, -414e-6),
     (20, 442e-6, -355e-6),
 ]
-"""Rake angle in degrees; greatest contact and leftmost chip or band of a cut at a cell of 20 um."""
+"""Rake angle in degrees; largest contact and leftmost chip or band of a cut at a cell of 20 um."""
 
 
 @pytest.mark.parametrize(("rake", "contact", "left"), MEASURED)

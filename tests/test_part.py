@@ -37,10 +37,10 @@ class Shelf(Part):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"width": 0.0}, "width: 0 m, expected over 0 m, up to 2 m"),
-        ({"width": "3 m"}, "width: 3000000 um, expected over 0 um, up to 2000000 um"),
-        ({"width": "3 s"}, "width: '3 s' is not a length, expected one such as 6 um"),
-        ({"width": float("nan")}, "width: nan m, expected over 0 m, up to 2 m"),
+        ({"width": 0.0}, "width: 0 m, expected more than 0 m, up to 2 m"),
+        ({"width": "3 m"}, "width: 3000000 um, expected more than 0 um, up to 2000000 um"),
+        ({"width": "3 s"}, "width: '3 s' is not a length, expected a value such as 6 um"),
+        ({"width": float("nan")}, "width: nan m, expected more than 0 m, up to 2 m"),
         ({"width": 1.0, "boards": 0}, "boards: 0, expected 1 or more"),
         ({"width": 1.0, "boards": 2.5}, "boards: 2.5, expected a valid integer"),
         ({"width": 1.0, "boards": True}, "boards: True, expected a valid integer"),
@@ -85,7 +85,7 @@ def test_a_description_gives_text_with_units_and_makes_the_part():
 def test_si_numbers_pass_from_python_only():
     assert read({"width": 1.5}) == Shelf(1.5) == Shelf("150 cm")
     assert (Shelf(1.5).given, Shelf(1.5, warmth=300.0).given) == ({"width"}, {"width", "warmth"})
-    with pytest.raises(ValidationError, match="3 m, expected over 0 m"):
+    with pytest.raises(ValidationError, match="3 m, expected more than 0 m"):
         read({"width": 3.0})
     with pytest.raises(ValidationError, match="has no unit"):
         read_from_file({"width": 1.5})
@@ -100,7 +100,9 @@ def test_help_shows_plain_types():
 
 def test_comment_schema_and_documentation_say_the_same():
     text = commented_yaml("# head", Shelf(1.0))
-    assert "# Of the board.\n# Allowed: over 0 um, up to 2000000 um.\nwidth: 1000000 um\n" in text
+    assert (
+        "# Of the board.\n# Allowed: more than 0 um, up to 2000000 um.\nwidth: 1000000 um\n" in text
+    )
     assert "# How many.\n# Allowed: 1 or more.\nboards: 3\n" in text
     assert "# Of the room.\n# Allowed: none, or 0 degC or more.\nwarmth: none\n" in text
     schema = json.loads(json_schema(Shelf))

@@ -91,7 +91,7 @@ def test_the_exposure_is_pyxels_time_step(folder):
         ({}, {"row": 5}, "study.yaml: the camera's image has 4 rows and 5 columns"),
         ({"chip": "chip 3"}, {}, "chip: 'chip 3', expected one of"),
         ({"f_number": 0.1}, {}, "f_number: 0.1, expected 0.5 or more"),
-        ({"transmittance": 0.0}, {}, "transmittance: 0.0, expected over 0, at most 1"),
+        ({"transmittance": 0.0}, {}, "transmittance: 0.0, expected more than 0, at most 1"),
         ({"start": "20 us"}, {}, "beyond|scene"),
     ],
 )

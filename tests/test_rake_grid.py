@@ -235,7 +235,7 @@ def test_a_tool_is_read_from_its_file(tmp_path):
         ("tip: [1, 2]\n", "tool.yaml: tip.0: 1 has no unit"),
         (
             "rake_angle: 80 deg\n",
-            "tool.yaml: rake_angle: 80 deg, expected over -60 deg, under 60",
+            "tool.yaml: rake_angle: 80 deg, expected more than -60 deg, less than 60",
         ),
     ],
 )

@@ -107,7 +107,7 @@ regions:
             "regions: {a: {circle: {centre: [1, 1], radius: 1}, rectangle: [[0, 0], [1, 1]]}}",
             "rectangle and circle, expected one of",
         ),
-        ("regions: {a: {circle: {centre: [1, 1]}}}", "circle: radius is 0.0, expected over 0"),
+        ("regions: {a: {circle: {centre: [1, 1]}}}", "circle: radius is 0.0, expected more than 0"),
         ("regions: {a: {rectangle: [[0, 0], [1 um, 1]]}}", "pixels and lengths are mixed"),
         ("regions: {a: {polygon: [[0, 0], [1, 1]]}}", "has 2 corners, expected 3"),
         ("regions: {a: {rectangle: [[0, 0], [1 s, 1]]}}", "'1 s', expected a number of pixels"),

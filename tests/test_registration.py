@@ -155,9 +155,9 @@ def test_the_warped_image_has_each_sensor_where_the_map_says():
     ("wrong", "message"),
     [
         ({"matrix": 2 * np.eye(3)}, "its last element is 2, expected 1"),
-        ({"matrix": np.diag([1.0, 0.0, 1.0])}, "is singular"),
+        ({"matrix": np.diag([1.0, 0.0, 1.0])}, "must have an inverse"),
         ({"covariance": np.zeros((3, 3))}, "covariance: expected finite"),
-        ({"degrees_of_freedom": 0.0}, "degrees_of_freedom is 0.0, expected over 0"),
+        ({"degrees_of_freedom": 0.0}, "degrees_of_freedom 0.0 must be positive"),
     ],
 )
 def test_a_registration_refuses_what_is_none(wrong, message):
@@ -306,7 +306,7 @@ def test_signals_that_say_nothing_are_refused():
         align_times(infrared[:3], hot[:3], visible, bright)
     with pytest.raises(ValueError, match="ascending times"):
         align_times(infrared[::-1], hot, visible, bright)
-    with pytest.raises(ValueError, match="29 values for 30 times"):
+    with pytest.raises(ValueError, match="29 values but 30 times"):
         align_times(infrared, hot[1:], visible, bright)
 
 
@@ -442,7 +442,7 @@ def test_pictures_of_another_kind_are_refused(folder):
     for name, content, expected in (
         ("empty.png", b"", "empty.png: is empty, expected a picture"),
         ("text.png", b"no picture", "text.png: expected a picture"),
-        ("cut.png", whole[: len(whole) // 2], "cut.png: is damaged or cut short"),
+        ("cut.png", whole[: len(whole) // 2], "cut.png: is damaged or truncated"),
         ("notes.txt", b"no camera", "notes.txt"),
     ):
         (folder / name).write_bytes(content)

@@ -188,8 +188,8 @@ def changed_field(name, change):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: replace(RASTER, spacing=0.0), "spacing must be over 0 m, got 0.0"),
-        (lambda: replace(RASTER, spacing=np.nan), "spacing must be over 0 m, got nan"),
+        (lambda: replace(RASTER, spacing=0.0), "spacing must be positive, got 0.0"),
+        (lambda: replace(RASTER, spacing=np.nan), "spacing must be positive, got nan"),
         (lambda: replace(RASTER, rows=0), "expected 1 sample or more, got 0 x 5"),
         (lambda: replace(RASTER, left=np.inf), "corner must be finite, got inf"),
         (lambda: Scene.from_fields(RASTER, 0.0, fields()), r"times have shape \(\), expected \(ti"),

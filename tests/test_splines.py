@@ -88,7 +88,7 @@ def in_memory(scene):
 def test_samples_are_those_of_the_b_splines():
     frame = a_spline_frame()
     found = frame.frame()
-    # Products of float32: a few units in the last place of the greatest term.
+    # Products of float32: a few units in the last place of the largest term.
     assert found.splines is frame
     filled = by_scipy(frame, "filled")
     clear = np.abs(filled - 0.5) > 1e-5

@@ -151,19 +151,25 @@ REFUSED = [
     ("sede: 3", "unknown key 'sede', did you mean 'seed'?"),
     ("camera: {zoom: 3}", "camera: unknown key 'zoom', expected one of preset, band, response"),
     ("cutting: {feed: 0.3}", "cutting.feed: 0.3 has no unit, expected a length such as 0.3 mm"),
-    ("cutting: {initial_temperature: -280 degC}", "initial_temperature: -280 degC is not over 0 K"),
+    (
+        "cutting: {initial_temperature: -280 degC}",
+        "initial_temperature: -280 degC must be more than 0 K",
+    ),
     (
         "cutting: {tool: {temperature: 1300 degC}}",
         "1300 degC, expected -73.15 degC to 1226.85 degC",
     ),
-    ("cutting: {tool: {rake_angle: 80 deg}}", "80 deg, expected over -60 deg, under 60 deg"),
+    (
+        "cutting: {tool: {rake_angle: 80 deg}}",
+        "80 deg, expected more than -60 deg, less than 60 deg",
+    ),
     ("cutting: {tool: {material: cheese}}", "'cheese' is unknown, expected one of carbide"),
     ("cutting: {workpiece: cheese}", "workpiece: 'cheese' is unknown, expected one of aisi-1045"),
     ("cutting: {numerics: {cell: 1 m}}", "1000000 um, expected 0.5 um to 43.75 um"),
     ("cutting: {window: {end: 3 mm}}", "window.end: 3 mm is beyond cutting_length, expected up to"),
     (
         "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
-        "start: 1.9 mm, expected under end, 1.8 mm",
+        "start: 1.9 mm, expected less than end, 1.8 mm",
     ),
     (
         "cutting: {window: {band_duration: 5 us}}",
@@ -193,11 +199,11 @@ REFUSED = [
     ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0: 4 has no unit"),
     (
         "cutting: {tool: {chamfer: {width: 10 um, angle: 20 deg}}}",
-        "chamfer width: expected over 17.53 um",
+        "chamfer width: more than 17.53 um",
     ),
     (
         "cutting: {tool: {hone: {rake: 40 um, clearance: 20 um}, edge_radius: 5 um}}",
-        "edge_radius: is not used beside hone, expected one or the other",
+        "edge_radius: is not used beside hone, give only one of them",
     ),
     (
         "cutting: {tool: {outline: none.csv}}",

@@ -131,7 +131,7 @@ def test_a_point_that_fails_is_stated_and_the_others_are_computed(study, tmp_pat
     [
         ({"camera.pich": ("5 um",)}, {}, "pich"),
         ({"camera.pitch": ("5",)}, {}, "has no unit"),
-        ({}, {}, "one setting or more"),
+        ({}, {}, "at least one setting"),
         ({"camera.pitch": "5 um:6 us:3"}, {}, "same unit"),
         ({"camera.pitch": ("5 um", "6 um")}, {"method": "random"}, "unknown"),
     ],

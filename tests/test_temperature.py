@@ -367,20 +367,20 @@ def true_of(line=KNOWN, surroundings=None, **more):
         (lambda _: true_temperature([], WHOLE, KNOWN), "temperature: there is no image"),
         (
             lambda _: true_of(surroundings=reflected_temperature(900.0)),
-            r"darker than what it reflects at 626\.85 °C",
+            r"darker than its reflection at 626\.85 °C",
         ),
         (
             lambda _: true_of(line_of(-1.6e-3, (600.0, 800.0)), emissivity=0.9, kelvins=1000.0),
-            "expected one that falls less",
+            "use an emissivity that falls less",
         ),
-        (lambda _: true_of(line_of(), kelvins=ROOM - 10.0), "is darker than what it reflects"),
+        (lambda _: true_of(line_of(), kelvins=ROOM - 10.0), "is darker than its reflection"),
         (lambda _: true_of(flags=DEAD), "0 of its 1200 pixels can be used"),
-        (lambda _: EmissivityLine.constant(0.0), "emissivity: is .*, expected over 0 to 1"),
-        (lambda _: EmissivityLine.constant(float("nan")), "emissivity: is nan, expected over 0"),
+        (lambda _: EmissivityLine.constant(0.0), "emissivity: is .*, expected more than 0 to 1"),
+        (lambda _: EmissivityLine.constant(float("nan")), "emissivity: is nan"),
         (lambda _: EmissivityLine.constant(0.5, -1.0), "standard uncertainty is -1"),
         (lambda _: reflected_temperature(0.0), "reflected: is 0"),
         (lambda _: reflected_temperature(293.0, -1.0), "reflected: standard uncertainty"),
-        (earlier_version, "of an earlier version"),
+        (earlier_version, "by an earlier version"),
     ],
 )
 def test_impossible_input_is_one_clear_error(tmp_path, call, message):

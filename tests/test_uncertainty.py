@@ -467,7 +467,7 @@ def test_impossible_estimates_are_refused():
     one = Estimate([1.0, 2.0])
     with pytest.raises(ValueError, match="noise: an effect is not finite"):
         one.with_component("noise", [1.0, np.nan])
-    with pytest.raises(ValueError, match="a component is there twice"):
+    with pytest.raises(ValueError, match="a component occurs twice"):
         one.with_component("noise", 1.0, identity="").with_component("noise", 2.0, identity="")
     with pytest.raises(ValueError, match="has effects on 3 values, expected 2"):
         Estimate(one.values, (Component(Cause("noise"), np.ones((3, 1))),))
@@ -489,7 +489,7 @@ def test_impossible_estimates_are_refused():
         lambda: draw([pixels, other], 2, generator),
         lambda: propagate(np.add, pixels, other),
     ):
-        with pytest.raises(ValueError, match="expected the same errors wherever its name"):
+        with pytest.raises(ValueError, match="they must be the same errors wherever its name"):
             together()
     with pytest.raises(ValueError, match="1 observations, expected 2 or more"):
         Estimate.from_observations([1.0], "noise")

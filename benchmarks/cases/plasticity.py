@@ -75,7 +75,7 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
     results = [sheared_block(step) for step in steps]
     expected = [float(np.interp(SHEAR / sqrt(3), total, value)) for value in (plastic, temperature)]
     errors = [abs(result[2][-1] - expected[1]) for result in results]
-    # Kernels take the heat capacity of the whole kelvin below: half a kelvin low in the mean.
+    # Kernels take the heat capacity of the whole kelvin below: half a kelvin low on average.
     capacity = UNBROKEN.heat_capacity.at([expected[1] - 0.5, expected[1]])
     lower_limit = (expected[1] - 293.0) * (1 - capacity[0] / capacity[1])
 

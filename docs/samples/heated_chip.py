@@ -84,7 +84,7 @@ def fine(regions: tuple[Region, ...]) -> tuple[Region, ...]:
 
 
 def shear_band(half_width: float) -> Region:
-    """Region of the first shear band, to this distance from its middle."""
+    """Region of the first shear band, to this distance from its centre."""
     places = [(side * half_width, -height) for side, height in ((-1, 72e-6), (1, 72e-6))]
     places += [(side * half_width, -height) for side, height in ((1, 432e-6), (-1, 432e-6))]
     corners = tuple((BANDS[0] + x - LEAN * y, y) for x, y in places)

@@ -49,7 +49,7 @@ def test_a_materials_file_names_it(tmp_path):
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("hardening_strain", -1, "hardening_strain: -1, expected over 0"),
+        ("hardening_strain", -1, "hardening_strain: -1, expected more than 0"),
         ("yield_stress", 400, "yield_stress: 400 has no unit, expected a stress such as"),
         ("yield_stress", "1 GPa", "saturation_stress: is under the yield_stress"),
     ],

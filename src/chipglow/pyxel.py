@@ -49,7 +49,7 @@ def photons(
 ) -> None:
     """Fill a detector of Pyxel with the photons of a scene, for one readout.
 
-    Band, optics, point spread function and footprint are those of the study's camera; its noise and
+    Band, optics, point spread function and footprint come from the study's camera; its noise and
     range limits are not applied, as Pyxel has its own. The exposure lasts Pyxel's time step.
     n = τ (π / 4 N²) A t ∫ R(λ) L(λ) λ / (h c) dλ (EMVA 1288, 2.1, with a quantum efficiency of 1).
 
@@ -77,7 +77,7 @@ def photons(
     if not 0.5 <= f_number < np.inf:
         raise ValueError(f"f_number: {f_number!r}, expected 0.5 or more")
     if not 0 < transmittance <= 1:
-        raise ValueError(f"transmittance: {transmittance!r}, expected over 0, at most 1")
+        raise ValueError(f"transmittance: {transmittance!r}, expected more than 0, at most 1")
     scene, surface, camera = _setup(study, chip)
     try:
         first = float(scene.times[0]) if start is None else INSTANT.parse(start)

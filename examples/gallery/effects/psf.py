@@ -53,13 +53,13 @@ def density(psf):
 
 reach = (HALF + 0.5) * SPACING * 1e6
 images = {name: density(psf) for name, psf in shown.items()}
-greatest = images["pupil over the band"].max()
+largest = images["pupil over the band"].max()
 with style():
     figure = new_figure(4.3)
     figure.set_layout_engine("compressed")
     panels = figure.subplots(2, 4, sharex=True, sharey=True)
     for axes, (name, image) in zip(panels.flat, images.items(), strict=True):
-        part = image / greatest
+        part = image / largest
         picture = axes.imshow(np.sqrt(part), extent=(-reach, reach, -reach, reach), vmin=0, vmax=1)
         axes.set_title(f"{name}\npeak {part.max():.2f}", fontsize=8)
     figure.supxlabel("x / µm", fontsize=9.5)

@@ -142,8 +142,8 @@ class HottestPlace(Place):
     quantities: ClassVar = ("peak",)
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
-        greatest = np.where(np.isnan(images), -np.inf, images).max(axis=(1, 2))
-        return np.where(np.isfinite(greatest), greatest, np.nan)[None]
+        largest = np.where(np.isnan(images), -np.inf, images).max(axis=(1, 2))
+        return np.where(np.isfinite(largest), largest, np.nan)[None]
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ class ShownStudy(Study):
     error_image: Annotated[str, Parameter("Image of the error.")] = "total"
 
     def _check_camera(self) -> None:
-        """Its cut need not suit the camera: the scene is there."""
+        """Its cut need not suit the camera: the scene exists."""
 
 
 @dataclass(frozen=True)

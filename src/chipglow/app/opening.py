@@ -74,7 +74,7 @@ def open_any(path: str | Path | None, study: Study | None = None) -> Model:
 
 
 def open_scene_object(scene: Scene, study: Study | None, name: str) -> SceneModel:
-    """Open a scene; a study of one that is no file names ``scene.nc`` beside it."""
+    """Open a scene; a study of a scene without a file names ``scene.nc`` next to it."""
     file = str(scene.path.resolve()) if isinstance(scene, StoredScene) else "scene.nc"
     return scene_model(scene, study or Study(), name, file)
 
@@ -125,7 +125,7 @@ def _results(folder: Path) -> SceneModel:
     study = load_study(file)
     if study.scene is None and not is_cut(study):
         raise ValueError(
-            f"{folder}: the scene of its study is not in the cache, expected that "
+            f"{folder}: the scene of its study is not in the cache; set "
             f"chipglow run {file} --out {folder} was done on this machine, or a scene's file"
         )
     scene = open_scene(study.scene or cut(study))

@@ -53,7 +53,7 @@ class Newest(Generic[_Job]):
         self.pause(0.0)
 
     def pause(self, seconds: float) -> None:
-        """Let the running job wait, and end it if it is superseded meanwhile."""
+        """Let the running job wait, and stop it if it is superseded."""
         if self._running.wait(seconds):
             raise SupersededError
 

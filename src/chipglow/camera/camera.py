@@ -242,7 +242,7 @@ class Camera(Part):
     def row_delays(self, scene: Raster) -> Array:
         """Return the delay in s of the integration of each row of samples, shape (y,).
 
-        The delay is that of the nearest row of pixels; 0 with a global shutter.
+        The delay belongs to the nearest row of pixels; 0 with a global shutter.
         """
         sensors = self.pixels(scene)
         if self.line_time is None:

@@ -72,7 +72,7 @@ class RatioCamera(Part):
             one, other = getattr(self.first, name), getattr(self.second, name)
             if one != other:
                 raise ValueError(
-                    f"ratio camera: {name} is {one!r} and {other!r}, expected the same of both"
+                    f"ratio camera: {name} is {one!r} and {other!r}, both must be the same"
                 )
         self.thermometer.range  # noqa: B018 - refuses bands without a ratio now, not later
 

@@ -112,9 +112,9 @@ def _where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _R
     yield "y", f"{bottom} to {top}"
     yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
     if len(times) > 1:
-        least, mean, greatest = (float(f(np.diff(times))) for f in (np.min, np.mean, np.max))
-        is_even = greatest - least < 1e-3 * mean
-        uneven = f"{microseconds(least)} to {microseconds(greatest)}"
+        least, mean, largest = (float(f(np.diff(times))) for f in (np.min, np.mean, np.max))
+        is_even = largest - least < 1e-3 * mean
+        uneven = f"{microseconds(least)} to {microseconds(largest)}"
         yield "interval", microseconds(mean) if is_even else uneven
 
 
@@ -215,8 +215,8 @@ def _measurement_facts(measurement: Measurement, time: float | None) -> _Rows:
         yield "its calibration", "uncertainty not known"
     else:
         uncertainty = uncertainty / measurement.band.slope(kelvins)
-        least, greatest = float(np.nanmin(uncertainty)), float(np.nanmax(uncertainty))
-        yield "its calibration", f"standard uncertainty {least:.2g} K to {greatest:.2g} K"
+        least, largest = float(np.nanmin(uncertainty)), float(np.nanmax(uncertainty))
+        yield "its calibration", f"standard uncertainty {least:.2g} K to {largest:.2g} K"
     yield "usable pixels", f"{100 * np.mean(measurement.usable):.4g} %"
     fractions = flag_fractions(measurement)
     for flag, name in _FLAG_NAMES.items():
@@ -228,5 +228,5 @@ def _celsius(kelvins: NDArray[np.float64]) -> str:
     known = kelvins[np.isfinite(kelvins)] - 273.15
     if known.size == 0:
         return "none: no pixel is usable"
-    least, median, greatest = (f"{one:.1f} °C" for one in np.quantile(known, (0.0, 0.5, 1.0)))
-    return f"{least} to {greatest}, median {median}"
+    least, median, largest = (f"{one:.1f} °C" for one in np.quantile(known, (0.0, 0.5, 1.0)))
+    return f"{least} to {largest}, median {median}"

@@ -170,16 +170,16 @@ class OutputWindow(Part):
         super().__post_init__()
         if not self.start < self.end:
             start, end = (CUT_LENGTH.text(length) for length in (self.start, self.end))
-            raise ValueError(f"start: {start}, expected under end, {end}")
+            raise ValueError(f"start: {start}, expected less than end, {end}")
 
 
 @dataclass(frozen=True)
 class Numerics(Part):
     """Cells, time steps and region of the computation.
 
-    Cutting is slow against the speed of sound, so a heavier material moves alike and allows a
-    longer time step; heat is not scaled. The computed region reaches `upstream`, `downstream`,
-    `depth` and `height` in m: before and behind the edge, under and over the cut.
+    Cutting is slow against the speed of sound, so a heavier material moves in the same way and
+    allows a longer time step; heat is not scaled. The computed region reaches `upstream`,
+    `downstream`, `depth` and `height` in m: before and behind the edge, under and over the cut.
     """
 
     cell: Annotated[

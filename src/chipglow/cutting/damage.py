@@ -62,7 +62,7 @@ class JohnsonCookDamage(Part):
         ends = [self.d1 + self.d2 * np.exp(self.d3 * end) for end in TRIAXIALITIES]
         if min(ends) <= 0:
             raise ValueError(
-                f"d1 + d2 exp(d3 triaxiality) falls to {min(ends):.3g}, expected over 0 "
+                f"d1 + d2 exp(d3 triaxiality) falls to {min(ends):.3g}, expected more than 0 "
                 f"from {TRIAXIALITIES[0]:g} to {TRIAXIALITIES[1]:g}"
             )
         check_melting(type(self), self.reference_temperature, self.melting_temperature)
@@ -89,9 +89,7 @@ class FittedDamage(Part):
         covariance = np.array(self.relative_covariance, dtype=np.float64)
         lowest = np.linalg.eigvalsh(covariance).min() if size else 0.0
         if not np.allclose(covariance, covariance.T) or lowest < -1e-9 * covariance.max():
-            raise ValueError(
-                "relative_covariance: expected one that is symmetric, without negative variances"
-            )
+            raise ValueError("relative_covariance: must be symmetric without negative variances")
 
     def draw(self, damage: JohnsonCookDamage, generator: np.random.Generator) -> JohnsonCookDamage:
         """Draw another damage law that the measured cuts allow: log-normal about `damage`."""

@@ -51,8 +51,8 @@ class FlowStress(Part):
     Attributes
     ----------
     stress_and_slopes : compiled function
-        Of the arguments of `stress`: the flow stress and its derivatives by strain and by the
-        logarithm of the rate. Taken from differences of `stress` without it.
+        Return, for the arguments of `stress`, the flow stress and its derivatives by strain and by
+        the logarithm of the rate. Taken from differences of `stress` without it.
     """
 
     Numbers: ClassVar[Any] = _NumbersOfLaw()
@@ -65,7 +65,7 @@ class FlowStress(Part):
         Parameters
         ----------
         strain, rate, temperature : float
-            Plastic strain (over 0), its rate in 1/s (over 0), temperature in K.
+            Plastic strain (positive), its rate in 1/s (positive), temperature in K.
         law : named tuple
             The law's numbers, by the names of its fields.
         """
@@ -93,7 +93,7 @@ def comes_with_chipglow(kind: type) -> bool:
 @cache
 def _numbers_of(law: Any) -> Any:
     # Numba tells compiled functions apart by the names of their arguments' types, those that it
-    # has on disk among them: a law that is defined anew needs another name.
+    # has on disk among them: a law that is defined again needs another name.
     number = "" if comes_with_chipglow(law) else next(_OWN_LAWS)
     names = [one.name for one in fields(law)]
     numbers: Any = namedtuple(f"{law.__name__}{number}", names)  # type: ignore[misc]

@@ -52,8 +52,8 @@ def conduct(  # type: ignore[no-untyped-def]
     free surface wherever the surface lies between the nodes.
 
     Increments leave differences between the points of a cell as they are, so a point much colder
-    than the others would be cooled with them. A `part` of what the grid does not see is taken
-    away: that is all of the noise, but of a smooth field only a fourth derivative.
+    than the others would be cooled with them. A `part` of the variation below the grid's resolution
+    is taken away: that is all of the noise, but of a smooth field only a fourth derivative.
     """
     _gather_heat(points, count, nodes, capacity, heat_mass, grid)
     increment[:] = 0.0
@@ -129,7 +129,7 @@ def _conduct_at(p, nodes, increment, conductivity, grid, duration, part):  # typ
             rise_y += (b - ay) * weighted
             slope_x += sx[a] * wy[b] * temperature
             slope_y += wx[a] * sy[b] * temperature
-    # Squares of the nodes' distances are a quarter of a cell's in the mean, wherever the point is.
+    # Squares of the nodes' distances are a quarter of a cell's on average, wherever the point is.
     p.rise_x, p.rise_y = 4.0 * rise_x, 4.0 * rise_y
     p.temperature += part * (seen - p.temperature)
     flow = property_at(conductivity, seen) * p.volume / (grid.cell * grid.cell) * duration
@@ -165,15 +165,15 @@ need a needlessly short time step."""
 
 CELLS: Final = 24
 GROWTH: Final = 1.25
-"""Beyond the computed region the tool goes on in a row of cells for each node of the border, each
+"""Beyond the computed region the tool continues in a row of cells for each border node, each
 longer than the last: 840 cells of the grid out, 8.4 mm for cells of 10 µm. They conduct along the
 row only: heat that reaches a border far from the contact goes outward."""
 
 
 def border_nodes(fraction: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the nodes from which the tool goes on beyond the grid, (n, 2); a corner is twice.
+    """Return the nodes at which the tool continues beyond the grid, (n, 2); a corner is twice.
 
-    `fraction` is that of each node's square that the tool fills, shape (columns, rows).
+    `fraction` is the fraction of each node's square filled by the tool, shape (columns, rows).
     """
     columns, rows = fraction.shape
     i, j = np.arange(columns), np.arange(rows)
@@ -383,7 +383,7 @@ class HeatLoss(NamedTuple):
 
     @classmethod
     def of(cls, surroundings: Surroundings, numerics: Numerics) -> "HeatLoss":
-        """Return losses in the computed region, whose own border is no free surface."""
+        """Return losses in the computed region, whose own border is not a free surface."""
         edge = 2 * numerics.cell
         return cls(
             surroundings.convection,

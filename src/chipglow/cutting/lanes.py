@@ -1,7 +1,7 @@
 """Logarithm and exponential that a compiler can apply to several points at once.
 
 A call of the C library stops a loop from being vectorised; these are plain arithmetic. The series
-are those of artanh and of e^x on an interval of half a binary order.
+are the coefficients of artanh and e^x on an interval of half a binary order.
 """
 
 from typing import Any, Final

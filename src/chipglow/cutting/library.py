@@ -64,7 +64,7 @@ class MaterialFile:
 
 
 def material_names(kind: str | None = None) -> list[str]:
-    """Return the names of the library's materials (of one kind), with those of other packages."""
+    """Return the names of all materials (of one kind), also of other packages."""
     own = {name for one, names in _OWN.items() if kind in (None, one) for name in names}
     others = of_other_packages(_GROUP).keys()
     return sorted(own | {name for name in others if kind in (None, material_file(name).kind)})
@@ -87,7 +87,7 @@ def workpiece(name: str) -> WorkpieceMaterial:
     if chosen is None:
         return next(iter(sets.values()))
     if chosen not in sets:
-        raise MaterialError(f"{file}: {chosen!r} is no set, expected one of {', '.join(sets)}")
+        raise MaterialError(f"{file}: {chosen!r} is not a set, expected one of {', '.join(sets)}")
     return sets[chosen]
 
 
@@ -148,7 +148,7 @@ def _material(data: Any) -> MaterialFile:
 
 
 def _without_sources(place: str, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the numbers of a file alone; what is no group of groups must state a source."""
+    """Return the numbers of a file alone; a group without subgroups must state a source."""
     values = {}
     for key, value in data.items():
         below = f"{place}.{key}".lstrip(".")
@@ -187,7 +187,7 @@ def _workpieces(name: str, values: dict[str, Any]) -> dict[str, WorkpieceMateria
             raise ValueError(f"{key}: {values[key]!r}, expected rows of [temperature, value]")
     laws = values.get("flow_stress")
     if not isinstance(laws, Mapping) or not laws:
-        raise ValueError(f"flow_stress: {laws!r}, expected one set or more by name")
+        raise ValueError(f"flow_stress: {laws!r}, name at least one set")
     sets = {}
     for chosen, law in laws.items():
         place, numbers = f"flow_stress.{chosen}", dict(law) if isinstance(law, Mapping) else {}
@@ -197,7 +197,7 @@ def _workpieces(name: str, values: dict[str, Any]) -> dict[str, WorkpieceMateria
             known = ", ".join(sorted(FLOW_LAWS.kinds))
             raise ValueError(f"{place}.law: {named!r}, expected one of {known}")
         if damage not in (None, "none"):
-            raise ValueError(f"{place}.damage: {damage!r}, expected none, or to be left out")
+            raise ValueError(f"{place}.damage: {damage!r}, must be none or omitted")
         own = {"name": f"{name}, flow stress {chosen}", "flow_stress": _part(place, kind, numbers)}
         if damage is not None:
             own |= {"damage": None, "fitted_damage": None}

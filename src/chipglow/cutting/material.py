@@ -34,7 +34,7 @@ class TemperatureTable:
 
     def __post_init__(self) -> None:
         if len(self.temperatures) != len(self.values) or not self.values:
-            raise ValueError("temperature table: expected as many values as temperatures")
+            raise ValueError("temperature table: needs one value per temperature")
         if any(np.diff(self.temperatures) <= 0):
             raise ValueError("temperature table: temperatures must ascend")
 
@@ -67,9 +67,9 @@ class RateTable:
 
     def __post_init__(self) -> None:
         if len(self.rates) != len(self.values) or not self.values:
-            raise ValueError("rate table: expected as many values as rates")
+            raise ValueError("rate table: needs one value per rate")
         if any(np.diff(self.rates, prepend=0.0) <= 0):
-            raise ValueError("rate table: rates must ascend from over 0")
+            raise ValueError("rate table: rates must be positive and ascend")
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@ GRID_VARIANCE = 0.5
 def average_rates(points, count, nodes, spare, grid, duration, length):  # type: ignore[no-untyped-def]
     """Give points the Gaussian mean of the plastic strain rate around them, `mean_rate` in 1/s.
 
-    The rate is that of the last `duration` (s), weighted by volume: where there is no material,
-    nothing counts. The Gaussian of the standard deviation `length` (m) is made of three-point
-    weights; its variance is right to rounding on every grid whose cell is less than √2 lengths,
-    and that of the grid itself on a coarser one. `nodes` and `spare` (2, columns, rows) are
-    overwritten.
+    The rate is averaged over the last `duration` (s), weighted by volume: where there is no
+    material, nothing counts. The Gaussian of the standard deviation `length` (m) consists of
+    three-point weights; its variance is right to rounding on every grid whose cell is less than √2
+    lengths, and that of the grid itself on a coarser one. `nodes` and `spare` (2, columns, rows)
+    are overwritten.
     """
     nodes[:] = 0.0
     for k in range(count):

@@ -3,7 +3,7 @@
 Each field is the quadratic B-spline on the grid that fits the points: a weighted mean to start
 with, then corrections by the residual at the points. A sample shows the workpiece where the
 smoothed fraction of the area that chip and tool fill is over one half: on a straight surface
-that is the surface. The samples are those of a `SplineFrame`, which the frame keeps.
+that is the surface. The samples belong to a `SplineFrame`, which the frame keeps.
 """
 
 from collections.abc import Mapping

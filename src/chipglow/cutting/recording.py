@@ -138,7 +138,7 @@ class EnergyHistory:
     """Change of the energy of motion, of the scaled mass."""
     elastic_energy: Array
     plastic_work: Array
-    """Of which the Taylor-Quinney fraction is heat."""
+    """Plastic work, whose Taylor-Quinney fraction becomes heat."""
     friction_work: Array
     sharing_loss: Array
     """Elastic energy lost because the points of a cell share one dilation."""

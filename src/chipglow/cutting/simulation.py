@@ -272,7 +272,7 @@ class CuttingSimulation:
         segments; conduction in the tool's body gives the temperature that this heat makes. The
         warmer the tool is, the more of the heat the chip takes, as a half-space would that slides
         past the contact (Jaeger). With that slope each round comes close to where cut and
-        conduction agree; from the fourth on rounds are averaged, since no two segments are alike.
+        conduction agree; after the third, rounds are averaged, since segments differ.
         """
         body = self.tool_temperature
         if not isinstance(body, ToolBody):
@@ -290,7 +290,7 @@ class CuttingSimulation:
             raise SolverError(
                 f"warm tool: the contact's temperature still changes by "
                 f"{max(recent) - min(recent):.1f} K in {_SETTLED} rounds, "
-                f"expected under {STEADY_TOLERANCE:g}"
+                f"expected less than {STEADY_TOLERANCE:g}"
             )
         return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
 
@@ -445,9 +445,9 @@ class _State:
         self.tool_beyond = beyond(self.grid, self.tool_border, self.tool_temperature, body)
 
     def heat_through(self, body: ToolBody, number: int) -> float:
-        """Cut for an interval, give the tool what its heat makes of it; mean in the contact in K.
+        """Cut for an interval, update the tool's temperature by its heat; mean in the contact in K.
 
-        `number` is that of the round; from the fourth on the mean of the rounds is kept.
+        `number` is the index of the round; after the third, the mean of the rounds is kept.
         """
         self.entered[:] = 0.0
         begin = self.tool_temperature.copy()

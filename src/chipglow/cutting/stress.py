@@ -1,6 +1,6 @@
 """Stress of a batch of points: hypo-elastic, radial return to the flow stress, damage.
 
-A point carries the deviator that its elastic strain makes at room temperature. What it makes at the
+A point carries the deviator that its elastic strain makes at room temperature. The deviator at the
 point's own temperature is less by the ratio of the shear moduli.
 
 Points are copied into rows of a buffer, one row a quantity, so that the compiler does the same
@@ -177,7 +177,7 @@ def elastic_energy(p, shear, bulk, step):  # type: ignore[no-untyped-def]
 def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
     """Return the elastic energy (J/m) that a point lost since its last step, as its moduli fell.
 
-    The energy is that of the strain before this step's.
+    The energy is computed from the strain before this step.
     """
     before = kelvin_index(p.elastic_temperature, elastic.shape[0])
     if before == warm:

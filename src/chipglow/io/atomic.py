@@ -134,7 +134,7 @@ def _check_writable(path: Path, folder: Path) -> None:
 def errors_name(path: Path, temporary: Path) -> Iterator[None]:
     """Let errors of writing under a temporary name bear the name that was asked for.
 
-    Those of `write` bear none, and those of `shutil.copyfile` first that of the file it read.
+    Errors of `write` have none; errors of `shutil.copyfile` first name the file that was read.
     """
     try:
         yield

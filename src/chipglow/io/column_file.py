@@ -113,7 +113,7 @@ def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, U
             return column, SI
         if cell == column.name:
             raise ValueError(
-                f"{path}, line 1: {cell!r} has no unit, expected one such as {column.title}"
+                f"{path}, line 1: {cell!r} has no unit, expected a name such as {column.title}"
             )
         if cell.startswith(f"{column.name}_") and column.base:
             try:

@@ -111,7 +111,7 @@ class ImportDescription(Part):
         for kind, source in IMPORT_SOURCES.parts.items():
             if name.endswith(source.endings):
                 return kind
-        raise ValueError(f"kind: {name!r} says none, expected {', '.join(IMPORT_SOURCES.kinds)}")
+        raise ValueError(f"kind: {name!r}, expected {', '.join(IMPORT_SOURCES.kinds)}")
 
     def build(self) -> Import:
         """Return the import that is described."""
@@ -173,7 +173,7 @@ def import_description() -> type[ImportDescription]:
 
 
 def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:
-    """Read the description of an import from a YAML file, or make one of a source.
+    """Read the description of an import from a YAML file, or create one for a source.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class View(Part):
         for low, high in (("left", "right"), ("bottom", "top")):
             first, last = getattr(self, low), getattr(self, high)
             if first is not None and last is not None and not first < last:
-                raise ValueError(f"{high}: {last:g} m, expected over {low}, {first:g} m")
+                raise ValueError(f"{high}: {last:g} m, expected more than {low}, {first:g} m")
 
     def raster(self, survey: Survey) -> Raster:
         """Return the samples for a source; refuse a view of nothing and too many samples."""
@@ -269,7 +269,7 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
         seen = seen or bool(frame.material.any())
         yield frame
     if not seen:
-        raise SourceError("import: no sample of any frame shows material, expected some in view")
+        raise SourceError("import: no frame shows material in the field of view")
 
 
 def _not_kelvin(wanted: Import, value: float, place: str) -> SourceError:

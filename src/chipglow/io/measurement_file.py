@@ -55,7 +55,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file is cut short or not a measurement; the message names the file.
+        If the file is truncated or not a measurement; the message names the file.
     """
     return read_dataset(Path(path), Measurement, "a measurement", "a NetCDF-4 file")
 
@@ -73,7 +73,7 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
         return made_of(data)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         reason = str(error).split("\n", 1)[0]
-        raise ValueError(f"{path}: not {what}, or cut short, expected {kind}: {reason}") from error
+        raise ValueError(f"{path}: not {what}, or truncated, expected {kind}: {reason}") from error
 
 
 def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:

@@ -383,7 +383,7 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
         raise SceneError(f"{path}: {error}") from error
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         raise SceneError(
-            f"{path}: not a scene, or cut short, expected a NetCDF-4 file: {_first_line(error)}"
+            f"{path}: not a scene, or truncated, expected a NetCDF-4 file: {_first_line(error)}"
         ) from error
 
 

@@ -121,7 +121,7 @@ def spooled(path: Path, resume: UnfinishedScene | None) -> Iterator[Spool]:
     try:
         with errors_name(path, part), part.open("r+b" if resume else "x+b") as file:
             if not hold(file.fileno()) and resume:
-                raise BlockingIOError(f"{path}: another run goes on with {part}")
+                raise BlockingIOError(f"{path}: another run continues {part}")
             spool = Spool(part, file, *(resume.frames() if resume else ()))
             file.truncate(spool.ends[-1] if spool.ends else 0)
             file.seek(0, os.SEEK_END)

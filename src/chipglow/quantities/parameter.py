@@ -168,9 +168,9 @@ class Parameter:
         if self.least is not None and self.most is not None:
             return f"{text(self.least)} to {text(self.most)}"
         words = (
-            "" if self.over is None else f"over {text(self.over)}",
+            "" if self.over is None else f"more than {text(self.over)}",
             "" if self.least is None else f"{text(self.least)} or more",
-            "" if self.under is None else f"under {text(self.under)}",
+            "" if self.under is None else f"less than {text(self.under)}",
             "" if self.most is None else f"up to {text(self.most)}",
         )
         return ", ".join(word for word in words if word) or "a finite number"

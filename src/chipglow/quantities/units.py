@@ -199,11 +199,11 @@ class Quantity:
             raise ValueError(f"{value} is not finite, {self.expected}")
         if self.positive and result <= 0:
             zero = "0 K" if self.base == "K" else "0"
-            raise ValueError(f"{value} is not over {zero}, {self.expected}")
+            raise ValueError(f"{value} must be more than {zero}, {self.expected}")
         return result
 
     def _not_this_kind(self, value: object) -> str:
-        return f"{value!r} is not {self.kind}, expected one such as {self.example}"
+        return f"{value!r} is not {self.kind}, expected a value such as {self.example}"
 
     def _number(self, value: float) -> str:
         scale, offset = self._unit(self.unit)

@@ -67,7 +67,7 @@ class TabulatedResponse:
                 "many, 2 or more"
             )
         if not (np.diff(wavelengths) > 0).all() or not wavelengths[0] > 0:
-            raise ValueError("response: wavelengths must be over 0 m and ascend")
+            raise ValueError("response: wavelengths must be positive and ascend")
         if not (np.isfinite(values).all() and (values >= 0).all()):
             raise ValueError("response: values must be finite, 0 or more")
 

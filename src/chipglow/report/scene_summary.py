@@ -79,13 +79,13 @@ def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
 
 def _values(name: str, frame: Frame, ends: list[float]) -> dict[str, object]:
     now, field = _over_workpiece(name, frame), _FIELDS[name]
-    least, median, greatest = np.percentile(now, (0, 50, 100)) if now.size else (np.nan,) * 3
+    least, median, largest = np.percentile(now, (0, 50, 100)) if now.size else (np.nan,) * 3
     return {
         "field": field.title,
         "unit": field.unit,
         "least": least,
         "median": median,
-        "greatest": greatest,
+        "greatest": largest,
         "overall": (min(ends), max(ends)) if ends else (),
     }
 

@@ -89,7 +89,7 @@ class Summary(_Numbered):
     provenance: Annotated[
         dict[str, str], Field(description="Origin, time, version, seed and the like.")
     ]
-    camera: Annotated[_Numbers, Field(description="Numbers of the detector, if present.")] = {}
+    camera: Annotated[_Numbers, Field(description="Detector values, if present.")] = {}
     results: Annotated[_Numbers, Field(description="Means of the draws, and single numbers.")]
     lower_bounds: Annotated[
         list[str], Field(description="Results that continue beyond the border of the view.")

@@ -1,4 +1,4 @@
-"""Fields of scattered points, such as of SPH or the material point method, on a raster.
+"""Fields of scattered points, for example from SPH or the material point method, on a raster.
 
 A sample is the mean of the first-order expansions of the points around it, so linear fields are
 exact, on the free surface too. Weights are quadratic B-splines: values reach 1.1 spacings from a
@@ -53,7 +53,7 @@ class Cloud:
         for name in ("spacing", "area"):
             numbers = getattr(self, name)
             if not (np.isfinite(numbers) & (numbers > 0)).all():
-                raise ValueError(f"{name}: expected over 0")
+                raise ValueError(f"{name}: expected more than 0")
 
 
 def neighbour_distance(places: NDArray[np.float64]) -> float:

@@ -92,7 +92,7 @@ class Completion(Part):
         if self.motion not in ("auto", "flow", "none"):
             raise ValueError(f"motion: {self.motion!r}, expected auto, flow or none")
         if self.motion == "none" and self.cutting_speed is not None:
-            raise ValueError("motion: 'none' beside a cutting_speed, expected one or the other")
+            raise ValueError("motion: 'none' beside a cutting_speed, give only one of them")
 
     @property
     def memory(self) -> int:
@@ -132,7 +132,7 @@ class Completion(Part):
         if not self._has_velocity(known):
             return "none; completion.motion: flow derives it from the images."
         if self.cutting_speed is None and frames == 1:
-            return "0 everywhere, as there is one frame and no cutting speed."
+            return "0 everywhere, because the scene has one frame and no cutting speed."
         if self.cutting_speed is None:
             return "from the optical flow, which fails where the image has no pattern."
         chip = "0" if frames == 1 else "that of the optical flow"
@@ -188,7 +188,7 @@ def _prepared(
 ) -> SampledFrame:
     """The frame with its tool and its strain, and with no hole in the material."""
     if "temperature" not in sampled.fields:
-        raise SceneError("scene: no temperature is known, expected one")
+        raise SceneError("scene: no sample has a temperature")
     material = np.where(in_tool, np.uint8(Material.TOOL), sampled.material)
     solid = material != Material.VOID
     known = np.isfinite(sampled.fields["temperature"])
@@ -200,7 +200,7 @@ def _prepared(
     if unknown > _MOST_FILLED * max(solid.sum(), 1):
         raise SceneError(
             f"scene: temperature is not known in {unknown} of {solid.sum()} samples of the "
-            f"material at {sampled.time:.9g} s, expected under half"
+            f"material at {sampled.time:.9g} s, expected less than half"
         )
     fields = {name: _without_holes(values, solid) for name, values in sampled.fields.items()}
     fields["temperature"][bare] = completion.surroundings
@@ -316,7 +316,7 @@ def strain_rate_along(
 ) -> NDArray[np.float32]:
     """Return (strain(x) - before(x - v interval)) / interval in 1/s, shape (y, x), 0 or more.
 
-    Strains are NaN without material, where the rate is NaN too; 0 where there was none before.
+    Strains are NaN without material, where the rate is NaN too; 0 if no material was there before.
     """
     rows, columns = np.indices(strain.shape, dtype=np.float32)
     shift = np.float32(interval / spacing)

@@ -71,7 +71,7 @@ class Frame:
         """Return a field of `FIELD_UNITS` or raise a SceneError."""
         values: NDArray[np.float32] | None = getattr(self, name)
         if values is None:
-            raise SceneError(f"scene: has no {name}, expected it: this needs it")
+            raise SceneError(f"scene: has no {name}, which is required here")
         return values
 
 

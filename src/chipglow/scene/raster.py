@@ -36,7 +36,7 @@ class Raster:
         if not (isfinite(self.left) and isfinite(self.top)):
             raise ValueError(f"raster: corner must be finite, got {self.left!r}, {self.top!r}")
         if not (isfinite(self.spacing) and self.spacing > 0):
-            raise ValueError(f"raster: spacing must be over 0 m, got {self.spacing!r}")
+            raise ValueError(f"raster: spacing must be positive, got {self.spacing!r}")
         if self.rows < 1 or self.columns < 1:
             raise ValueError(f"raster: expected 1 sample or more, got {self.rows} x {self.columns}")
 

@@ -67,7 +67,7 @@ class Circle:
         if not np.isfinite(self.centre).all():
             raise ValueError(f"circle: centre is {self.centre!r}, expected numbers")
         if not 0 < self.radius < np.inf:
-            raise ValueError(f"circle: radius is {self.radius!r}, expected over 0")
+            raise ValueError(f"circle: radius is {self.radius!r}, expected more than 0")
 
     @property
     def outline(self) -> NDArray[np.float64]:
@@ -94,7 +94,7 @@ class Region:
 
     def __post_init__(self) -> None:
         if not self.name.strip():
-            raise ValueError("region: the name is empty, expected one such as chip body")
+            raise ValueError("region: the name is empty; name it, such as chip body")
         if self.unit not in ("pixel", "m"):
             raise ValueError(f"region {self.name}: unit is {self.unit!r}, expected pixel or m")
         if not self.feature:
@@ -107,9 +107,7 @@ class Region:
         x, y = (columns, rows) if self.unit == "pixel" else (raster.x, raster.y)
         mask = self.shape.holds(*np.meshgrid(x, y))
         if not mask.any():
-            raise ValueError(
-                f"region {self.name}: is empty, expected one that holds the middle of a pixel"
-            )
+            raise ValueError(f"region {self.name}: is empty: it contains no pixel centre")
         return mask
 
     def outline(self, raster: Raster) -> NDArray[np.float64]:

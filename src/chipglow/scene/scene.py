@@ -67,7 +67,7 @@ def is_gap(steps: NDArray[np.float64], frame_spacing: float) -> NDArray[np.bool_
 
 
 class Scene:
-    """Fields of temperature, and where there are any of strain, velocity and material, over time.
+    """Temperature and, if known, strain, velocity and material over time.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ class Scene:
         if name == "material" and name not in self.data:
             return self._workpiece
         if name not in self.data:
-            raise SceneError(f"scene: has no {name}, expected it: this needs it")
+            raise SceneError(f"scene: has no {name}, which is required here")
         values = self._read(name, index)
         return values if name in _BYTES else np.asarray(values, dtype=np.float32)
 

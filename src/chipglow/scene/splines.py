@@ -23,7 +23,8 @@ SPLINE_FIELDS: Final = (
     "filled",
     "tool_temperature",
 )
-"""What the coefficients are of: the workpiece's fields, the fraction of the area that chip and tool
+"""Quantities of the coefficients: the workpiece's fields, the fraction of the area that chip and
+tool
 fill, and the tool's temperature."""
 
 FILLED_SPLINE: Final = SPLINE_FIELDS.index("filled")
@@ -91,7 +92,7 @@ class Lattice:
         )
 
     def coarser(self, step: int) -> "Lattice":
-        """Return the same nodes with samples `step` times as large, each as its middle shows."""
+        """Return the same nodes with samples `step` times as large, each valued at its centre."""
         fine = self.raster
         rows, columns = fine.rows // step, fine.columns // step
         if step < 1 or min(rows, columns) < 2:
@@ -205,9 +206,9 @@ def _evaluate(nodes, first_down, down, first_across, across, result):  # type: i
 
 
 @njit(cache=True, **_FAST)
-def _within(values, material, least, greatest, elsewhere):  # type: ignore[no-untyped-def]
+def _within(values, material, least, largest, elsewhere):  # type: ignore[no-untyped-def]
     rows, columns = values.shape
     for r in range(rows):
         for c in range(columns):
-            value = min(max(values[r, c], least), greatest)
+            value = min(max(values[r, c], least), largest)
             values[r, c] = value if material[r, c] == _WORKPIECE else elsewhere

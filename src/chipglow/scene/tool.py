@@ -209,7 +209,7 @@ class ToolGeometry(Tool, Part):
             ANGLE,
             over=-STEEPEST_RAKE,
             under=STEEPEST_RAKE,
-            allowed="over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
+            allowed="more than -60 deg, less than 60 deg; a wedge of 5 deg or more must be left",
         ),
     ] = radians(-7.0)
     clearance_angle: Annotated[
@@ -245,7 +245,7 @@ class ToolGeometry(Tool, Part):
         super().__post_init__()
         check_angles(self.rake_angle, self.clearance_angle)
         if self.chamfer and self.hone:
-            raise ValueError("chamfer and hone: expected one or the other, got both")
+            raise ValueError("chamfer and hone: cannot be combined")
         if self.chamfer:
             self._check_chamfer(self.chamfer)
 
@@ -300,12 +300,12 @@ class ToolGeometry(Tool, Part):
     def _check_chamfer(self, chamfer: Chamfer) -> None:
         if not chamfer.angle < _RIGHT_ANGLE + self.rake_angle:
             raise ValueError(
-                f"chamfer angle: expected under {degrees(_RIGHT_ANGLE + self.rake_angle):g} "
+                f"chamfer angle: expected less than {degrees(_RIGHT_ANGLE + self.rake_angle):g} "
                 f"degrees, so that the land faces the chip, got {degrees(chamfer.angle):g} degrees"
             )
         if not self.land > 0:
             raise ValueError(
-                f"chamfer width: expected over {(chamfer.width - self.land) * 1e6:.4g} um, so that "
+                f"chamfer width: more than {(chamfer.width - self.land) * 1e6:.4g} um, so that "
                 f"a land is left between corners of {self.edge_radius * 1e6:g} um, "
                 f"got {chamfer.width * 1e6:g} um"
             )
@@ -319,7 +319,7 @@ def check_angles(rake_angle: float, clearance_angle: float) -> None:
         )
     if not 0 < clearance_angle < LARGEST_CLEARANCE:
         raise ValueError(
-            "clearance_angle: expected over 0 and under 45 degrees, "
+            "clearance_angle: expected more than 0 and less than 45 degrees, "
             f"got {degrees(clearance_angle):g} degrees"
         )
     if rake_angle + clearance_angle > _RIGHT_ANGLE - SMALLEST_WEDGE:

@@ -47,9 +47,9 @@ class ToolOutline(Tool):
     """A tool with straight lines between given points and straight faces beyond the outer ones.
 
     The straight rake face is the longest stretch from the first point on that stays within 0.2 um
-    of the line through its ends; the flank face is the same from the last point back. They
-    give rake and clearance angle and go on straight beyond the outer points. What is between them
-    is the edge. Distances up the rake face count from the lower end of the straight rake face.
+    of the line through its ends; the flank face is the same from the last point back. They give
+    rake and clearance angle and continue straight beyond the outer points. The part between them is
+    the edge. Distances up the rake face count from the lower end of the straight rake face.
     """
 
     points: tuple[tuple[float, float], ...]

@@ -31,7 +31,7 @@ DESCRIPTION: Final = "sweep.json"
 """File in the folder of a sweep with its axes and points."""
 
 NUMBERS: Final = ("reference", "error", "uncertainty", "psf_portion", "true_error")
-"""Numbers of each reading in K; the uncertainty is the expanded one of the error's mean."""
+"""Stored values of each reading in K; uncertainty: expanded, of the mean error."""
 
 _RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d+))?")
 _QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
@@ -147,7 +147,7 @@ def sweep(
     Parameters
     ----------
     study : Study
-        The study; its seed is that of every point.
+        The study; every point has its seed.
     vary : mapping
         Values by the path of a setting such as ``camera.integration_time``: a sequence, or text
         such as ``2 us, 5 us`` or ``6 um:20 um:8`` (first, last, number).
@@ -288,7 +288,7 @@ def _points(
 ) -> Iterator[dict[str, Any]]:
     """Yield the settings of each point as a study takes them."""
     if not axes:
-        raise ValueError("vary: is empty, expected one setting or more")
+        raise ValueError("vary: name at least one setting")
     if method == "grid":
         for values in product(*axes.values()):
             yield dict(zip(axes, values, strict=True))

@@ -117,7 +117,7 @@ def blend_row(  # type: ignore[no-untyped-def]
 ):
     """Emissivity of one row for every surface: fractions of the features times their textures.
 
-    The fields are those of row `row` of the samples; `textures` are `Textures`, `shifts` of shape
+    The fields belong to row `row` of the samples; `textures` are `Textures`, `shifts` of shape
     (feature, 2), and `scratch` has `SCRATCH` rows and one for each seed, of finite numbers.
     """
     scale, maps, seed_numbers, linear, tables, tool_maps = textures

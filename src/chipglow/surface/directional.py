@@ -69,11 +69,11 @@ class Direction(Modifier):
 @DIRECTIONS.part
 @dataclass(frozen=True, kw_only=True)
 class Fresnel(Direction):
-    """A smooth surface of a refractive index n + i k: one less the reflectance, unpolarised.
+    """A smooth surface of a refractive index n + i k: one minus the reflectance, unpolarised.
 
     Howell, Mengüç, Daun and Siegel, Thermal Radiation Heat Transfer, chapter 3. A metal has n and k
-    that are large and alike (`HagenRubens`), a thick oxide a small k. Rough surfaces depend less on
-    the angle.
+    that are large and similar (`HagenRubens`), a thick oxide a small k. Rough surfaces depend less
+    on the angle.
     """
 
     kind = "fresnel"

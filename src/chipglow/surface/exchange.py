@@ -77,7 +77,7 @@ class Exchange:
     ) -> Array:
         """Return the irradiation over π of each element, shape (..., element).
 
-        Of blackbodies' radiance (..., element), emissivities, the surroundings' radiance, and
+        Take the blackbody radiance (..., element), emissivities, the surroundings' radiance, and
         the fraction of reflected light that is reflected as by a mirror. For an eye far off in a
         direction (2,), which sees ε L + (1 − ε) times the result, the mirrors' fraction is the
         radiance in the mirrored direction.

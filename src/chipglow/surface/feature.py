@@ -210,7 +210,7 @@ class Features:
         if self.fixed_positions is not None:
             return self.fixed_positions
         if frame.material_x is None or frame.material_y is None:
-            raise ValueError("frame: has no material coordinates, expected them for 'material'")
+            raise ValueError("frame: the texture 'material' requires material coordinates")
         return frame.material_x, frame.material_y
 
     @cached_property
@@ -285,7 +285,7 @@ class FeatureTrends(Modifier):
     To the emissivity of a sample comes, of each feature by its fraction, how far its line at the
     sample's temperature is from `EmissivityTrend.emissivity`, which the features must have as the
     mean; a sum outside 0 to 1 becomes the nearer of these. The errors that a thermocouple or a
-    calibration makes are the same for all features in a draw.
+    calibration are the same for all features in a draw.
     """
 
     effect = "emissivity_by_temperature"

@@ -50,7 +50,7 @@ class MapSurface(Surface):
     Notes
     -----
     On samples larger than its pixels the image is the mean over the area of the sample, on smaller
-    ones it is interpolated linearly; of what is known alone. "The tool emissivity characteristics
+    ones it is interpolated linearly; from known values only. "The tool emissivity characteristics
     […] can simply be applied to the tool […], since the tool does not move": Heigel and Whitenton
     (2010), Equation 3 and what follows.
     """

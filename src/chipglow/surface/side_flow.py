@@ -118,10 +118,10 @@ class SideShape(Modifier):
 
     Samples seen in the camera's direction have the temperatures of the scene; the rake face has
     that of the tool's side next to it. In each cross-section at right angles to the rake face that
-    the chip touches, all bounces are summed as if it went on alike (`Exchange`). What is seen is
-    ε L + (1 − ε) times the incident radiance. It is given as an effective emissivity, by which the
-    radiance of the blackbody (less that of the surroundings) is what is seen (less the same): over
-    1 where more is reflected than the sample would emit as a blackbody.
+    the chip touches, all bounces are summed as if it continued unchanged (`Exchange`). The apparent
+    radiance is ε L + (1 − ε) times the incident radiance. It is given as an effective emissivity,
+    by which the radiance of the blackbody (less that of the surroundings) is what is seen (less the
+    same): over 1 where more is reflected than the sample would emit as a blackbody.
     """
 
     effect = "reflections"
@@ -164,7 +164,7 @@ class SideShape(Modifier):
         if not -self.outline[0, 1] > 0:
             raise ValueError(
                 f"{type(self).__name__}.overhang: {self.overhang:g} m, with which the chip covers "
-                f"the rake face, expected over {self.overhang + self.outline[0, 1]:.3g} m"
+                f"the rake face, expected more than {self.overhang + self.outline[0, 1]:.3g} m"
             )
 
     @cached_property

@@ -108,7 +108,7 @@ class PhaseSurface(HomogeneousSurface):
         super().__post_init__()
         if not self.liquidus > self.solidus:
             raise ValueError(
-                f"liquidus: {self.liquidus:g} K, expected over the solidus of {self.solidus:g} K"
+                f"liquidus: {self.liquidus:g} K, must exceed the solidus of {self.solidus:g} K"
             )
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:

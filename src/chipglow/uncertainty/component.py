@@ -39,7 +39,7 @@ class Cause:
         rules = {
             f"its name is {self.name!r}, expected one": self.name.strip(),
             f"has {self.errors} errors, expected 1 or more": self.errors >= 1,
-            f"degrees of freedom are {self.degrees_of_freedom!r}, expected over 0": (
+            f"degrees of freedom are {self.degrees_of_freedom!r}, expected more than 0": (
                 self.degrees_of_freedom > 0
             ),
             f"has {len(self.parts)} parts, expected {self.errors}": (

@@ -3,8 +3,8 @@
 Conventions: obsarray's user guide, "Storing uncertainties" (https://obsarray.readthedocs.io). A
 variable names its uncertainty variables in ``unc_comps``; each of these states for every dimension
 whether its errors are ``random`` or ``systematic``, and keeps the sign of the effect: the
-covariance of a systematic one is the product of its values. What obsarray has no attribute for
-(cause, identity, degrees of freedom, warnings) stands beside in attributes of ours.
+covariance of a systematic one is the product of its values. Everything without an attribute in
+obsarray (cause, identity, degrees of freedom, warnings) stands beside in attributes of ours.
 """
 
 import re

@@ -21,7 +21,7 @@ from chipglow.uncertainty.component import Cause, Component
 class Estimate:
     """Values with the components of their uncertainty.
 
-    An estimate is made of its values alone and gets its components from `with_component`,
+    An estimate is created from its values alone and gets its components from `with_component`,
     `from_observations` or `from_covariance`. Sums, products and `propagate` keep the effect of
     every single error, with its sign, so what two results have in common is known: the difference
     of an estimate and itself is exact.
@@ -63,7 +63,7 @@ class Estimate:
             object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
         keys = [component.cause.key for component in self.components]
         if len(set(keys)) < len(keys):
-            raise ValueError(f"estimate: a component is there twice: {keys}, expected each once")
+            raise ValueError(f"estimate: a component occurs twice: {keys}")
         known = np.isfinite(values).ravel()
         for component in self.components:
             name, effects = component.cause.name, component.effects
@@ -128,7 +128,7 @@ class Estimate:
         identity: str | None = None,
         degrees_of_freedom: float = np.inf,
     ) -> "Estimate":
-        """Return values whose covariance matrix is known, as of the parameters of a fit."""
+        """Return values with a known covariance matrix, such as parameters of a fit."""
         center = np.asarray(values, np.float64)
         matrix = np.asarray(covariance, np.float64)
         if matrix.shape != (center.size, center.size):
@@ -426,7 +426,7 @@ def factor(covariance: Array, name: str) -> Array:
     """Return effects of independent errors that have a covariance, shape (values, errors)."""
     scale = np.sqrt(np.abs(np.diag(covariance)))
     scale[scale == 0.0] = 1.0
-    # Of correlations: beside a value in kelvins the variance of one in metres is lost in rounding.
+    # Correlations, since the variance of a value in metres is lost in rounding next to kelvins.
     matrix = covariance / np.outer(scale, scale)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9):
         raise ValueError(f"component {name}: covariance is not symmetric, expected it so")
@@ -444,7 +444,7 @@ def check_same(one: Cause, other: Cause) -> None:
     """Raise ValueError if two causes of one name and identity are not the same."""
     if one != other:
         raise ValueError(
-            f"component {one.name}: is {one} and {other}, expected the same errors wherever "
+            f"component {one.name}: is {one} and {other}, they must be the same errors wherever "
             "its name appears; name it otherwise, or make it independent"
         )
 

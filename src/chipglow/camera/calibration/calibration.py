@@ -51,7 +51,7 @@ class CalibrationErrors:
         if not (np.isfinite(self.effects).all() and np.isfinite(nodes).all()):
             raise ValueError("calibration errors: a number is not finite")
         if not (np.diff(nodes) > 0).all():
-            raise ValueError("calibration errors: the radiance does not rise, expected it to")
+            raise ValueError("calibration errors: the radiance must rise with the counts")
 
     @cached_property
     def identity(self) -> str:
@@ -117,7 +117,7 @@ class FittedCalibration(Calibration):
     parameters: Array
     """As `NAMES` says, shape (n,)."""
     covariance: Array
-    """Of the fit and of what the blackbodies have in common, shape (n, n)."""
+    """Covariance of the fit and of errors common to the blackbodies, shape (n, n)."""
 
     def __post_init__(self) -> None:
         if not COLDEST <= self.lowest < self.highest <= HOTTEST:
@@ -140,7 +140,7 @@ class FittedCalibration(Calibration):
     @classmethod
     @abstractmethod
     def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:
-        """Return parameters to start a fit from, the last of which is over 0 where counts rise."""
+        """Return parameters to start a fit from, the last of which is positive if counts rise."""
 
     @abstractmethod
     def counts(self, temperature: ArrayLike) -> Array:
@@ -213,7 +213,7 @@ class LinearCalibration(FittedCalibration):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.parameters[1] > 0:
-            raise ValueError(f"calibration: gain is {self.parameters[1]:g}, expected over 0")
+            raise ValueError(f"calibration: gain is {self.parameters[1]:g}, expected more than 0")
 
     @classmethod
     def first_guess(cls, kelvins: Array, counts: Array, band: Band) -> Array:

@@ -44,7 +44,7 @@ def residual_warnings(
         )
     if drifts:
         yield (
-            "Residuals of successive points are alike, as by a drift or by the self-heating of the "
+            "Residuals of successive points are correlated, as by drift or self-heating of the "
             "camera during the calibration, or by a wrong band. The uncertainty is enlarged by "
             "what a drift that is even from point to point would do. Take the points again, in "
             "random order."
@@ -93,7 +93,7 @@ def _student_limit(free: int) -> float:
 
 
 def _serial_probability(residuals: Array, design: Array) -> float:
-    """Return how often independent errors leave residuals so much alike from point to point.
+    """Return how often independent errors leave residuals as correlated from point to point.
 
     The statistic of J. Durbin and G. S. Watson, Biometrika 37 (1950) 409, with its distribution by
     draws of independent errors that the same fit is subtracted from.

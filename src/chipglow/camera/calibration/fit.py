@@ -148,7 +148,7 @@ def fit_calibration(
     given, all points weigh the same, and the scatter of the residuals gives the uncertainty.
 
     Weights are by the effective variance u²(S) + (dS/dT)² u²(T) at the fitted slope, iterated
-    (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters is that of the
+    (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters follows from the
     weighted fit, times the square of `CalibrationFit.enlargement`; a common error of the
     temperatures or of the blackbody's emissivity moves all points at once, and what it does to
     the parameters is added to their covariance as one more term (JCGM 100, Equation 13).
@@ -217,11 +217,9 @@ def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> 
 
 
 def _check_points(kelvins: Array, counts: Array, parameters: int, stated: bool) -> None:
-    """Raise a ValueError if points are impossible, saturated or too few for so many parameters."""
+    """Raise a ValueError if points are impossible, saturated or fewer than the parameters."""
     if kelvins.ndim != 1 or kelvins.shape != counts.shape:
-        raise ValueError(
-            f"calibration: {kelvins.size} temperatures and {counts.size} counts, expected as many"
-        )
+        raise ValueError(f"calibration: {kelvins.size} temperatures but {counts.size} counts")
     if not np.isfinite(counts).all():
         raise ValueError("calibration: counts are not finite")
     impossible = kelvins[~((kelvins >= COLDEST) & (kelvins <= HOTTEST))]
@@ -230,9 +228,9 @@ def _check_points(kelvins: Array, counts: Array, parameters: int, stated: bool) 
             f"calibration: a blackbody is at {impossible[0]:g} K "
             f"({impossible[0] - 273.15:g} °C), expected {COLDEST:g} to {HOTTEST:g} K"
         )
-    greatest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
-    if greatest.size > 1 and np.unique(counts).size > 1:
-        places = ", ".join(f"{kelvin - 273.15:.5g}" for kelvin in greatest)
+    largest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
+    if largest.size > 1 and np.unique(counts).size > 1:
+        places = ", ".join(f"{kelvin - 273.15:.5g}" for kelvin in largest)
         raise ValueError(
             f"calibration: the counts are {counts.max():.7g} at each of {places} °C and nowhere "
             "greater: the camera is saturated there, expected points without saturation"
@@ -259,7 +257,7 @@ def _settled(
     weights = deviations(calibration)
     if not weights.all():
         raise ValueError(
-            "calibration: a point's uncertainties are both 0, expected one over 0, or none stated"
+            "calibration: both uncertainties of a point are 0; give a positive one, or none"
         )
     for _ in range(_MOST_ROUNDS):
         calibration = _least_squares(calibration, kelvins, counts, weights)

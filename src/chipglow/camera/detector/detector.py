@@ -91,14 +91,14 @@ class Detector(Part):
                 raise ValueError(f"Detector.terms: two are of kind {kind!r}, expected one of each")
         if self.offset >= self._top:
             raise ValueError(
-                f"Detector.offset: {self.offset:g}, expected under the {self._top} of "
+                f"Detector.offset: {self.offset:g}, expected less than the {self._top} of "
                 f"{self.bits} bits"
             )
         if self.gain is None and self.full_well is None:
-            raise ValueError("Detector.gain: none, expected it or full_well")
+            raise ValueError("Detector: gain or full_well is required")
         if self.cold is not None and self.hot is not None and not self.cold < self.hot:
             raise ValueError(
-                f"Detector.hot: {self.hot:g} K, expected over the {self.cold:g} K of cold"
+                f"Detector.hot: {self.hot:g} K, expected more than the {self.cold:g} K of cold"
             )
 
     @property
@@ -159,7 +159,7 @@ class Detector(Part):
         """Return the recording that a camera with this detector writes of an ideal measurement."""
         attributes = measurement.data.attrs
         if "detector" in attributes:
-            raise ValueError("detector: the measurement has one already, expected one without")
+            raise ValueError("detector: the measurement already contains one")
         known = {
             name: float(attributes[name])
             for name in ("integration_time", "frame_rate", "fill_factor")

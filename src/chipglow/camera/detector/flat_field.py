@@ -46,7 +46,7 @@ _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
 class FlatFieldCalibration:
     """A camera's conversion of its detector's counts to radiance.
 
-    Pixels are made alike by the detector's `correction`. Two sources, blackbodies of known
+    The detector's `correction` equalises the pixels. Two sources, blackbodies of known
     radiance, give the straight line from the median pixel's counts to radiance. So what remains in
     the radiance is noise, rounding, what the pixels differ in besides, the frames of the sources
     being few, and non-linearity.
@@ -101,7 +101,7 @@ class FlatFieldCalibration:
         """Return the noise-equivalent temperature difference in K of a blackbody in K.
 
         The standard deviation over time of the calibrated radiance, root mean square over the
-        pixels, over dL/dT: noise of frames that the detector makes, as a laboratory measures it.
+        pixels, over dL/dT: temporal noise of the detector, as a laboratory measures it.
         NaN for a blackbody that saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
@@ -146,7 +146,7 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
         )
     if not bright < full:
         raise ValueError(
-            f"Detector.hot: {hot:.4g} °C fills the detector at its exposure, expected under "
+            f"Detector.hot: {hot:.4g} °C fills the detector at its exposure, expected less than "
             f"{float(band.temperature(full)) - 273.15:.4g} °C"
         )
     return dark, bright
@@ -204,9 +204,9 @@ def full_light(detector: Detector, point: OperationPoint) -> float:
 def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
     """Return the lowest radiance temperature in K that a detector measures at its exposure.
 
-    That of the blackbody whose mean signal over the dark is `least_signal` times its noise: the
-    standard deviation over time, or that of rounding where it is larger. At least the 200 K from
-    which on a band's tables go.
+    Temperature of the blackbody whose mean signal above the dark level is `least_signal` times its
+    noise: the standard deviation over time, or that of rounding where it is larger. At least the
+    200 K from which on a band's tables go.
     """
 
     def excess(logarithm: float) -> float:

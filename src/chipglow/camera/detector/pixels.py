@@ -61,7 +61,7 @@ class NonUniformity:
         if signal.shape[1:] != self.gain.shape:
             raise ValueError(
                 f"non-uniformity: is of {size_text(self.gain.shape)} pixels, the frames of "
-                f"{size_text(signal.shape[1:])}, expected the same"
+                f"{size_text(signal.shape[1:])}, they must be the same"
             )
         return np.asarray(self.gain * signal + self.offset, np.float64)
 
@@ -80,7 +80,7 @@ def signal_rise(cold: Array, hot: Array) -> Array:
     if cold.shape != hot.shape:
         raise ValueError(
             f"uniform frames: are of {size_text(cold.shape)} and {size_text(hot.shape)} pixels, "
-            "expected the same"
+            "they must be the same"
         )
     if not np.median(hot - cold) > 0:
         raise ValueError(
@@ -157,7 +157,7 @@ def replace_bad_pixels(signal: Array, bad: NDArray[np.bool_]) -> tuple[Array, ND
     if bad.shape != signal.shape[1:]:
         raise ValueError(
             f"bad pixels: are of {size_text(bad.shape)} pixels, the frames of "
-            f"{size_text(signal.shape[1:])}, expected the same"
+            f"{size_text(signal.shape[1:])}, they must be the same"
         )
     result = np.array(signal, np.float64)
     result[:, bad] = np.nan

@@ -74,7 +74,7 @@ class PhotonResponse(DetectorResponse):
     ]
     f_number: Annotated[
         float,
-        Parameter("F-number of the light at the detector, such as of its cold stop.", least=0.5),
+        Parameter("F-number of the light at the detector, set by the cold stop.", least=0.5),
     ]
     transmittance: Annotated[
         float, Parameter("Fraction of the light that optics and filter pass.", over=0.0, most=1.0)

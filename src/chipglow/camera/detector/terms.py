@@ -38,7 +38,7 @@ class Stage(IntEnum):
     CHARGE = 2
     """On all electrons of an element; then the full well limits them."""
     TRANSFER = 3
-    """On the signal that is made of them."""
+    """On the signal after conversion."""
     READOUT = 4
     """Read-out noise; then come gain, offset and the digitiser."""
 
@@ -89,14 +89,14 @@ class DetectorTerm(Part, ABC):
         Parameters
         ----------
         electrons : ndarray
-            Of every element and frame, as the stages before left them, shape (time, y, x).
+            Signal of every element and frame after the previous stages, shape (time, y, x).
         readout : Readout
             The frames.
 
         Returns
         -------
         ndarray
-            Of the same shape.
+            Signal of the same shape.
         """
 
 

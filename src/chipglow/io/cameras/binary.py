@@ -38,7 +38,7 @@ class Binary:
         """Return bytes from a place."""
         if not (start >= 0 and count >= 0 and start + count <= self.size):
             raise CutShortError(
-                f"{self.path}: is cut short or damaged, bytes {start} to {start + count} are "
+                f"{self.path}: is truncated or damaged, bytes {start} to {start + count} are "
                 f"missing, it has {self.size}"
             )
         self.stream.seek(start)
@@ -83,7 +83,7 @@ def opened(path: Path) -> Iterator[Binary]:
 def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) -> range:
     """Return the numbers of the frames to read of `count` whole ones, of `samples` each."""
     if count <= 0:
-        raise CutShortError(f"{path}: is cut short or damaged, it has no whole frame")
+        raise CutShortError(f"{path}: is truncated or damaged, it has no whole frame")
     numbers = range(count)[frames or slice(None)]
     if not numbers:
         raise SourceError(f"{path}: has {count} frames, none of them is among frames={frames}")
@@ -180,11 +180,11 @@ class CameraFile(ABC):
 
     def common_exposure(self, exposures: Array) -> float | None:
         """Return the integration time in s of all frames; None if they differ or it is 0."""
-        least, greatest = float(exposures.min()), float(exposures.max())
-        if least == greatest:
+        least, largest = float(exposures.min()), float(exposures.max())
+        if least == largest:
             return least or None
         self.notes.warnings.append(
-            f"The integration time varies from {least * 1e6:g} us to {greatest * 1e6:g} us."
+            f"The integration time varies from {least * 1e6:g} us to {largest * 1e6:g} us."
         )
         return None
 

@@ -307,7 +307,7 @@ def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
             size -= missing
             if kind != _RAW or not _whole_picture(binary, start + offset, size):
                 raise CutShortError(
-                    f"{binary.path}: is cut short or damaged, {missing} bytes of a record of frame "
+                    f"{binary.path}: is truncated or damaged, {missing} bytes of a record of frame "
                     f"{number} are missing"
                 )
             notes.remarks.append(
@@ -365,7 +365,7 @@ def _unpacked(name: str, packing: str, stored: bytes) -> NDArray[Any]:
 def _in_order(values: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Return counts with their bytes in order: most cameras, not all, write PNG with them swapped.
 
-    Neighbours of a picture are alike, unless the bytes of its counts are swapped.
+    Neighbours in an image are similar, unless the bytes of its counts are swapped.
     """
     swapped = values.byteswap()
     return swapped if _roughness(swapped) < _roughness(values) else values

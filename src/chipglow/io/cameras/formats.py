@@ -38,8 +38,8 @@ class CameraFormat:
         Whether a file is of this format, by its first bytes.
     read : callable, optional
         Reads frames of a file that says what was measured: its path, which frames, and the time
-        between frames in s, in the place of the file's own, or None. It raises SourceError for a
-        file that is damaged, cut short or of another kind, and OSError for one that is missing or
+        between frames in s, instead of the file's own, or None. It raises SourceError for a
+        file that is damaged, truncated or of another kind, and OSError for one that is missing or
         not accessible. Without it the file holds an array, and the user says.
     in_subprocess : callable
         Whether libraries in C or C++ would unpack a file: they do so in a subprocess.
@@ -172,7 +172,7 @@ def read_recording(
     Raises
     ------
     ValueError
-        If the file is damaged, cut short or of an unknown kind (`SourceError`), what it does not
+        If the file is damaged, truncated or of an unknown kind (`SourceError`), what it does not
         say is not given, or what is given is impossible.
     OSError
         If it is missing or not accessible.
@@ -185,7 +185,7 @@ def read_recording(
     one = camera_formats()[kind]
     if one.states_quantity and stated != Stated(interval=interval):
         raise ValueError(
-            f"{path}: is {one.description}, which says itself what was measured: "
+            f"{path}: is {one.description}, which states itself what was measured: "
             "expected no quantity, unit, dataset or axes"
         )
     if not one.in_subprocess(path):

@@ -97,7 +97,7 @@ class Hcc(CameraFile):
             if rest >= 0 and b"TC".startswith(self.binary.read(length + pixels, min(2, rest))):
                 return int(length)
         raise SourceError(
-            f"{self.path}: is cut short or damaged, it has {size} bytes and no whole frame of "
+            f"{self.path}: is truncated or damaged, it has {size} bytes and no whole frame of "
             f"{first['width']} columns and {first['height']} rows with a second one behind it"
         )
 
@@ -118,10 +118,10 @@ class Hcc(CameraFile):
             return image
         scale: float = 2.0 ** header["data_exponent"]
         offset: float = header["data_offset"]
-        greatest = _MOST * scale + abs(offset)
-        if not greatest < np.finfo(np.float32).max:
+        largest = _MOST * scale + abs(offset)
+        if not largest < np.finfo(np.float32).max:
             raise SourceError(
-                f"{self.path}: DataOffset and DataExp give {greatest:g}, expected less"
+                f"{self.path}: DataOffset and DataExp give {largest:g}, expected less"
             )
         return image * scale + offset
 

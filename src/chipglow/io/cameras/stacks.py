@@ -67,7 +67,7 @@ class Stated:
                 f"unit: is {self.unit!r}, expected one of {', '.join(RECORDING_UNITS)}"
             )
         if self.interval is not None and not 0 < self.interval < float("inf"):
-            raise ValueError(f"interval: is {self.interval!r} s, expected over 0")
+            raise ValueError(f"interval: is {self.interval!r} s, expected more than 0")
         if self.quantity and self.unit and RECORDING_UNITS[self.unit][0] != self.quantity:
             raise ValueError(f"unit: {self.quantity} is not in {self.unit}")
         if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
@@ -96,7 +96,7 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
                 f"{', '.join(RECORDING_UNITS)}"
             )
         if times is None:
-            missing.append("give the interval between frames, the file says no times")
+            missing.append("give the interval between frames, the file states no times")
         if unit is None or times is None:
             raise MissingError(f"{one}: {'; '.join(missing)}")
         signal = _signal(one, axes, chosen)
@@ -137,7 +137,7 @@ def _unit(one: FileArray, stated: Stated) -> tuple[Quantity, Unit] | None:
     if found is None and stated.quantity in ("counts", "radiance"):
         found = RECORDING_UNITS["counts" if stated.quantity == "counts" else "W/m2/sr"]
     if found is not None and stated.quantity not in (None, found[0]):
-        raise SourceError(f"{one}: is in {one.unit}, which is no unit of {stated.quantity}")
+        raise SourceError(f"{one}: is in {one.unit}, which is not a unit of {stated.quantity}")
     return found
 
 

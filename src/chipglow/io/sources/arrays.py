@@ -332,11 +332,11 @@ def _tiff(path: Path, stack: ExitStack) -> Iterator[FileArray]:
         file = stack.enter_context(tifffile.TiffFile(path))
         every = list(file.series)
     if errors:
-        raise SourceError(f"{path}: is damaged or cut short: {errors[0]}")
+        raise SourceError(f"{path}: is damaged or truncated: {errors[0]}")
     for number, series in enumerate(every):
         if series.dtype.kind in _KINDS:
             if "S" in series.axes:
-                raise SourceError(f"{path}: has colours, expected one number per sample")
+                raise SourceError(f"{path}: has colours; a single value per sample is required")
             dims = tuple({"Y": "y", "X": "x"}.get(axis, "time") for axis in series.axes)
             name = f"series_{number + 1}" if number else ""
             yield FileArray(name, tuple(series.shape), _tiff_reader(path, series), dims)
@@ -363,7 +363,7 @@ def _tiff_reader(path: Path, series: Any) -> Callable[[Key], NDArray[Any]]:
     for page in series.pages:
         ends = [a + n for a, n in zip(page.dataoffsets, page.databytecounts, strict=True)]
         if max(ends, default=0) > path.stat().st_size:
-            raise SourceError(f"{path}: is cut short, a picture ends at byte {max(ends)}")
+            raise SourceError(f"{path}: is truncated, a picture ends at byte {max(ends)}")
     return partial(_tiff_pages, path, series)
 
 

@@ -1,4 +1,4 @@
-"""Points over time, such as of SPH and the material point method."""
+"""Points over time, for example from SPH or the material point method."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -58,7 +58,7 @@ class CloudSource(Source, Part):
     ] = None
     tool_parts: Annotated[
         tuple[int, ...],
-        Parameter("Numbers of the part field that are tool, such as [2]."),
+        Parameter("Values of the part field that belong to the tool, such as [2]."),
     ] = ()
     depth: Annotated[
         float, Parameter("Middle of the slab that is seen of points in space.", POSITION)
@@ -204,7 +204,7 @@ class _Points:
             return np.full(table.count, self._spacing**self._dimension)
         values = table.numbers(self._extra["volume"])
         if not (np.isfinite(values) & (values > 0)).all():
-            raise SourceError(f"{table.path}: {self._extra['volume']}: expected over 0 everywhere")
+            raise SourceError(f"{table.path}: {self._extra['volume']}: must be positive")
         return values * self._source.units.length.scale**self._dimension
 
     def _material(self, table: PointTable) -> NDArray[np.uint8]:
@@ -243,7 +243,7 @@ class _Points:
             if not spacing > 0:
                 raise SourceError(f"{table.path}: its points are in one place, expected spacing")
             self.notes.assumed.append(
-                f"The point spacing is that of neighbours in the first frame, {spacing:.4g} m."
+                f"Point spacing: distance of neighbours in the first frame, {spacing:.4g} m."
             )
         if source.thickness is not None and source.thickness < spacing:
             raise SourceError(
@@ -259,7 +259,7 @@ def _field_columns(source: CloudSource, path: str, labels: Sequence[str]) -> dic
     given = {n: label for n, label in source.names.items() if n in COMMON_NAMES}
     vector = given.pop("velocity", None)
     if vector is not None and vector not in vectors:
-        raise SourceError(f"{path}: fields: velocity: there is no vector {vector!r}")
+        raise SourceError(f"{path}: fields: velocity: there is not a vector {vector!r}")
     vector = vector or match_names(vectors, {}, ("velocity",)).get("velocity")
     if vector is not None:
         given = {f"velocity_{axis}": f"{vector}_{axis}" for axis in "xy"} | given

@@ -56,7 +56,7 @@ class Snapshot:
         if table.shape != shape or table.iloc[:, -1].isna().any():
             raise SourceError(
                 f"{self.path}: a frame has {table.shape[0]} atoms of {table.shape[1]} numbers, "
-                f"expected {shape[0]} of {shape[1]}: it is cut short"
+                f"expected {shape[0]} of {shape[1]}: it is truncated"
             )
         table.columns = pd.Index(self.labels)
         numbers = table.select_dtypes("number")
@@ -92,7 +92,7 @@ def snapshots(path: Path) -> list[Snapshot]:
     """Return all frames of a dump, whose atoms are not read yet."""
     with _mapped(path) as content:
         if content[-1:] != b"\n":
-            raise SourceError(f"{path}: its last line has no end, it is cut short")
+            raise SourceError(f"{path}: its last line has no end, it is truncated")
         return list(_snapshots(path, content))
 
 

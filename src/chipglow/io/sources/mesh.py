@@ -160,7 +160,7 @@ class Meshes:
             raise SourceError(f"{file}: displacement: no node has {name!r}")
         by = np.asarray(block.grid.point_data[name], np.float64)
         if by.ndim != 2 or by.shape[1] not in _VECTOR_SIZES:
-            raise SourceError(f"{file}: displacement: {name!r} is no vector")
+            raise SourceError(f"{file}: displacement: {name!r} is not a vector")
         points = np.array(block.grid.points, np.float64)
         points[:, : by.shape[1]] += by
         grid = block.grid.copy(deep=False)
@@ -265,7 +265,7 @@ class Meshes:
             if simple(name) in ("displacement", "u") and name not in self.found.values()
         ]
         if moving and self._source.displacement is None and not self._is_exodus:
-            sentences.append(f"Positions are those of the file; {moving[0]} is not added.")
+            sentences.append(f"Positions are taken from the file; {moving[0]} is not added.")
         if not self._source.tool_parts:
             sentences.append("No part is named as tool: all elements are workpiece.")
         return sentences
@@ -373,7 +373,7 @@ def _reader(source: MeshSource) -> MeshReader:
     reader = MESH_READERS.get(suffix, DynaReader if dyna else None)
     if reader is None:
         known = " ".join(sorted(MESH_READERS))
-        raise SourceError(f"{source.files}: {suffix} is no mesh, expected d3plot or one of {known}")
+        raise SourceError(f"{source.files}: {suffix} is not a mesh, expected d3plot or {known}")
     with reading(source.files):
         return reader(files_of(source.files, gaps_allowed=bool(source.times)))
 

@@ -100,7 +100,7 @@ def _read_deck(file: Path) -> _Deck:
                 "elements in it and one instance at most"
             )
         if keyword == "INSTANCE" and any(rows):
-            raise SourceError(f"{file}: the instance is moved, expected one that is not")
+            raise SourceError(f"{file}: an instance that is moved is not supported")
         try:
             if not (outside and keyword == "NODE"):
                 _take(deck, keyword, options, rows)

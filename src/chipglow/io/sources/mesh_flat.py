@@ -63,7 +63,7 @@ def flatten(
     solids = [grid for grid in grids if _is_solid(grid).any()]
     if not solids:
         if section is not None and section != "facing":
-            raise SourceError("mesh.section: a position in a mesh that is flat, expected none")
+            raise SourceError("mesh.section: a flat mesh has no section position")
         flat = [part for grid in grids for part in _flat(grid)]
     elif section is None:
         raise SourceError(

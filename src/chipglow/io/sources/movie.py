@@ -90,7 +90,7 @@ class FieldMovie(Part):
     ] = None
     bands: Annotated[
         int,
-        Parameter("Number of the map's bands; 0: it runs without steps.", allowed="0, 2 to 256"),
+        Parameter("Number of bands of the colour map; 0: no steps.", allowed="0, 2 to 256"),
     ] = 0
     legend: Annotated[
         Box | None,
@@ -183,7 +183,7 @@ class MovieSource(Source, Part):
             "none: all."
         ),
     ] = None
-    every: Annotated[int, Parameter("Take one picture of so many.", least=1)] = 1
+    every: Annotated[int, Parameter("Take every n-th picture.", least=1)] = 1
     background: Annotated[
         tuple[Colour, ...] | None,
         Parameter(
@@ -364,7 +364,7 @@ class MovieSource(Source, Part):
         if index.times is None:
             raise SourceError(f"{self._path('temperature')}: it has no times, expected interval")
         step = index.times[-1] / max(index.count - 1, 1)
-        said = f"The times are those of playing the movie, {step:.6g} s per frame."
+        said = f"The times are the playing times of the movie, {step:.6g} s per frame."
         return index.times[:: self.every], (said,)
 
     def _grid(self, index: MovieIndex) -> PlacedGrid:

@@ -45,7 +45,7 @@ class MovieIndex:
 
 
 def index_movie(path: Path) -> MovieIndex:
-    """Count the pictures of a movie without decoding them; refuse one that is cut short."""
+    """Count the pictures of a movie without decoding them; refuse one that is truncated."""
     state = path.stat()
     return _index(path, state.st_size, state.st_mtime_ns)
 
@@ -126,7 +126,7 @@ def _check_end(
 def _interpolation() -> Any:
     """Return how colours of half the resolution are enlarged.
 
-    FFmpeg's default repeats them, whatever interpolation is asked for, unless it is told to
+    FFmpeg's default repeats them, whatever interpolation is asked for, unless it is set to
     compute them in full; PyAV 12 cannot tell it.
     """
     from av.video.reformatter import Interpolation

@@ -136,7 +136,7 @@ class Survey:
 def even_times(count: int, interval: float | None, notes: Notes) -> NDArray[np.float64]:
     """Return evenly spaced times in s: 1 s apart, which is noted, unless an interval is given."""
     if interval is not None and not (isfinite(interval) and interval > 0):
-        raise SourceError(f"interval: {interval!r} s, expected over 0")
+        raise SourceError(f"interval: {interval!r} s, expected more than 0")
     if interval is None and count > 1:
         notes.assumed.append("The files contain no times: frames are 1 s apart.")
     return (1.0 if interval is None else interval) * np.arange(count, dtype=np.float64)

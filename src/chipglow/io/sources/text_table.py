@@ -36,7 +36,7 @@ class TextTable:
 
     @classmethod
     def look_at(cls, path: Path, skipped: int = 0) -> "TextTable":
-        """Find out how a table behind some lines is written; refuse one that is cut short."""
+        """Find out how a table behind some lines is written; refuse one that is truncated."""
         size = path.stat().st_size
         if size > _LARGEST_TABLE:
             raise SourceError(f"{path}: has {size} bytes, expected up to {_LARGEST_TABLE}")
@@ -93,7 +93,7 @@ class TextTable:
         if alike and not whole and self._decimals(last[-1].strip()) < decimals[0]:
             raise SourceError(
                 f"{self.path}: ends with {last[-1].strip()!r} and no end of line, expected a "
-                f"number such as {numbers[-1]!r}: it is cut short, or lacks its end of line"
+                f"number such as {numbers[-1]!r}: it is truncated, or lacks its end of line"
             )
 
     def _decimals(self, number: str) -> int:
@@ -133,5 +133,5 @@ def _two_lines(path: Path, skipped: int) -> tuple[str, str]:
     if not lines:
         raise SourceError(f"{path}: there is no number in it")
     if "\0" in lines[0]:
-        raise SourceError(f"{path}: is no text, expected a table of numbers")
+        raise SourceError(f"{path}: is not text, expected a table of numbers")
     return lines[0], lines[1] if len(lines) > 1 else ""

@@ -192,10 +192,10 @@ def band_profile(
     width : float, optional
         Width across the curve in m over which to average; a pixel by default.
     position : float, optional
-        Standard uncertainty of the curve's position in m, the same in x and y. By default that of
-        one pixel: its side over the root of 12.
+        Standard uncertainty of the curve's position in m, the same in x and y. Default: the
+        uncertainty of one pixel: its side over the root of 12.
     uncertainty : ToolUncertainty, optional
-        Uncertainty of the tool's position, such as of a `FoundTool`.
+        Uncertainty of the tool's position, for example from a `FoundTool`.
 
     Raises
     ------

@@ -22,10 +22,10 @@ from chipglow.quantities import Array
 from chipglow.scene import Line, Raster, Tool
 
 LEAST_PROMINENCE: Final = 10.0
-"""Height in K of a ridge over the higher of its two sides under which it is no band."""
+"""Smallest height in K of a band's ridge above the higher of its two sides."""
 
 SHORTEST: Final = 15.0
-"""Length in pixels under which a ridge is no band."""
+"""Smallest length of a band's ridge in pixels."""
 
 _SCALES: Final = (6e-6, 12e-6, 18e-6)
 _ALONG_THE_FACE: Final = (10.0, 30.0)
@@ -38,7 +38,7 @@ _SIDES: Final = 10.0
 _FINE: Final = 4
 _CLIMB_BLUR: Final = (2.0, 4.0)
 _NOISE_FACTOR: Final = 3.0
-_NO_RIDGE: Final = "shear band: no ridge of the radiance temperature is there"
+_NO_RIDGE: Final = "shear band: the radiance temperature has no ridge"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class ThermalImage:
     """A frame in which every pixel has a temperature, so that slopes and bends exist."""
 
     temperature: Array
-    """Radiance temperature in K, shape (y, x): under the camera's range its lower limit, else the
+    """Radiance temperature in K, shape (y, x): below the camera's range its lower limit, else the
     lowest of the frame; at saturated and dead pixels that of the nearest usable one.
     """
     usable: NDArray[np.bool_]

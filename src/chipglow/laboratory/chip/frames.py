@@ -53,7 +53,7 @@ def frame_mean(estimate: Estimate) -> Estimate:
 def frame_scatter(frames: Array) -> Component:
     """Return the errors of a mean over frames of shape (frames, ...), as the frames show them.
 
-    Successive frames that are alike count as fewer: the variance of the mean grows by
+    Correlated successive frames count as fewer: the variance of the mean grows by
     1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that is
     not positive (C. J. Geyer, Statistical Science 7 (1992) 473). Fewer than 8 frames do not show
     their correlation: all of them count as one, with one degree of freedom.

@@ -113,7 +113,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     if tool is None:
         raise ValueError("scene: it does not state its tool, which the rake face needs")
     if feed is not None and not feed > 0:
-        raise ValueError(f"feed is {feed!r}, expected over 0 m")
+        raise ValueError(f"feed is {feed!r}, expected more than 0 m")
     block = scene.longest_block
     even = np.linspace(block[0], block[-1], min(len(block), _MOST_FRAMES))
     frames = even.round().astype(int).tolist()
@@ -194,11 +194,11 @@ def _passing(
     speed = (right * tool.rake_direction[0] + up * tool.rake_direction[1]).mean(axis=1)
     whole = np.logical_or.reduce(windows)
     moved = speed[whole].sum()
-    greatest = [np.median(strain[window].max(axis=0)) for window in windows]
+    largest = [np.median(strain[window].max(axis=0)) for window in windows]
     return {
         **_with_deviation("chip_speed", speed[whole]),
         "thickness": float((scan.thickness * speed)[whole].sum() / moved) if moved > 0 else nan,
-        "band_strain": float(np.mean(greatest)),
+        "band_strain": float(np.mean(largest)),
     }
 
 
@@ -269,8 +269,8 @@ def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
     fields = ("plastic_strain_rate", "material")
     bands = [shear_band(scene, *(scene.field(name, k) for name in fields)) for k in frames]
     free = [band for band in bands if band and band.reaches_surface]
-    greatest = max((band.middle_rate for band in free), default=0.0)
-    return [band for band in free if band.middle_rate >= _DEVELOPED * greatest]
+    largest = max((band.middle_rate for band in free), default=0.0)
+    return [band for band in free if band.middle_rate >= _DEVELOPED * largest]
 
 
 def _angle(band: ShearBand) -> float:

@@ -189,12 +189,12 @@ def rake_grid(
     frames : sequence of int, optional
         Indices of the frames; all by default.
     uncertainty : ToolUncertainty, optional
-        Uncertainty of the tool's position, such as of a `FoundTool`.
+        Uncertainty of the tool's position, for example from a `FoundTool`.
 
     Notes
     -----
-    A pixel belongs to the square that holds its middle; nothing is resampled. A square is left out
-    in a frame if any of its pixels is `UNUSABLE` there, as in the paper, or if it is not whole
+    A pixel belongs to the square that contains its centre; nothing is resampled. A square is left
+    out in a frame if any of its pixels is `UNUSABLE` there, as in the paper, or if it is not whole
     inside the image.
 
     In a turned square the pixels' middles are not spread evenly about the square's own. The mean
@@ -263,7 +263,7 @@ def rake_grid(
 
 
 def _within_square(tool: Tool, size: float, pitch: float) -> Array:
-    """Return places spread evenly over a square, about one a pixel, from its middle, (k, 2)."""
+    """Return even positions in a square relative to its centre, about one per pixel, (k, 2)."""
     count = round(size / pitch)
     steps = size * ((np.arange(count) + 0.5) / count - 0.5)
     normal, direction = np.array(tool.rake_normal), np.array(tool.rake_direction)

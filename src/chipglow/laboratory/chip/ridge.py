@@ -120,7 +120,7 @@ class PolarGrid:
 
 @njit(cache=True, nogil=True)
 def _add_up(total, slopes, anywhere):  # type: ignore[no-untyped-def]
-    """Add to each place the greatest sum within reach at the radius before; return its index."""
+    """Add to each place the largest sum within reach at the radius before; return its index."""
     radii, angles = total.shape
     came_from = np.full(total.shape, _NOWHERE)
     for i in range(1, radii):

@@ -40,7 +40,7 @@ class Segmentation:
     peak_standard_deviation: float
     valley: float
     valley_standard_deviation: float
-    """Mean thickness at peaks and valleys in m; without two peaks the greatest and the least."""
+    """Mean thickness at peaks and valleys in m; without two peaks the largest and the least."""
     degree: float
     """Degree of segmentation: 1 - valley over the mean of both peaks beside it, mean."""
     degree_uncertainty: float

@@ -145,11 +145,11 @@ def _best_path(
         # The path leads from one band to another: the band is the best path beyond the gap.
         beyond = allowed & (np.arange(polar.radii.size) >= first)[:, None]
         i, j = polar.best_path(score, beyond, ends, _TOLL, anywhere=True)
-    greatest = values[i, j].max()
-    if not greatest >= BAND_RATE:
+    largest = values[i, j].max()
+    if not largest >= BAND_RATE:
         raise NoShearBandError(
-            f"shear band: the greatest plastic strain rate on the best path is "
-            f"{greatest:.3g} 1/s, expected {BAND_RATE:g} 1/s or more"
+            f"shear band: the largest plastic strain rate on the best path is "
+            f"{largest:.3g} 1/s, expected {BAND_RATE:g} 1/s or more"
         )
     if i.size < 2:
         raise NoShearBandError(_NO_RIDGE)

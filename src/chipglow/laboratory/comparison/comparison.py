@@ -188,7 +188,7 @@ class StatedUncertainties(Part):
     position: Annotated[
         float | None,
         Parameter(
-            "Of the position of each measured value, by default that of a pixel; for squares at "
+            "Uncertainty of each measured position, by default of a pixel; for squares at "
             "the rake face only where `tool` is not stated.",
             LENGTH,
             least=0.0,
@@ -244,7 +244,7 @@ def compare(
     if stated.temperature > 0.0 and measured.calibration_errors is not None:
         raise ValueError(
             f"uncertainty: {stated.temperature:g} K beside the uncertainty that the measurement "
-            "states, expected one or the other"
+            "states, give only one of them"
         )
     notes = Notes()
     if measured.calibration_errors is None and stated.temperature == 0.0:

@@ -19,7 +19,7 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
         if label in found:
             label = f"{label} ({path.stem})"
         if label in found:
-            raise ValueError(f"{path}: is there twice, expected each simulation once")
+            raise ValueError(f"{path}: is given twice; give each simulation once")
         found[label] = item
     return found
 

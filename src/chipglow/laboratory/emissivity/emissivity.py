@@ -51,7 +51,7 @@ class Heating(Part):
     """Temperatures of a heated object and of the surroundings that it reflects."""
 
     reference: Annotated[
-        float, Parameter("True temperature of the object, as of a thermocouple.", KELVINS, over=0.0)
+        float, Parameter("True temperature of the object, as by a thermocouple.", KELVINS, over=0.0)
     ]
     reflected: Annotated[
         float, Parameter("Temperature of the surroundings.", KELVINS, over=0.0)
@@ -194,7 +194,7 @@ class EmissivityMap:
             elif used.flagged[Flag.SATURATED]:
                 text += " The remaining pixels are darker than the region."
             yield text
-        darker = "under 0: they are darker than the stated surroundings."
+        darker = "below 0: they are darker than the stated surroundings."
         brighter = "over 1: they are brighter than a blackbody of the true temperature."
         for count, text in zip(outside, (darker, brighter), strict=True):
             if count:
@@ -243,7 +243,7 @@ class RegionEmissivity:
     standard_deviation: float
     """Standard deviation over the pixels, with their noise; no uncertainty of the mean."""
     outside: tuple[int, int]
-    """Numbers of pixels with an emissivity under 0, and over 1."""
+    """Numbers of pixels with a negative emissivity, and with one above 1."""
     observed: Array
     """Mean emissivity of each observation, shape (observation,)."""
     estimate: Estimate
@@ -285,7 +285,7 @@ class EmissivityLine:
     def constant(cls, mean: float, standard_uncertainty: float = 0.0) -> "EmissivityLine":
         """Return an emissivity from elsewhere, whose error is independent of the measurement's."""
         if not 0 < mean <= 1:
-            raise ValueError(f"emissivity: is {mean!r}, expected over 0 to 1")
+            raise ValueError(f"emissivity: is {mean!r}, expected more than 0 to 1")
         if not 0 <= standard_uncertainty < inf:
             raise ValueError(
                 f"emissivity: standard uncertainty is {standard_uncertainty!r}, expected 0 or more"
@@ -366,7 +366,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         lower_limit = _floor(measurement)
         if heating.reference < lower_limit:
             raise ValueError(
-                f"reference: {_celsius(heating.reference)} is under the camera's lower range limit "
+                f"reference: {_celsius(heating.reference)} is below the camera's lower range limit "
                 f"of {_celsius(lower_limit)}, expected a hotter object"
             )
     first, radiance = measurements[0], observed_radiance(measurements)
@@ -397,8 +397,8 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     """Fit a line to an area's emissivity at several temperatures by ordinary least squares.
 
     The covariance of the means is propagated (JCGM 100:2008, Equation 13); the errors of `COMMON`
-    are the same at all temperatures. The random error is that of the means, or the scatter about
-    the line if that is larger. At one temperature the line is a constant.
+    are the same at all temperatures. The random error is the error of the means, or the scatter
+    about the line if that is larger. At one temperature the line is a constant.
     """
     if len(areas) == 1:
         return areas[0]

@@ -58,7 +58,7 @@ def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: 
 
 
 def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
-    """Write a region's name in its middle, upright where the region is slender."""
+    """Write a region's name at its centre, upright where the region is slender."""
     width, height = np.ptp(outline, axis=0)
     x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2
     axes.text(

@@ -126,7 +126,7 @@ def read_emissivity_lines(path: str | os.PathLike[str]) -> dict[str, EmissivityL
 
 def _lines(data: xr.Dataset) -> dict[str, EmissivityLine]:
     if "observations" not in data:
-        raise ValueError("it is of an earlier version, expected one that is written anew")
+        raise ValueError("it was written by an earlier version; write it again")
     maps = [data.isel(reference=index) for index in range(data.sizes["reference"])]
     lines = [
         emissivity_line([_constant(one.isel(region=index)) for one in maps])
@@ -213,7 +213,7 @@ def emissivity_trend(line: EmissivityLine) -> EmissivityTrend:
 def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:
     def checked(data: xr.Dataset) -> Made:
         if data.attrs.get("kind") != _KIND:
-            raise ValueError("it does not say that it is an emissivity map")
+            raise ValueError("it is not marked as an emissivity map")
         return made_of(data)
 
     return read_dataset(path, checked, "an emissivity map", "a file of chipglow emissivity")

@@ -20,7 +20,7 @@ RANDOM: Final = "random"
 """Name of the component of the random errors that observations show."""
 
 _FLAGS: Final = {
-    Flag.UNDER_RANGE: "under the lower range limit",
+    Flag.UNDER_RANGE: "below the lower range limit",
     Flag.SATURATED: "saturated",
     Flag.DEAD: "dead",
 }

@@ -54,7 +54,7 @@ def reflected_temperature(
 ) -> Estimate:
     """Return the temperature in K of the reflected surroundings, the paper's by default."""
     if not 0 < temperature < inf:
-        raise ValueError(f"reflected: is {temperature!r} K, expected over 0 K")
+        raise ValueError(f"reflected: is {temperature!r} K, expected more than 0 K")
     if not 0 <= standard_uncertainty < inf:
         raise ValueError(
             f"reflected: standard uncertainty is {standard_uncertainty!r} K, expected 0 K or more"
@@ -132,7 +132,7 @@ def true_temperature(
     room = float(reflecting.values)
     if not mean > float(band.radiance(np.array(room))):
         raise ValueError(
-            f"region {area.name}: is darker than what it reflects at {room - ZERO_CELSIUS:.6g} °C, "
+            f"region {area.name}: is darker than its reflection at {room - ZERO_CELSIUS:.6g} °C, "
             "expected a hotter object"
         )
     value = _emissivity_of_area(emissivity, area.name, mean, room, band)
@@ -295,7 +295,7 @@ def _mean_radiance(
 ) -> Estimate:
     """Return the mean radiance in W/(m² sr) of observations of shape (observation, pixel).
 
-    `shared` is the correlation of its calibration's error with that of the emissivity.
+    `shared` is the correlation of the calibration errors of image and emissivity.
     """
     mean = float(values.mean())
     random = area_estimate(mean, values, uuid4().hex)
@@ -358,7 +358,7 @@ def _emissivity_of_area(
     if not hotter.size:
         raise ValueError(
             f"region {name}: no temperature up to {HOTTEST - ZERO_CELSIUS:.0f} °C has its radiance "
-            "by the line of its emissivity, expected one that falls less with the temperature"
+            "by the line of its emissivity, use an emissivity that falls less with the temperature"
         )
     ends = kelvins[hotter[0] - 1 : hotter[0] + 1]
     return line.at(scipy.optimize.brentq(excess, *ends, xtol=1e-6))

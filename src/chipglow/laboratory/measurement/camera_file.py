@@ -54,7 +54,7 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         return read_measurement(source)
     if is_scene(source):
         raise DescriptionError(
-            f"{source}: is a scene, expected a measurement; chipglow measure makes one of it"
+            f"{source}: is a scene, expected a measurement; chipglow measure creates one from it"
         )
     described = load_description(source, settings)
     return measurement_of(described, load_recording(described), str(source))
@@ -134,7 +134,7 @@ def uniform_counts(
         if bad is not None:
             good &= ~bad[region]
         if not good.any():
-            raise ValueError("no pixel of the region is good, expected some")
+            raise ValueError("the region contains no good pixel")
         if recording.saturation is not None:
             fraction = float(np.mean(recording.signal[:, *region][:, good] > recording.saturation))
             if fraction > 0:
@@ -231,7 +231,7 @@ def _unsuitable(uniform: Recording, recording: Recording) -> str | None:
     if theirs is not None and ours is not None and not np.isclose(theirs, ours, rtol=0.01):
         return (
             f"has an integration time of {1e6 * theirs:g} us, the recording {1e6 * ours:g} us, "
-            "expected the same"
+            "they must be the same"
         )
     if recording.saturation is not None:
         fraction = float(np.mean(uniform.signal > recording.saturation))

@@ -165,19 +165,19 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
     if ours is not None and theirs is not None and abs(ours - theirs) > _SAME * theirs:
         raise ValueError(
             f"calibration: is for an integration time of {1e6 * theirs:g} us, the recording has "
-            f"{1e6 * ours:g} us, expected the same"
+            f"{1e6 * ours:g} us, they must be the same"
         )
     ranges = recording.range_name, calibration.range_name
     if None not in ranges and ranges[0] != ranges[1]:
         raise ValueError(
             f"calibration: is for the range {ranges[1]!r}, the recording has {ranges[0]!r}, "
-            "expected the same"
+            "they must be the same"
         )
     band = recording.band
     if band is not None and not _same_band(band, calibration.band):
         raise ValueError(
             f"calibration: is for the band {_band_text(calibration.band)}, the recording has "
-            f"{_band_text(band)}, expected the same"
+            f"{_band_text(band)}, they must be the same"
         )
 
 
@@ -305,13 +305,13 @@ def _notes(recording: Recording, calibration: Calibration | None, position: Imag
         "The radiance is what the camera received, with nothing corrected for.": (
             quantity == "radiance"
         ),
-        "The integration time is the calibration's: the file does not say it.": (
+        "The integration time is the calibration's: the file does not state it.": (
             recording.integration_time is None and time is not None
         ),
-        f"The range is the calibration's, {name}: the file does not say it.": (
+        f"The range is the calibration's, {name}: the file does not state it.": (
             recording.range_name is None and name is not None
         ),
-        "No pixel is saturated: neither the file nor the description says from where on.": (
+        "No pixel is saturated: neither the file nor the description states the limit.": (
             recording.saturation is None
         ),
         "The origin of coordinates is the image's lower left corner: no tip was given.": (
@@ -341,8 +341,8 @@ def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator
         count = np.count_nonzero(signal == top)
         if top in _FULL_SCALES and count > 1:
             yield (
-                f"{count} values are {top}, the greatest of their number of bits: they may be "
-                f"saturated (saturation: {top - 1} says so)."
+                f"{count} values are {top}, the largest of their number of bits: they may be "
+                f"saturated (set saturation: {top - 1})."
             )
 
 

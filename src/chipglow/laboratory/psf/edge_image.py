@@ -117,7 +117,7 @@ def counts_image(
     """Return the mean of frames of counts, linear in radiance, as an image of an edge."""
     if recording.pitch is None:
         raise ValueError(
-            "pitch: is missing, the file does not say it, expected the distance between pixels "
+            "pitch: is missing, the file does not state it, expected the distance between pixels "
             "on the object such as 6 um"
         )
     raster = Raster(0.0, 0.0, recording.pitch, *signal.shape[1:])
@@ -170,7 +170,7 @@ def _mean_image(
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     """Find the edge in an image, and the pixels that show it.
 
-    Where pixels are saturated or under range, all pixels from there on outward are left
+    If pixels are saturated or below the range, all pixels further outward are left
     out: to leave out only those whose noise goes over the limit would shift the mean of the others.
     """
     image = replace(image, saturated=image.saturated | _piled_up(image))
@@ -298,7 +298,7 @@ def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, 
     limit = max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
     kept = np.abs(left) <= limit
     lost = int(np.count_nonzero(~kept))
-    # More than a few are no dead pixels but something that is not an edge.
+    # More than a few are not dead pixels but an object that is not an edge.
     if lost == 0 or lost > 0.01 * kept.size:
         return pixels, []
     text = f"{lost} pixels far from the others are left out; if they are dead, flag them."

@@ -115,7 +115,7 @@ class KnifeEdge:
 
     @property
     def weights(self) -> tuple[float, ...]:
-        """Probability of each model by the Bayesian criterion; all are alike where none fits."""
+        """Probability of each model by the Bayesian criterion; all are equal if none fits."""
         if self.unexplained:
             return (1 / len(self.fits),) * len(self.fits)
         likely = [exp(-min(fit.bic - self.best.bic, 700.0) / 2) for fit in self.fits]
@@ -217,7 +217,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     -----
     The models are fitted to all pixels of all images by weighted least squares, each with its
     background, step, place and angle free, first with even weights, then with the noise that the
-    best model leaves on the dark and the bright side. Covariances grow by what is left beyond the
+    best model leaves on the dark and the bright side. Covariances include the residuals beyond the
     noise. Noise is taken as independent from pixel to pixel.
     """
     if not images:
@@ -360,7 +360,7 @@ def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
             f"No model fits: the best, {best.model.name}, leaves "
             f"{sqrt(best.reduced_chi_squared):.2g} times the noise in the means at a distance, "
             f"{100 * left:.2g} % of the step near the edge; uncertainties are enlarged by it, "
-            "and all models count alike."
+            "and all models have the same weight."
         )
     return warnings
 
@@ -370,12 +370,12 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
     fractions = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
     left = (signals.radiance - best.aperture_background) / best.source - fractions
     square = float(np.sum((left * best.source / signals.sigma) ** 2))
-    greatest = int(np.argmax(np.abs(left)))
-    if square < _APERTURES_APART * left.size or abs(left[greatest]) < _NOTHING:
+    largest = int(np.argmax(np.abs(left)))
+    if square < _APERTURES_APART * left.size or abs(left[largest]) < _NOTHING:
         return []
     return [
         f"The apertures and the edges contradict each other: the signal of "
-        f"{signals.diameters[greatest] * 1e6:.4g} um is {100 * abs(left[greatest]):.2g} % of the "
+        f"{signals.diameters[largest] * 1e6:.4g} um is {100 * abs(left[largest]):.2g} % of the "
         "source away from the fit; check the diameters and that the source is even."
     ]
 

@@ -30,7 +30,7 @@ _MOST_SIDE: Final = 1025
 _LARGEST_WIDTH: Final = 1e-3
 _LENGTHS: Final = ("fwhm", "diameter")
 _EVEN_DISC: Final = 30.0
-"""A disc of so many deviations of its blur is half as bright at its rim, within its 2000th."""
+"""A disc of this many deviations of its blur is half as bright at its rim, within its 2000th."""
 _MOFFAT_NODES: Final = np.geomspace(1e-7, 60.0, 1000)
 """Arguments of the transfer function: it is 1 under and 0 over them."""
 _MOST_WIDTHS: Final = 60.0
@@ -306,7 +306,7 @@ class EllipticalModel(PSFModel):
 
     tilted: bool
     """Whether its axes may be tilted, for which edges of three orientations are needed; else they
-    are those of the image.
+    belong to the image.
     """
     name = "elliptical gaussian"
     shapes = ((1.0, 1.0, 0.0),)
@@ -337,8 +337,8 @@ class EllipticalModel(PSFModel):
         return np.asarray(np.exp(-form / 2))
 
     def sampling(self, values: Array) -> tuple[float, float]:
-        least, greatest = np.sqrt(np.linalg.eigvalsh(self._squares(values))).tolist()
-        return 2.0 * greatest, least / 8
+        least, largest = np.sqrt(np.linalg.eigvalsh(self._squares(values))).tolist()
+        return 2.0 * largest, least / 8
 
     def _squares(self, values: Array) -> Array:
         both = values[2] * values[0] * values[1] if self.tilted else 0.0

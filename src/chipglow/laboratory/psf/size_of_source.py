@@ -31,7 +31,7 @@ class ApertureImage:
 
     def __post_init__(self) -> None:
         if not 0 < self.diameter < np.inf:
-            raise ValueError(f"{self.name}: diameter is {self.diameter!r} m, expected over 0")
+            raise ValueError(f"{self.name}: diameter is {self.diameter!r} m, expected more than 0")
 
 
 def aperture_image(measurement: Measurement, diameter: float, name: str) -> ApertureImage:

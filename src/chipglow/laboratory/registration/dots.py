@@ -330,7 +330,7 @@ def _disc(
 
 
 def _correlation(discs: list[_Disc]) -> float:
-    """Return the factor on the uncertainty by which neighbours' residuals are alike.
+    """Return the factor on the uncertainty due to correlated residuals of neighbours.
 
     Newey and West's sum of their correlations up to eight pixels away, over all discs.
     """

@@ -60,7 +60,7 @@ def blink_pictures(
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """Return the visible picture, and the infrared image as the visible camera would have it.
 
-    Parameters as of `draw_registration`.
+    Parameters as for `draw_registration`.
     """
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - ZERO_CELSIUS, raster, shape)

@@ -76,7 +76,7 @@ def load_registration(path: str | Path) -> Registration:
     Raises
     ------
     DescriptionError
-        If the file is no YAML or no registration; the message names the file.
+        If the file is not YAML or not a registration; the message names the file.
     OSError
         If it cannot be read.
     """
@@ -123,9 +123,9 @@ def _frames(path: Path) -> NDArray[np.float32]:
     except (UnidentifiedImageError, Image.DecompressionBombError):
         raise ValueError(f"{path}: expected a picture, such as PNG, TIFF or JPEG") from None
     except (SyntaxError, EOFError, OSError) as error:
-        raise ValueError(f"{path}: is damaged or cut short: {error}") from None
+        raise ValueError(f"{path}: is damaged or truncated: {error}") from None
     if len({frame.shape for frame in frames}) > 1:
-        raise ValueError(f"{path}: has pages of several sizes, expected one size")
+        raise ValueError(f"{path}: all pages must have the same size")
     return np.stack(frames)
 
 

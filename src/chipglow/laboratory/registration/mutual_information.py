@@ -100,15 +100,15 @@ def fit_images(
     (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements round that in
     which both images have the same middle and the same width, not mirrored: shifts of up to a
     quarter of the width, turns of up to 4 degrees, scales of 0.8 to 1.25. From there the sum of
-    (g_i . g_v)^2 climbs, from coarse to fine: the products of both images' gradients, each over
-    the contrast of its surroundings, so that it does not matter which side of an edge is the
-    brighter (after Haber and Modersitzki, Methods Inf. Med. 46 (2007) 292). Mutual information
-    alone would be off by several pixels where heat spreads beyond what is seen. Radiance is taken
-    as it is: the logarithm, or the temperature, of a blurred edge lies beyond the edge.
+    (g_i . g_v)^2 climbs, from coarse to fine: the products of both images' gradients, each over the
+    contrast of its surroundings, so that it does not matter which side of an edge is the brighter
+    (after Haber and Modersitzki, Methods Inf. Med. 46 (2007) 292). Mutual information alone would
+    be off by several pixels where heat spreads beyond the visible edges. Radiance is taken as it
+    is: the logarithm, or the temperature, of a blurred edge lies beyond the edge.
 
-    The covariance is that of an estimate which maximises a sum over blocks of 16 x 16 pixels (the
-    sandwich of Huber, 1967), so that neighbours need not be independent. Half a pixel is added
-    for each parameter, at the image's corner, for what is systematic: an edge of heat beside the
+    The covariance is computed for an estimate that maximises a sum over blocks of 16 x 16 pixels
+    (the sandwich of Huber, 1967), so that neighbours need not be independent. Half a pixel is added
+    for each parameter, at the image's corner, for systematic errors: an edge of heat beside the
     edge that is seen.
     """
     levels = _levels(infrared, raster, visible)
@@ -179,7 +179,7 @@ def _levels(
     known, seen = np.isfinite(infrared), np.asarray(visible, np.float64)
     for name, values in (("infrared image", infrared[known]), ("visible picture", seen)):
         if values.size == 0 or not np.ptp(values) > 0:
-            raise ValueError(f"{name}: has no contrast, expected one in which something is seen")
+            raise ValueError(f"{name}: has no contrast")
     filled = np.where(known, infrared, np.median(infrared[known]))
     scale = min(seen.shape[0] / raster.rows, seen.shape[1] / raster.columns)
     return [_level(filled, known, raster, seen, step, scale * step) for step in _STEPS]

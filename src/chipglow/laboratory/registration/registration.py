@@ -72,10 +72,10 @@ class Registration:
                 f"registration: matrix: its last element is {self.matrix[2, 2]:g}, expected 1"
             )
         if not abs(np.linalg.det(self.matrix)) > 0:
-            raise ValueError("registration: matrix: is singular, expected one with an inverse")
+            raise ValueError("registration: matrix: must have an inverse")
         if not self.degrees_of_freedom > 0:
             raise ValueError(
-                f"registration: degrees_of_freedom is {self.degrees_of_freedom!r}, expected over 0"
+                f"registration: degrees_of_freedom {self.degrees_of_freedom!r} must be positive"
             )
 
     def pixels(self, positions: ArrayLike) -> Array:

@@ -64,10 +64,10 @@ def align_times(
     -----
     The visible signal, smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
     54 (2010) 1167), is put to the infrared times; the correlation of both is largest at the offset
-    that is least squares for infrared = a + b visible(time). All offsets are tried, a third
-    of a visible frame apart, at which at least half of the infrared frames have visible ones;
-    Gauss-Newton ends it. Changes faster than the visible camera's frames, which the spline cannot
-    follow, go into the residuals and with them into the uncertainty.
+    that is least squares for infrared = a + b visible(time). All offsets are tried, a third of a
+    visible frame apart, at which at least half of the infrared frames have visible ones;
+    Gauss-Newton refines it. Changes faster than the visible camera's frames, which the spline
+    cannot follow, go into the residuals and with them into the uncertainty.
     """
     for name, times, values in (
         ("infrared", infrared_times, infrared_signal),
@@ -123,7 +123,7 @@ def region_signals(
     inside = (place[..., 0] >= left) & (place[..., 0] <= right)
     inside &= (place[..., 1] >= bottom) & (place[..., 1] <= top)
     if not (columns.any() and rows.any() and inside.any()):
-        raise ValueError("region: is outside an image, expected one that both cameras see")
+        raise ValueError("region: must lie within both images")
     hot = infrared[:, rows][:, :, columns].reshape(len(infrared), -1).mean(axis=1)
     bright = visible.reshape(len(visible), -1)[:, inside.ravel()].mean(axis=1)
     return np.asarray(hot, np.float64), np.asarray(bright, np.float64)
@@ -131,9 +131,7 @@ def region_signals(
 
 def _check(name: str, times: Array, values: Array) -> None:
     if times.ndim != 1 or times.shape != values.shape:
-        raise ValueError(
-            f"{name} signal: {values.size} values for {times.size} times, expected as many"
-        )
+        raise ValueError(f"{name} signal: {values.size} values but {times.size} times")
     if times.size < _FEWEST:
         raise ValueError(f"{name} signal: {times.size} frames, expected {_FEWEST} or more")
     if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
@@ -211,7 +209,7 @@ def _refined(times: Array, target: Array, spline: CubicSpline, begin: float) -> 
 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
-    """Return a warning where one of so many offsets would have such a correlation by chance."""
+    """Return a warning if one of the offsets would have this correlation by chance."""
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
     if likely < _CHANCE:
