@@ -190,7 +190,7 @@ def two_cameras(folder: Path) -> None:
 
 
 def target_before(raster: Raster) -> DotTarget:
-    """A target before the cameras that look at the chip: their map is the same."""
+    """Return a target before the cameras that look at the chip: their map is the same."""
     target, (left, right, bottom, top) = DotTarget(gaps=(19,)), raster.extent
     centre = ((left + right) / 2, (bottom + top) / 2)
     x, y = target.shift - target.matrix[:2, :2] @ centre

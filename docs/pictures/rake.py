@@ -32,7 +32,7 @@ def main() -> None:
 
 
 def say_found(name: str, measurement: Measurement) -> None:
-    """The found tool beside the true one."""
+    """Return the found tool beside the true one."""
     true, found = measurement.tool, find_tool(measurement)
     stated = found.uncertainty
     off = found.tool.rake_point(150e-6) - true.rake_foot

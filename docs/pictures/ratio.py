@@ -53,7 +53,7 @@ def main() -> None:
 
 
 def study(quick: chipglow.study.Study, law: Any) -> chipglow.study.Study:
-    """The quick study with a detector, more draws, and a law of the wavelength."""
+    """Return the quick study with a detector, more draws, and a law of the wavelength."""
     changes = {"camera.detector": DETECTOR, "surface.spectral": law}
     return changed(quick, changes | {"analysis.phases": 3, "analysis.textures": 2})
 

@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def draw_section(axes: Axes) -> None:
-    """The wedge in cross-section."""
+    """Return the wedge in cross-section."""
     for angle, colour in ANGLES.items():
         side = 1e6 * Wedge(angle=radians(angle)).outline
         axes.plot(*np.vstack([side, [130, 0]]).T, color=colour)

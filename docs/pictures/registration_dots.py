@@ -12,7 +12,7 @@ from chipglow.laboratory.registration.figure import draw_registration  # noqa: E
 
 
 def main() -> None:
-    """A heated plate with holes, one left out, by its dots."""
+    """Return a heated plate with holes, one left out, by its dots."""
     target = DotTarget(gaps=(19,))
     fit = fit_dots(target.infrared, RASTER, target.visible)
     measured = Measurement.from_radiance(target.infrared[None], Band(3.8e-6, 5.1e-6), [0.0], RASTER)

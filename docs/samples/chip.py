@@ -22,6 +22,6 @@ def closed_form_chip(frames: int) -> Scene:
 
 
 def late(chip: AnalyticChip) -> Scene:
-    """The chip's scene, its times moved to those of a cut."""
+    """Return the chip's scene, its times moved to those of a cut."""
     data = chip.scene().data
     return Scene(data.assign_coords(time=("time", data["time"].values + FIRST, {"units": "s"})))

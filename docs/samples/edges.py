@@ -26,7 +26,7 @@ def seen(bright: NDArray[np.float64], psf: PointSpreadFunction) -> NDArray[np.fl
 
 
 def edge(normal: float, psf: PointSpreadFunction) -> NDArray[np.float64]:
-    """A sharp edge, 0 and 1, seen through a point spread function; its normal in degrees."""
+    """Return a sharp edge, 0 and 1, seen through a point spread function; its normal in degrees."""
     x = np.arange(SENSORS * PER_SENSOR) - SENSORS * PER_SENSOR / 2 + 0.5
     angle = radians(normal)
     distance = x * cos(angle) - x[:, None] * sin(angle)
@@ -34,7 +34,7 @@ def edge(normal: float, psf: PointSpreadFunction) -> NDArray[np.float64]:
 
 
 def aperture(diameter: float, psf: PointSpreadFunction) -> NDArray[np.float64]:
-    """A round hole, 1 inside."""
+    """Return a round hole, 1 inside."""
     fine = PITCH / PER_SENSOR
     x = fine * (np.arange(2 * SENSORS * PER_SENSOR) - SENSORS * PER_SENSOR + 0.5)
     inside = np.clip((diameter / 2 - np.hypot(x, x[:, None])) / fine + 0.5, 0.0, 1.0)
@@ -42,7 +42,7 @@ def aperture(diameter: float, psf: PointSpreadFunction) -> NDArray[np.float64]:
 
 
 def measured(fraction: NDArray[np.float64], cold: float, hot: float, seed: int) -> Measurement:
-    """A frame between two temperatures in K, with noise of a fraction of the step."""
+    """Return a frame between two temperatures in K, with noise of a fraction of the step."""
     low, high = BAND.radiance(np.array([cold, hot]))
     noise = np.random.default_rng(seed).normal(0.0, NOISE, fraction.shape)
     raster = Raster(0.0, 0.0, PITCH, *fraction.shape)

@@ -64,7 +64,7 @@ def heated(
 
 
 def heated_scene(background: NDArray[np.bool_], temperature: float) -> Scene:
-    """A scene as long as an exposure in which nothing happens."""
+    """Return a scene as long as an exposure in which nothing happens."""
     fields = {name: np.zeros((11, *RASTER.shape), np.float32) for name in FIELD_UNITS}
     fields["material"][:] = ~background
     fields["temperature"][:] = np.where(background, LABORATORY, temperature)
@@ -72,7 +72,7 @@ def heated_scene(background: NDArray[np.bool_], temperature: float) -> Scene:
 
 
 def fine(regions: tuple[Region, ...]) -> tuple[Region, ...]:
-    """The same regions in the scene's coordinates."""
+    """Return the same regions in the scene's coordinates."""
     return tuple(
         replace(
             region,

@@ -58,7 +58,7 @@ def _packaged() -> str:
 
 
 def source() -> MovieSource:
-    """The movie as import-movie.md describes it."""
+    """Return the movie as import-movie.md describes it."""
     return MovieSource(
         FieldMovie(str(MOVIE), COLDEST, HOTTEST),
         pixel=2e-6,

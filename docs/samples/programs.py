@@ -96,7 +96,7 @@ def ansys(folder: Path) -> None:
 
 
 def meshes(folder: Path) -> None:
-    """The same with Abaqus's names."""
+    """Return the same with Abaqus's names."""
     write_vtk(folder, "NT11", "PEEQ")
 
 
@@ -187,7 +187,7 @@ def faces() -> tuple[list[tuple[int, int, list[int]]], list[tuple[int, int, list
 
 
 def listed(rows: Iterable[str]) -> str:
-    """A list as OpenFOAM writes it."""
+    """Return a list as OpenFOAM writes it."""
     lines = list(rows)
     return f"{len(lines)}\n(\n" + "\n".join(lines) + "\n)\n"
 

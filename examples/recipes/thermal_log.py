@@ -43,7 +43,7 @@ class ThermalLog(Source, Part):
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """The nearest of the log's samples for each of the scene's."""
+        """Return the nearest of the log's samples for each of the scene's."""
         values, spacing, interval = self._read()
         down, across = np.floor(-raster.y / spacing), np.floor(raster.x / spacing)
         rows, columns = down.astype(int), across.astype(int)

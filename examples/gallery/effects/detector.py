@@ -43,7 +43,7 @@ CAMERA = Camera(lower_limit=None, detector=DETECTOR)
 
 
 def patterned(correction):
-    """The detector with elements that differ."""
+    """Return the detector with elements that differ."""
     return replace(DETECTOR, terms=(*PATTERN, *NOISE), correction=correction)
 
 

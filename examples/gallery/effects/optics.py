@@ -52,7 +52,7 @@ def kelvins(camera):
 
 
 def term(one):
-    """The camera with a term of the optics."""
+    """Return the camera with a term of the optics."""
     return replace(CAMERA, optics=(one,))
 
 

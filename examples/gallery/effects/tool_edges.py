@@ -92,7 +92,7 @@ def _mark_hone(axes: Axes) -> None:
 
 
 def _sharp_land() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The corners of the chamfer before they are rounded."""
+    """Return the corners of the chamfer before they are rounded."""
     assert CHAMFERED.chamfer is not None
     land = np.diff(CHAMFERED.corners[::-1], axis=0)[0]
     land /= np.hypot(*land)

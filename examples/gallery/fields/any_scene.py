@@ -37,7 +37,7 @@ for name, text in re.findall(r"<!-- file: (\S+) -->\n```yaml\n(.*?)```", page, r
 
 
 def looked_at(source, settings, study):
-    """The errors of a study on fields that are imported."""
+    """Return the errors of a study on fields that are imported."""
     with TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.nc"
         chipglow.import_scene(chipglow.load_import(str(files / source), settings).build(), scene)

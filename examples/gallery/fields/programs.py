@@ -40,7 +40,7 @@ PAGE = (sample_files.HERE / "do" / "from-programs.md").read_text(encoding="utf-8
 
 
 def imported(name):
-    """The scene of a description on the page, sampled every 5 µm."""
+    """Return the scene of a description on the page, sampled every 5 µm."""
     block = rf"<!-- file: {name} -->\n```yaml\n(.*?)```"
     (FOLDER / name).write_text(re.search(block, PAGE, re.DOTALL)[1], encoding="utf-8")
     wanted = chipglow.load_import(str(FOLDER / name), ["field_of_view.spacing=5 um"])

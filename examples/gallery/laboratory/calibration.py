@@ -98,7 +98,7 @@ rng = np.random.default_rng(1)
 
 
 def frames(kelvins):
-    """Counts of twenty frames."""
+    """Return counts of twenty frames."""
     return detector.counts(np.broadcast_to(BAND.radiance(kelvins), (20, *SHAPE)), rng)
 
 

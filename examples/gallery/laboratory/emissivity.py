@@ -29,7 +29,7 @@ chip, background = chip_emissivity()
 
 
 def heating(celsius):
-    """A thermocouple of 2 K, surroundings of 293 K to 1 K, a camera of 2 K."""
+    """Return a thermocouple of 2 K, surroundings of 293 K to 1 K, a camera of 2 K."""
     return Heating(celsius + 273.15, heated_chip.LABORATORY, 2.0, 1.0, 2.0)
 
 

@@ -45,14 +45,14 @@ print("\n".join(sentences(found)))
 
 
 def in_temperature(measurement):
-    """The same image with temperature instead of radiance: a mistake to avoid."""
+    """Return the same image with temperature instead of radiance: a mistake to avoid."""
     wrong = measurement.data.copy(deep=True)
     wrong["radiance"].values[:] = wrong["radiance_temperature"].values
     return Measurement(wrong)
 
 
 def width(of):
-    """The width of the Gaussian."""
+    """Return the width of the Gaussian."""
     fit = of.fit("gaussian")
     text = uncertain_text(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6)
     return f"{text} µm (reduced chi-squared {fit.reduced_chi_squared:.1f})"

@@ -106,7 +106,7 @@ class SceneModel:
         return self.coarse is not None
 
     def is_ready(self, state: State) -> bool:
-        """Whether the exact picture takes milliseconds."""
+        """Return whether the exact picture takes milliseconds."""
         key, camera = self._exposure_key(state), state.study.camera
         kind = camera.psf.kind if camera.psf else ""
         # A quick look at pixels hardly larger than the coarse samples takes half as long.

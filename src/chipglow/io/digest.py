@@ -81,7 +81,7 @@ def write_hdf5(path: Path, write: Callable[[HDF5Sink], object]) -> None:
 
 
 def is_intact(path: Path) -> bool | None:
-    """Whether a file is as it was when its digest was appended; None if it has no digest."""
+    """Return whether a file is as it was when its digest was appended; None if it has no digest."""
     size = path.stat().st_size - _LENGTH
     if size < 0:
         return None

@@ -26,7 +26,7 @@ IMPORT_SOURCES: Final = Family("import_source")
 
 
 def _has_header(path: Path) -> bool:
-    """Whether a table of text begins with a line of names."""
+    """Return whether a table of text begins with a line of names."""
     if not path.is_file():
         return False
     with path.open("rb") as file:

@@ -43,7 +43,7 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
 
 
 def is_measurement(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is a measurement that `write_measurement` wrote, and not a camera's."""
+    """Return whether a file is a measurement that `write_measurement` wrote, and not a camera's."""
     return holds(path, MEASUREMENT_UNITS)
 
 
@@ -77,7 +77,7 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
 
 
 def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
-    """Whether a file is HDF5, whole enough to be opened, and has all these at its root."""
+    """Return whether a file is HDF5, whole enough to be opened, and has all these at its root."""
     path = Path(path)
     if not path.is_file() or not h5py.is_hdf5(path):
         return False

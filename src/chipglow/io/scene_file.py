@@ -332,7 +332,7 @@ class StoredScene(Scene):
 
 
 def _is_plain(dataset: h5py.Dataset) -> bool:
-    """Whether a dataset holds the values themselves, as files of other programs need not."""
+    """Return whether a dataset holds the values themselves, as files of other programs need not."""
     encoded = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
     return dataset.dtype in (np.float32, np.uint8) and not any(
         map(dataset.attrs.__contains__, encoded)
@@ -401,7 +401,7 @@ def example_scene() -> StoredScene:
 
 
 def is_scene(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is one that `SceneWriter` or `write_scene` wrote, or like it."""
+    """Return whether a file is one that `SceneWriter` or `write_scene` wrote, or like it."""
     return holds(path, ("temperature",)) or holds(path, (spline_file.SPLINES,))
 
 

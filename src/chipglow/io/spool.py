@@ -142,7 +142,7 @@ def unfinished_scenes(path: Path) -> list[UnfinishedScene]:
 
 
 def _is_abandoned(part: Path) -> bool:
-    """Whether no writer holds the part any more."""
+    """Return whether no writer holds the part any more."""
     try:
         with part.open("r+b") as file:
             return hold(file.fileno())

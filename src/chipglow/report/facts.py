@@ -201,7 +201,7 @@ class Facts:
         return fraction.mean, float(np.interp(psf.fwhm, widths, values)) / 100
 
     def contact_reaches_border(self) -> bool:
-        """Whether the contact ends at the border of the view."""
+        """Return whether the contact ends at the border of the view."""
         cut, raster = self.analysis.cut, self.analysis.raster
         assert cut is not None
         x, y = cut.segments[0].tool.rake_point(cut.segments[0].contact_length)

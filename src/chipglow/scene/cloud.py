@@ -137,7 +137,7 @@ def _scatter_kind(
 def _neighbours(
     places: NDArray[np.float64], layers: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Indices of the nearest points, shape (points, neighbours), and distance of the nearest."""
+    """Return indices of the nearest points, (points, neighbours), and the smallest distance."""
     # Where points lie behind one another, more of the nearest are in one place.
     count = min(_NEIGHBOURS * layers, _MOST_NEIGHBOURS, len(places) - 1)
     neighbours = np.empty((len(places), count), np.int32)

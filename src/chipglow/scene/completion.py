@@ -139,7 +139,7 @@ class Completion(Part):
         return f"the cutting speed where the strain is small, in the chip {chip}."
 
     def uses_flow(self, found: Iterable[str], frames: int) -> bool:
-        """Whether the optical flow may be asked for the velocity."""
+        """Return whether the optical flow may be asked for the velocity."""
         known = set(found)
         return frames > 1 and not known & _VELOCITY and self._has_velocity(known)
 
@@ -186,7 +186,7 @@ def _prepared(
     chip: NDArray[np.bool_],
     in_tool: NDArray[np.bool_],
 ) -> SampledFrame:
-    """The frame with its tool and its strain, and with no hole in the material."""
+    """Return the frame with its tool and its strain, and with no hole in the material."""
     if "temperature" not in sampled.fields:
         raise SceneError("scene: no sample has a temperature")
     material = np.where(in_tool, np.uint8(Material.TOOL), sampled.material)
@@ -213,7 +213,7 @@ def _prepared(
 
 
 def _without_holes(values: NDArray[np.float32], solid: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """A field that is known everywhere in the material, and NaN elsewhere."""
+    """Return a field that is known everywhere in the material, and NaN elsewhere."""
     known = solid & np.isfinite(values)
     whole = np.where(known, values, np.float32(0.0))
     fill(whole, known, solid & ~known)
@@ -227,7 +227,7 @@ def _finished(
     completion: Completion,
     found: set[str],
 ) -> Frame:
-    """The whole frame; `others` are those before it, or the one after it."""
+    """Return the whole frame; `others` are those before it, or the one after it."""
     names = completion.fields(found, 2 if others else 1)
     fields = {name: now.fields[name] for name in names if name in now.fields}
     if "velocity_x" in names:

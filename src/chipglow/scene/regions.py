@@ -42,7 +42,7 @@ class Polygon:
 
     @classmethod
     def rectangle(cls, corner: Point, opposite: Point) -> "Polygon":
-        """An upright rectangle between two opposite corners."""
+        """Return an upright rectangle between two opposite corners."""
         (left, top), (right, bottom) = corner, opposite
         return cls(((left, top), (right, top), (right, bottom), (left, bottom)))
 

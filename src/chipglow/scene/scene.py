@@ -155,7 +155,7 @@ class Scene:
         return cls(data)
 
     def __len__(self) -> int:
-        """Number of frames."""
+        """Return the number of frames."""
         return len(self.times)
 
     def __repr__(self) -> str:
@@ -298,7 +298,7 @@ _MATERIALS: Final = ", ".join(f"{m.value} ({m.name.lower()})" for m in Material)
 
 
 def _as_stored(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-    """An array of this shape in the type that a scene keeps; bytes only if nothing is lost."""
+    """Return an array of this shape in a scene's type; bytes only if nothing is lost."""
     if values.shape != shape:
         raise SceneError(f"scene: {name!r} has shape {values.shape}, expected {shape}: time, y, x")
     if values.dtype.kind not in "biuf":

@@ -183,7 +183,7 @@ def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArra
 
 @njit(**_FAST)
 def spread(nodes, first, weights, begin, end, result):  # type: ignore[no-untyped-def]
-    """A row of nodes on the columns of samples from `begin` to `end`."""
+    """Return a row of nodes on the columns of samples from `begin` to `end`."""
     for c in range(begin, end):
         i = first[c]
         result[c - begin] = (

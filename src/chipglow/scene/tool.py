@@ -135,7 +135,7 @@ class Tool(ABC):
 
 
 def _right_of(start: float, end: float, curved: bool) -> NDArray[np.float64]:
-    """Unit vectors to the right of headings from start to end, shape (n, 2)."""
+    """Return unit vectors to the right of headings from start to end, shape (n, 2)."""
     steps = ceil(abs(end - start) / _ARC_STEP) if curved else 0
     heading = np.linspace(start, end, steps + 1)
     return np.stack([np.sin(heading), -np.cos(heading)], axis=1)

@@ -172,7 +172,7 @@ class Features:
         return result
 
     def moves_like(self, other: "Features") -> bool:
-        """Whether textures of both are looked up at the same places."""
+        """Return whether textures of both are looked up at the same places."""
         names = ("grain", "follow", "restore_standard_deviation")
         one, two = self.surfaces[0], other.surfaces[0]
         alike = all(getattr(one, name) == getattr(two, name) for name in names)

@@ -311,7 +311,7 @@ class Wedge(SideShape):
 
 
 def _graded(count: int) -> NDArray[np.float64]:
-    """Ends of `count` elements from 0 to 1, shorter toward 0."""
+    """Return the ends of `count` elements from 0 to 1, shorter toward 0."""
     return np.linspace(0.0, 1.0, count + 1) ** 2
 
 

@@ -323,7 +323,7 @@ def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
 
 
 def _whole_picture(binary: Binary, place: int, length: int) -> bool:
-    """Whether a record of counts, of which the end is missing, has all of them."""
+    """Return whether a record of counts, of which the end is missing, has all of them."""
     if length <= _RAW_HEADER:
         return False
     stored = binary.read(place, length)
@@ -338,7 +338,7 @@ def _whole_picture(binary: Binary, place: int, length: int) -> bool:
 
 
 def has_packed_counts(path: Path) -> bool:
-    """Whether the counts of a file are packed as PNG or JPEG-LS, so that libraries unpack them."""
+    """Return whether the counts of a file are packed as PNG or JPEG-LS."""
     with opened(path) as file:
         binary = _records(file)
         stored = binary.read(*_frame(binary, 0, 0, Notes()).records[_RAW])

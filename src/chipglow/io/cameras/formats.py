@@ -65,7 +65,7 @@ def _starts(*beginnings: bytes) -> Begins:
 
 
 def _is_hcc(head: bytes) -> bool:
-    """Whether a file begins with TC and a version that is not a letter."""
+    """Return whether a file begins with TC and a version that is not a letter."""
     return head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32
 
 

@@ -98,7 +98,7 @@ class Ptw(CameraFile):
         return stride
 
     def _has_lock_in(self) -> bool:
-        """Whether a line of lock-in data comes before each picture."""
+        """Return whether a line of lock-in data comes before each picture."""
         first = self.binary.numbers(self.start, min(self.header["columns"], 4), "<u2")
         return tuple(first) == _LOCK_IN and self.header["rows"] > 1
 

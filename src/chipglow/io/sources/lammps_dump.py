@@ -78,7 +78,7 @@ class Snapshot:
 
 
 def is_dump(path: Path) -> bool:
-    """Whether a file begins as a dump of LAMMPS in text does."""
+    """Return whether a file begins as a dump of LAMMPS in text does."""
     with path.open("rb") as stream:
         return stream.read(len(_ITEM)) == _ITEM
 

@@ -56,7 +56,7 @@ def find_legend(picture: Picture) -> Box | None:
 
 
 def is_cut(picture: Picture, box: Box) -> bool:
-    """Whether the colours continue beyond an end of a legend."""
+    """Return whether the colours continue beyond an end of a legend."""
     along, first, last = _along(picture, box)
     return _goes_on(along[last:], along[first:last][::-1]) or _goes_on(
         along[:first][::-1], along[first:last]
@@ -64,7 +64,7 @@ def is_cut(picture: Picture, box: Box) -> bool:
 
 
 def _goes_on(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> bool:
-    """Whether colours from an end outward change no more than those from it inward."""
+    """Return whether colours from an end outward change no more than those from it inward."""
     if len(beyond) < _BEYOND:
         return False
     jump = np.linalg.norm(beyond[:_BEYOND] - inside[0], axis=1).max()

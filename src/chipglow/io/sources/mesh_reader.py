@@ -32,7 +32,7 @@ class Block:
     """Membership of the elements in named sets, shape (elements,), bool."""
 
     def has(self, name: str) -> bool:
-        """Whether nodes or elements have a field."""
+        """Return whether nodes or elements have a field."""
         return name in self.grid.point_data or name in self.grid.cell_data
 
 

@@ -105,7 +105,7 @@ def _fields_by_block(ours: str, frames: Frames, names: Sequence[str]) -> dict[An
 
 
 def _has_values(frames: Frames, block: Block, name: str) -> bool:
-    """Whether most values of a block are not 0, of nodes or elements in the first or last frame."""
+    """Return whether most values of a block are not 0 in the first or last frame."""
     same = [other.grid for frame in frames for other in frame if other.names == block.names]
     blank = [
         _is_blank(data[name])

@@ -198,7 +198,7 @@ def plain_colours(picture: Picture) -> tuple[Colour, ...]:
 
 
 def _is_plain(pixels: NDArray[np.uint8], colour: Colour) -> bool:
-    """Whether pixels have one colour; a shade of grey may run, others may be those of a field."""
+    """Return whether pixels have one colour, or a range of greys."""
     place = lab(np.array(colour) / 255.0)
     apart = np.linalg.norm(lab(pixels / 255.0) - place, axis=1)
     return bool(np.hypot(*place[1:]) < _GREY or np.sqrt((apart**2).mean()) < _ONE_COLOUR)
