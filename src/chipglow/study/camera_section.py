@@ -137,6 +137,14 @@ class CameraSection(Part):
                 raise ValueError(f"preset: {name!r} is unknown, expected one of {known}")
             preset = {key: value for key, value in CAMERAS[name].items() if key != "source"}
             data = {**preset, **data}
+        if data.get("detector_pitch") not in (None, "none"):
+            # A camera by its data sheet: the paper's order would count its footprint twice.
+            data = {"psf_order": "optics", **data}
+        elif data.get("magnification") not in (None, "none") and "pitch" in data:
+            raise ValueError(
+                "magnification: cannot be combined with pitch, which is the distance on the scene; "
+                "give the distance on the detector as detector_pitch"
+            )
         camera = _of_its_band(with_pitch(data, from_file), from_file)
         if camera.get("detector") not in (None, "none") and "lower_limit" not in data:
             return {**camera, "lower_limit": "detector"}

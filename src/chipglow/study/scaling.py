@@ -38,6 +38,7 @@ VIEWS: Final = ("window", "field_of_view")
 DERIVED: Final = (
     "camera.pitch",
     "camera.psf",
+    "camera.psf_order",
     "camera.lower_limit",
     "cutting.cutting_length",
     *(f"cutting.window.{name}" for name in ("start", "end", "interval", "band_duration")),
@@ -120,7 +121,10 @@ def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, A
         raise ValueError("magnification: must be given with detector_pitch")
     if not magnification > 0:
         raise ValueError(f"magnification: {magnification:g}, must be positive")
-    pitch = LENGTH.parse(detector, si=not from_file) / magnification
+    try:
+        pitch = LENGTH.parse(detector, si=not from_file) / magnification
+    except ValueError as error:
+        raise ValueError(f"detector_pitch: {error}") from None
     given = LENGTH.parse(camera["pitch"], si=not from_file) if "pitch" in camera else pitch
     if abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(

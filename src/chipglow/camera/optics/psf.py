@@ -329,7 +329,7 @@ class MeasuredPSF(PointSpreadFunction):
 
 @dataclass(frozen=True)
 class ApertureChoice(PSFChoice):
-    """Aperture from the data sheet of a lens: either of the two numbers."""
+    """Aperture from the data sheet of a lens: one of three numbers."""
 
     numerical_aperture: Annotated[
         float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
@@ -342,20 +342,38 @@ class ApertureChoice(PSFChoice):
             over=0.0,
         ),
     ] = None
+    working_f_number: Annotated[
+        float | None,
+        Parameter(
+            "F-number of the light at the detector, of a cooled camera that of its cold stop; the "
+            "numerical aperture is m / (2 working_f_number).",
+            over=0.0,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.numerical_aperture is None) == (self.f_number is None):
-            raise ValueError("pass either numerical_aperture or f_number")
+        given = self.numerical_aperture, self.f_number, self.working_f_number
+        if sum(one is not None for one in given) != 1:
+            raise ValueError("pass one of numerical_aperture, f_number and working_f_number")
 
     def aperture(self, magnification: float | None) -> float:
         """Return the numerical aperture on the scene's side."""
         if self.numerical_aperture is not None:
             return self.numerical_aperture
-        assert self.f_number is not None
+        name = "f_number" if self.working_f_number is None else "working_f_number"
         if magnification is None:
-            raise ValueError("magnification: is missing but required for psf.f_number")
-        return magnification / (2 * self.f_number * (1 + magnification))
+            raise ValueError(f"magnification: is missing but required for psf.{name}")
+        if self.f_number is not None:
+            return magnification / (2 * self.f_number * (1 + magnification))
+        assert self.working_f_number is not None
+        aperture = magnification / (2 * self.working_f_number)
+        if aperture > 1:
+            raise ValueError(
+                f"working_f_number: {self.working_f_number:g} gives a numerical aperture of "
+                f"{aperture:.3g} at the magnification {magnification:g}, which must be at most 1"
+            )
+        return aperture
 
 
 @PSFS.part
