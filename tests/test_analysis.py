@@ -14,6 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from chipglow.analysis import (
     CASES,
     BandPlace,
+    LinePlace,
     Plan,
     PointPlace,
     RakePlace,
@@ -594,6 +595,18 @@ def test_an_image_and_a_place_under_the_limit_of_the_range_are_warned_about(chip
     titles = [one.partition(":")[0] for one in told[1000.0]]
     of_1, of_2 = (["Image of chip 1", "Shear band (chip 1)"], ["Image of chip 2"])
     assert titles == [*of_1, *of_2, "Rake face (chip 2)"]
+
+
+def test_a_line_whose_ends_alone_are_out_of_range_is_not_warned_about():
+    """The warning counts the pixels along a line, not its corners."""
+    raster = Raster(-100e-6, 60e-6, 2e-6, 60, 100)
+    hot = np.where(np.abs(raster.x) < 60e-6, 1000.0, 600.0) * np.ones((60, 1))
+    scene = Scene.from_fields(raster, np.array([0.0, 1e-5]), {"temperature": np.stack([hot, hot])})
+    line = LinePlace("across", ((-80e-6, 0.0), (80e-6, 0.0)))
+    plan = Plan(exposures=1, phases=1, places=(line,))
+    camera = replace(CAMERA, psf=None, psf_order="optics", lower_limit=800.0)
+    warnings = analyse(scene, {"plate": UniformSurface(1.0)}, camera, plan).warnings
+    assert not [one for one in warnings if "outside the camera's range" in one]
 
 
 def test_one_phase_and_one_texture_are_undrawn_causes(chip):

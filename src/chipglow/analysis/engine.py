@@ -22,7 +22,7 @@ from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect
 from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
-from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
+from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace, polyline
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
@@ -539,7 +539,8 @@ def _range_warnings(
         for surface, place in read:
             outline = place.outline()
             if surface == name and outline is not None:
-                seen = nearest(unusable.astype(np.float64), one.raster, outline)
+                points = polyline(outline, one.raster.spacing).points
+                seen = nearest(unusable.astype(np.float64), one.raster, points)
                 parts[f"{place.name[0].upper()}{place.name[1:]} ({name})"] = 0.5, seen
         for title, (most, values) in parts.items():
             if np.nanmean(values) >= most:

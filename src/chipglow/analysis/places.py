@@ -97,11 +97,7 @@ class LinePlace(Place):
 
     def line(self, pitch: float) -> Line:
         """Return points along it, the distance in m from its first corner."""
-        corners = np.array(self.corners)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-        distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
-        points = [np.interp(distance, along, coordinate) for coordinate in corners.T]
-        return Line(distance, np.stack(points, axis=1))
+        return polyline(np.array(self.corners), pitch)
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
         return {self.name: self.line(pitch)}
@@ -210,6 +206,14 @@ class BandPlace(Place):
 
     def outline(self) -> NDArray[np.float64]:
         return self.band.ridge.points
+
+
+def polyline(corners: NDArray[np.float64], pitch: float) -> Line:
+    """Return points every half pixel from corner to corner, shape (n, 2)."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
+    points = [np.interp(distance, along, coordinate) for coordinate in corners.T]
+    return Line(distance, np.stack(points, axis=1))
 
 
 def _to_both_sides(half_length: float, step: float) -> NDArray[np.float64]:
