@@ -539,8 +539,9 @@ def _range_warnings(
         for surface, place in read:
             outline = place.outline()
             if surface == name and outline is not None:
-                points = polyline(outline, one.raster.spacing).points
-                seen = nearest(unusable.astype(np.float64), one.raster, points)
+                if len(outline) > 1:
+                    outline = polyline(outline, one.raster.spacing).points
+                seen = nearest(unusable.astype(np.float64), one.raster, outline)
                 parts[f"{place.name[0].upper()}{place.name[1:]} ({name})"] = 0.5, seen
         for title, (most, values) in parts.items():
             if np.nanmean(values) >= most:
