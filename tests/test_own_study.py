@@ -295,9 +295,9 @@ def test_emissivities_of_another_band_or_metal_are_doubted():
     analysed = analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, far, plan)
     assert analysed.warnings[:2] == (band, metal)
     converted = CHIP_1.modified(Dispersion(HagenRubens(1.7e-7)))
-    assert list(converted.origin.warnings(far.band, scene)) == [metal]
+    assert list(converted.origin.warnings(far.band, scene.metal)) == [metal]
     scene.data.attrs["metal"] = "aisi-1045"
-    assert list(CHIP_2.origin.warnings(Camera().band, scene)) == []
+    assert list(CHIP_2.origin.warnings(Camera().band, scene.metal)) == []
 
 
 def test_a_study_says_where_its_emissivities_come_from():

@@ -451,11 +451,29 @@ def test_the_command_takes_the_line_of_several_temperatures(folder):
         assert ("K from the 287 °C to 387 °C" in output) == beyond, output
 
 
+def test_a_region_without_emissivity_and_another_band_are_warned_about(folder):
+    write_lines(folder, *zip(*rows_of_line(0.0, HEATED), strict=True))
+    text = (folder / "regions.yaml").read_text()
+    more = text + "  another: {rectangle: [[2, 2], [6, 6]]}\n"
+    (folder / "more.yaml").write_text(more)
+    code, output = run("hot.nc", "--regions", "more.yaml", "--emissivity", "e.nc")
+    assert code == 0, output
+    assert "Warning: another: left out, as no known emissivity" in output
+    assert "Emissivities measured in" not in output
+    with xr.open_dataset(folder / "hot.nc", engine="h5netcdf") as data:
+        other = data.load()
+    other.attrs |= {"band_lower": 3e-6, "band_upper": 5e-6}
+    write_measurement(Measurement(other), folder / "other.nc")
+    code, output = run("other.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")
+    assert code == 0, output
+    assert "Warning: Emissivities measured in 3.8 µm to 5.1 µm are taken to hold in" in output
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "omit the option"),
-        (["--emissivity", "e.nc"], "is known of other, expected one of the regions"),
+        (["--emissivity", "e.nc"], "has the name or feature of a known emissivity (other)"),
         (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),
     ],
 )

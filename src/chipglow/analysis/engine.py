@@ -203,7 +203,7 @@ def analyse(
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
     origins = [surface.origin for surface in surfaces.values()]
-    doubts = dict.fromkeys(text for one in origins for text in one.warnings(camera.band, scene))
+    doubts = dict.fromkeys(text for one in origins for text in one.warnings(camera.band, scene.metal))
     warnings = [*doubts, *_image_warnings(task, looked)]
     if sparse := sparse_frames(scene, camera.integration_time):
         warnings = [sparse, *warnings]

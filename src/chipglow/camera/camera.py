@@ -280,7 +280,7 @@ class Camera(Part):
         self, scene: Scene, surface: Surface, field: EmissivityField, start: float
     ) -> Exposure:
         (exposure,) = self.expose_fields(scene, (field,), start)
-        warnings = tuple(surface.origin.warnings(self.band, scene))
+        warnings = tuple(surface.origin.warnings(self.band, scene.metal))
         return replace(exposure, effects=surface.effects, warnings=warnings)
 
     def expose_fields(

@@ -163,6 +163,7 @@ def temperature(
     from chipglow.laboratory import emissivity as lab
     from chipglow.laboratory.measurement import load_calibration, load_measurement
     from chipglow.laboratory.result_file import write_frame
+    from chipglow.text import Notes
 
     named = lab.load_regions(regions)
     surroundings = None
@@ -175,6 +176,9 @@ def temperature(
     result = lab.true_temperatures(measurements, named, lines, surroundings, fitted, drift, names)
     _print(result)
     notes = sum((one.notes for one in measurements), result.notes)
+    if isinstance(lines, dict):
+        band, metal = measurements[0].band, str(measurements[0].data.attrs.get("metal", ""))
+        notes += Notes(warnings=list(lab.read_origin(emissivity).warnings(band, metal)))
     finish(notes, (table, partial(write_frame, result.to_frame())))
 
 

@@ -214,6 +214,11 @@ class Scene:
         return raster_of(self.data)
 
     @property
+    def metal(self) -> str:
+        """The workpiece's metal; empty if the scene does not state it."""
+        return str(self.data.attrs.get("metal", ""))
+
+    @property
     def tool(self) -> Tool | None:
         """The tool's outline, if the scene states it."""
         return stored_tool(self.data.attrs)

@@ -197,7 +197,7 @@ def wavelengths(
             text
             for band in study.wavelengths.bands
             for surface in fitted.surfaces.values()
-            for text in surface.origin.warnings(band, scene)
+            for text in surface.origin.warnings(band, scene.metal)
         ]
         return data.assign_attrs((fitted.notes + Notes(warnings=doubts)).attrs())
 

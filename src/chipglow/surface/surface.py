@@ -66,9 +66,9 @@ class Origin:
     """Limits in m."""
     metal: str = ""
 
-    def warnings(self, band: Band, scene: Scene) -> Iterator[str]:
-        """Yield where a camera's band or the metal of a scene is another, a sentence each."""
-        seen, metal = (band.lower, band.upper), str(scene.data.attrs.get("metal", ""))
+    def warnings(self, band: Band, metal: str) -> Iterator[str]:
+        """Yield a sentence if a camera's band or the metal differs."""
+        seen = band.lower, band.upper
         if self.band is not None and not np.allclose(self.band, seen, rtol=_SAME_BAND, atol=0.0):
             measured, used = (
                 f"{1e6 * low:.3g} µm to {1e6 * high:.3g} µm" for low, high in (self.band, seen)

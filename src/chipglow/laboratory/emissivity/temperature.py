@@ -212,21 +212,28 @@ def true_temperatures(
     known = {area: emissivities[area.name] for area in places if area.name in emissivities}
     if not known:
         raise ValueError(
-            f"emissivity: is known of {', '.join(emissivities)}, expected one of the regions "
-            f"{', '.join(area.name for area in places)}"
+            f"emissivity: no region ({', '.join(area.name for area in places)}) has the name or "
+            f"feature of a known emissivity ({', '.join(emissivities)})"
         )
     rows = tuple(
         true_temperature(measurements, area, line, surroundings, calibration, drift)
         for area, line in known.items()
     )
     lines = list(known.values())
-    warnings = [warning for row in rows for warning in row.estimate.warnings]
+    warnings = [
+        f"{area.name}: left out, as no known emissivity ({', '.join(emissivities)}) has the name "
+        "or feature of this region."
+        for area in places
+        if area not in known
+    ]
+    warnings += [warning for row in rows for warning in row.estimate.warnings]
     warnings += [text for row, line in zip(rows, lines, strict=True) for text in _far(row, line)]
     unknown_drift = drift is None and len(measurements) == 1
     unknown_drift |= any(
         np.isnan(line.at(line.middle).contribution("drift")).any() for line in lines
     )
-    assumed = _assumptions(rows, lines, surroundings is None, unknown_drift)
+    stated = stated_calibration(measurements) is not None
+    assumed = _assumptions(rows, lines, surroundings is None, unknown_drift, stated)
     return RegionTemperatures(rows, Notes(assumed, warnings))
 
 
@@ -250,13 +257,13 @@ def _assumptions(
     lines: Sequence[EmissivityLine],
     same_surroundings: bool,
     unknown_drift: bool,
+    stated_calibration: bool,
 ) -> list[str]:
     def plays_a_part(cause: str) -> bool:
         return any(row.estimate.contribution(cause) for row in rows)
 
     known = not any(line.heatings for line in lines)
     straight = any(len(line.heatings) > 1 for line in lines)
-    calibrated = plays_a_part("calibration")
     texts = {
         "Every region is of uniform temperature and emissivity.": True,
         "The emissivity is a straight line over the temperature.": straight,
@@ -271,11 +278,11 @@ def _assumptions(
             not known and same_surroundings
         ),
         "The camera's calibration is exact, as the measurement states no uncertainty of it.": (
-            not calibrated
+            not stated_calibration
         ),
         "The calibration's errors in the emissivity and here are independent, which makes u too "
         "large rather than too small (calibration).": (
-            calibrated and not known and rows[0].correlation is None
+            stated_calibration and not known and rows[0].correlation is None
         ),
         "The camera does not drift between recordings: a single image, here or of the emissivity, "
         "does not show it, and u does not include it (drift).": unknown_drift,
