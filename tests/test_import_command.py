@@ -193,6 +193,27 @@ def test_a_movie_needs_no_source_beside_its_section(tmp_path):
     assert source.files == str(tmp_path / "disc.avi")
 
 
+def test_samples_filled_in_a_middle_frame_are_warned_about(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    for number in range(4):
+        grid = pyvista.ImageData(dimensions=(31, 21, 1), spacing=(5e-3, 5e-3, 1.0))
+        temperature = 100 + 1000 * grid.points[:, 0] + 10.0 * number
+        if number == 2:
+            temperature[np.hypot(*(grid.points[:, :2] - [0.075, 0.05]).T) < 0.02] = np.nan
+        grid["NT11"] = temperature
+        grid.cast_to_unstructured_grid().save(tmp_path / f"cut_{number}.vtu")
+    out = tmp_path / "scene.nc"
+    settings = [one for one in SETTINGS if not one.startswith("grid.")]
+    settings.append("field_of_view.spacing=5 um")
+    command = ["import", str(tmp_path / "cut_*.vtu"), "--out", str(out), *options(settings)]
+    result = RUNNER.invoke(app, command)
+    assert result.exit_code == 0, result.output
+    filled = open_scene(out).filled()
+    assert filled[2] > 0.01 and not filled[[0, 1, 3]].any()
+    said = " ".join(result.output.split())
+    assert f"In 1 of 4 frames up to {100 * filled[2]:.2g} % of the samples with material" in said
+
+
 def test_the_description_that_init_writes_says_every_field_and_is_read_back(arrays, tmp_path):
     path = tmp_path / "import.yaml"
     result = RUNNER.invoke(app, ["init", str(path), "--import"])

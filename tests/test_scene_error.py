@@ -26,6 +26,7 @@ from chipglow.cli import app
 from chipglow.io import write_scene
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
+from chipglow.scene.frame import FILLED
 from chipglow.scene.regions import Circle, Polygon, Region
 from chipglow.surface import TemperatureSurface, UniformSurface
 
@@ -69,6 +70,17 @@ def test_an_even_plate_is_measured_without_error():
         error = reading(result, place, name).error
         assert np.abs(error.values).max() < 1e-3, place
         assert error.values.shape == (2, 1, 4)
+
+
+def test_a_place_at_filled_samples_is_warned_about():
+    scene = plate()
+    quality = np.zeros((4, RASTER.rows, RASTER.columns), np.uint8)
+    quality[1:, 35:45, 85:95] = FILLED  # around (30 um, 0), which MIDDLE reads
+    flagged = Scene(scene.data.assign(quality=(("time", "y", "x"), quality)))
+    warnings = found(flagged, places=(MIDDLE, PointPlace("elsewhere", (-30e-6, 0.0)))).warnings
+    told = [one for one in warnings if "filled from their neighbours" in one]
+    assert len(told) == 1 and told[0].startswith("Middle: 100 % of its samples")
+    assert not [one for one in found(places=(MIDDLE,)).warnings if "filled" in one]
 
 
 def test_at_an_edge_the_blurred_radiance_is_the_mean_of_both_sides():

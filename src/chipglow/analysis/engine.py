@@ -36,6 +36,7 @@ from chipglow.laboratory.chip import (
     resolution_warnings,
 )
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
+from chipglow.scene.frame import FILLED, QUALITY
 from chipglow.scene.lines import nearest
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.surface import EmissivityField, Surface
@@ -203,7 +204,9 @@ def analyse(
         **(tool_attributes(scene.tool) if scene.tool else {}),
     }
     origins = [surface.origin for surface in surfaces.values()]
-    doubts = dict.fromkeys(text for one in origins for text in one.warnings(camera.band, scene.metal))
+    doubts = dict.fromkeys(
+        text for one in origins for text in one.warnings(camera.band, scene.metal)
+    )
     warnings = [*doubts, *_image_warnings(task, looked)]
     if sparse := sparse_frames(scene, camera.integration_time):
         warnings = [sparse, *warnings]
@@ -219,6 +222,7 @@ def analyse(
     exposure = schedule.drawn.index(schedule.shown)
     read = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
     warnings += _range_warnings(measurements, schedule.shown, read)
+    warnings += _filled_warnings(scene, schedule.starts[schedule.shown], task.duration, read)
     return Analysis(
         data=data,
         plan=plan,
@@ -549,6 +553,29 @@ def _range_warnings(
                     f"{title}: {100 * np.nanmean(values):.0f} % of the pixels are outside the "
                     "camera's range, so that a real camera does not show them."
                 )
+
+
+def _filled_warnings(
+    scene: Scene, start: float, duration: float, read: Sequence[tuple[str, Place]]
+) -> Iterator[str]:
+    """Yield a sentence for each place near samples without a temperature of their own."""
+    if QUALITY not in scene.data:
+        return
+    first, last = (scene.frame_at(time) for time in (start, start + duration))
+    flags = scene.data[QUALITY].isel(time=slice(first, last + 1)).values
+    filled = (flags == FILLED).any(axis=0).astype(np.float64)
+    for place in dict.fromkeys(place.name for _, place in read):
+        outline = next(one.outline() for _, one in read if one.name == place)
+        if outline is None:
+            continue
+        if len(outline) > 1:
+            outline = polyline(outline, scene.raster.spacing).points
+        fraction = float(nearest(filled, scene.raster, outline).mean())
+        if fraction > 0:
+            yield (
+                f"{place[0].upper()}{place[1:]}: {100 * fraction:.0f} % of its samples had no "
+                "temperature during the shown exposure and were filled from their neighbours."
+            )
 
 
 def _unread(data: xr.Dataset) -> Iterator[str]:

@@ -97,9 +97,12 @@ def import_source(
     resume: Annotated[bool, opt.flag("--resume", "Resume an interrupted import.")] = False,
 ) -> None:
     """Import meshes, grids, points or movies as a scene."""
+    import numpy as np
+
     from chipglow.cli.progress import progress_bars, say_checkpoint
-    from chipglow.io import import_scene, load_import, prospect
+    from chipglow.io import import_scene, load_import, open_scene, prospect
     from chipglow.io.importing import kept_import
+    from chipglow.text import Notes
 
     wanted = load_import(source, settings or ()).build()
     looked = prospect(wanted)
@@ -116,6 +119,15 @@ def import_source(
             looked=looked,
             resume=kept if resume else None,
         )
+    scene = open_scene(out)
+    filled = scene.filled()
+    scene.data.close()
+    if (largest := filled.max()) > 0:
+        warning = (
+            f"In {np.count_nonzero(filled)} of {filled.size} frames up to {100 * largest:.2g} % of "
+            "the samples with material had no value and were filled from their neighbours."
+        )
+        current().notes(Notes(warnings=[warning]))
     current().file(out)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.quantities.units import COLDEST, HOTTEST, ZERO_CELSIUS
 from chipglow.scene.frame import (
     FIELD_UNITS,
+    FILLED,
     MATERIAL_COORDINATE_UNITS,
     QUALITY,
     Frame,
@@ -212,6 +213,17 @@ class Scene:
     def raster(self) -> Raster:
         """The grid of the samples."""
         return raster_of(self.data)
+
+    def filled(self) -> NDArray[np.float64]:
+        """Return the fraction of each frame's material whose values are filled, shape (time,)."""
+        if QUALITY not in self.data:
+            return np.zeros(len(self))
+        fractions = []
+        for index in range(len(self)):
+            material = self.field("material", index) != Material.VOID
+            filled = self.data[QUALITY][index].values[material] == FILLED
+            fractions.append(filled.mean() if filled.size else 0.0)
+        return np.array(fractions)
 
     @property
     def metal(self) -> str:
