@@ -137,6 +137,16 @@ def test_columns_of_panels_are_separate_images_that_together_show_the_figure(fol
             left += image.width
 
 
+def test_the_page_describes_the_camera(facts, page):
+    text = " ".join(" ".join(page.text).split())
+    for said in (
+        "Spectral band 3.8 to 5.1 µm", "µm on the scene", "Exposure 10 µs at 600 Hz",
+        "Range from 300 °C", "Emissivity of chip 2",
+    ):  # fmt: skip
+        assert said in text
+    assert str(facts.analysis.camera.psf) in text.replace("\u00a0", " ")
+
+
 def test_every_figure_is_there_as_picture_and_as_drawing(folder):
     pictures = folder / "figures"
     assert {path.name for path in pictures.iterdir()} == {
@@ -179,7 +189,15 @@ def sentences_of(facts):
 
 
 def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, facts):
-    assert page.sections == ["answer", "causes", "details", "comparison", "tables", "repeat"]
+    assert page.sections == [
+        "answer",
+        "camera-settings",
+        "causes",
+        "details",
+        "comparison",
+        "tables",
+        "repeat",
+    ]
     assert page.seen.count("details") == 4  # all but the answer and its causes is folded
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2

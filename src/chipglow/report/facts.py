@@ -145,6 +145,34 @@ class Facts:
         """The readings that are known in every draw."""
         return headlines(self.data)
 
+    @property
+    def settings(self) -> Mapping[str, str]:
+        """Settings of the camera and the surfaces, as text by name."""
+        analysis, camera = self.analysis, self.analysis.camera
+        pixels, psf, limit = camera.pixels(analysis.raster), camera.psf, camera.lower_limit
+        spectral = f"{1e6 * camera.band.lower:.4g} to {1e6 * camera.band.upper:.4g} µm"
+        blur = "none" if psf is None else f"{psf}, {1e6 * psf.fwhm:.3g} µm wide at half maximum"
+        applied = {"detector": "on the pixel image", "optics": "before the pixels integrate"}
+        bits = camera.detector.bits if camera.detector else None
+        reflected = camera.reflected
+        settings = {
+            "Spectral band": spectral,
+            "Pixels": f"{pixels.columns} × {pixels.rows}, {1e6 * camera.pitch:.4g} µm on the scene",
+            "Exposure": f"{time_text(camera.integration_time)} at {camera.frame_rate:.6g} Hz",
+            "Point spread function": blur
+            if psf is None
+            else f"{blur}, {applied[camera.psf_order]}",
+            "Range": "no lower limit" if limit is None else f"from {limit - KELVIN:.0f} °C",
+            "Reflected temperature": (
+                "none" if reflected is None else f"{reflected - KELVIN:.0f} °C"
+            ),
+            "Detector": "ideal" if bits is None else f"{bits} bits, with noise",
+        }
+        for name in self.read_surfaces:
+            middle = float(self.data.set_emissivity.sel(surface=name))
+            settings[f"Emissivity of {name}"] = f"{middle:.2f}, median of the hot part"
+        return settings
+
     def text(self, text: str, **values: Any) -> str:
         """Return a text with the values of the analysis and further ones, in one line."""
         return " ".join(template(text).render({**self.context, **values}).split())

@@ -128,6 +128,7 @@ def write_report(
         "changes": changes(facts, rows["errors"]),
         "attribution": list(attribution.sentences(facts)),
         "note": facts.text(texts()["note"]),
+        "camera_settings": facts.settings,
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
         **tables(facts, rows, tool),
