@@ -198,7 +198,7 @@ def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(pa
         "tables",
         "repeat",
     ]
-    assert page.seen.count("details") == 4  # all but the answer and its causes is folded
+    assert page.seen.count("details") == 5  # all but the answer and its causes is folded
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2
     sentences = sentences_of(facts)
