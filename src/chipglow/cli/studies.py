@@ -196,7 +196,7 @@ def wavelengths(
     resume: opt.Resume = False,
     yes: opt.Yes = False,
 ) -> None:
-    """Compare spectral bands and two-band ratios: the error of the true temperature."""
+    """Compare spectral bands and two-band ratios: the error against the true temperature."""
     from chipglow.analysis import wavelengths_frame
     from chipglow.cli.progress import confirm_cost, progress_bars
     from chipglow.laboratory.result_file import write_frame

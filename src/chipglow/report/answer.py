@@ -25,7 +25,7 @@ class Statement(NamedTuple):
 def answer(facts: Facts, errors: Sequence[Row]) -> list[Statement]:
     """Return a sentence for each main error: of a cut at fixed places, else at the first ones.
 
-    The last one states the error of the true temperature at the first of these places.
+    The last one states the error against the true temperature at the first of these places.
     """
     rows = {row.key: row for row in errors}
     names = list(islice(_main(facts), _MAX_SENTENCES))

@@ -175,7 +175,7 @@ def error_lines(facts: Facts) -> Figure | None:
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
             axes.set_xlabel(_LINE_LABELS.get(name, f"distance / {unit}"))
-    _legend(figure, rows.T.flat, columns=4)
+    _legend(figure, rows.T.flat, columns=3)
     return figure
 
 
