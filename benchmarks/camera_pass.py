@@ -196,7 +196,7 @@ def compare_frames(path, rounds, sub_frames):
     stored = open_scene(path)
     arrays, times = arrays_of(stored, NEEDED, sub_frames), stored.times[:sub_frames]
     whole = Scene.from_fields(RASTER, times, arrays)
-    textured = CHIP_1.on(stored)
+    textured = CHIP_1.prepare(stored)
     frames = stored.frames(range(sub_frames), NEEDED)
     emissivity = np.stack([textured.emissivity(frame) for frame in frames])
     given = {name: arrays[name] for name in ("temperature", "material")}
