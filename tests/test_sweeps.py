@@ -224,6 +224,19 @@ def test_the_figure_draws_each_point_over_each_setting(study, tmp_path):
         assert drawn == expected
 
 
+def test_bands_are_varied_by_their_text(study, tmp_path):
+    file, out = tmp_path / "study.yaml", tmp_path / "out"
+    file.write_text(study_text(study))
+    vary = ["--vary", "camera.band=3.8-5.1 um,1.5-1.7 um", "--vary", "camera.pitch=3 um,6 um"]
+    command = ["sweep", str(file), *vary, "--at", "hot", "--workers", "0", "--out", str(out)]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    assert "1.5-1.7 um" in done.output
+    data = Sweep.open(out).to_xarray()
+    assert list(data["camera.band"].values) == ["3.8-5.1 um", "1.5-1.7 um"]
+    assert np.isfinite(data.error).all()
+
+
 def test_the_command_writes_table_arrays_and_figure(study, tmp_path):
     file = tmp_path / "study.yaml"
     file.write_text(study_text(study))

@@ -92,7 +92,11 @@ def sweep(
 def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]") -> "pd.DataFrame":
     """Return the frame with the settings as text in their units."""
     texts = {
-        path: frame[path].map(quantity.text if quantity else str)
+        path: frame[path].map(
+            lambda value, quantity=quantity: (
+                quantity.text(value) if quantity and not isinstance(value, str) else str(value)
+            )
+        )
         for path, quantity in quantities.items()
     }
     return frame.assign(**texts)

@@ -317,12 +317,12 @@ def _studies(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | 
 
 
 def _in_si(study: Study, path: str, value: Any) -> Any:
-    """Return the value of a setting in SI, or as it was given if it has no unit."""
+    """Return the value of a setting in SI; as it was given without a unit or if it is a range."""
     try:
         quantity = setting_at(study, path).parameter.quantity
-    except LookupError:
+        return quantity.parse(value) if quantity and isinstance(value, str) else value
+    except (LookupError, ValueError):
         return value
-    return quantity.parse(value) if quantity and isinstance(value, str) else value
 
 
 def _key(study: Study | str, at: Sequence[str]) -> str:
