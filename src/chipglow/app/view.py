@@ -19,7 +19,6 @@ import param
 from bokeh.document import Document
 from jinja2 import Environment, PackageLoader
 from panel.custom import Children, JSComponent
-from panel.io import unlocked
 
 from chipglow.analysis.images import PARTS
 from chipglow.app.controls import ERROR_IMAGES, Texts
@@ -118,8 +117,7 @@ class View:
         message = event.data
         self._handled = int(message["n"])
         act = getattr(self, f"_on_{message['kind']}")
-        with unlocked():  # one answer, that the browser draws once
-            self._reported(lambda: act(message.get("content")))
+        self._later(lambda: act(message.get("content")))
 
     def _notified(self, kind: str, *content: Any) -> None:
         self._later(lambda: getattr(self, f"_show_{kind}")(*content))
@@ -306,17 +304,23 @@ class View:
             self._loop.call_soon_threadsafe(self.page.alone, lambda: self._reported(show))
             return
         if self._document is None:
-            show()
+            self._reported(show)
             return
-
-        def together() -> None:
-            with unlocked():  # one message, that the browser draws once
-                self._reported(show)
-
         try:
-            self._document.add_next_tick_callback(together)
+            self._document.add_next_tick_callback(partial(self._together, show, self._document))
         except RuntimeError:  # the page was closed meanwhile
             self.session.end()
+
+    def _together(self, show: Callable[[], None], document: Document) -> None:
+        """Send all messages at the end, through Bokeh, so that the browser draws once.
+
+        Panel would keep a message that comes while others are written until the one after it.
+        """
+        document.hold("collect")
+        try:
+            self._reported(show)
+        finally:
+            document.unhold()
 
 
 def _bars(values: Mapping[Any, float]) -> dict[Any, float]:
