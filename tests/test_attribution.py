@@ -181,6 +181,15 @@ def test_lost_pixels_are_divided_among_the_effects_that_lose_them(scene):
     assert float(data.measured.min()) == 690.0
 
 
+def test_the_default_exposure_is_within_the_longest_part_of_a_scene_with_a_gap(scene):
+    times = scene.times + 5e-5 * (np.arange(12) >= 4)
+    late = Scene.from_fields(GRID, times, {"temperature": scene.data["temperature"].values})
+    start = attribute(late, replace(CAMERA, integration_time=3e-6), UniformSurface(0.6)).attrs[
+        "start"
+    ]
+    assert late.times[4] < start <= late.times[-1] - 2e-6
+
+
 def test_named_effects_leave_the_others_in_a_group(scene):
     data = attribute(scene, CAMERA, UniformSurface(0.6), effects=("emissivity", "psf"))
     assert list(data.effect.values) == ["emissivity", "psf", REST]

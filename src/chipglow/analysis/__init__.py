@@ -21,7 +21,6 @@ from chipglow.analysis.heated import HeatedObject as HeatedObject, HeatedRow as 
 from chipglow.analysis.images import (
     ALL as ALL,
     CASES as CASES,
-    Array as Array,
     ExposureImages as ExposureImages,
     error_images as error_images,
     error_parts as error_parts,

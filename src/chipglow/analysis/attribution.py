@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chipglow.analysis.cut import spread_starts
 from chipglow.analysis.images import Array, ExposureImages, reference_temperature
 from chipglow.analysis.places import Place
 from chipglow.camera import UNUSABLE, Camera, Exposure
@@ -18,8 +19,8 @@ from chipglow.camera.exposure import View, expose
 from chipglow.camera.optics.sampling import integrate, largest
 from chipglow.camera.sweep import Check
 from chipglow.quantities import Parameter, Part
-from chipglow.scene import Raster, Scene, sample
-from chipglow.surface import ModifiedSurface, Surface, UniformSurface
+from chipglow.scene import Raster, Scene
+from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface
 
 EFFECTS: Final = (
     "emissivity",
@@ -106,7 +107,7 @@ def attribute(
     surface : Surface
         The surface.
     start : float, optional
-        Start of the exposure in s; by default the exposure is in the middle of the scene.
+        Start of the exposure in s; by default in the middle of the scene's longest part.
     effects : sequence of str
         Any of `EFFECTS`, or the ``kind`` of a term of the camera's optics or detector. The
         effects that are not named form one group. By default all that the camera has.
@@ -148,12 +149,14 @@ def attribute(
     """
     plan = AttributionPlan(tuple(effects), reference, permutations)
     if start is None:
-        times = scene.times
-        start = float(times[0] + times[-1] + scene.frame_spacing - camera.integration_time) / 2
-    model = _Model(camera, _sources(scene, camera, surface, start, check), plan, check)
+        starts = spread_starts(scene, camera.frame_duration(scene.raster), 3)
+        start = float(starts[len(starts) // 2])
+    field = camera.prepare(surface, scene)
+    model = _Model(camera, _sources(scene, camera, surface, field, start, check), plan, check)
     variables = _divided(model, plan.permutations, seed)
     half = replace(camera, integration_time=camera.integration_time / 2)
-    shorter = half.expose(scene, surface, start + half.integration_time / 2)
+    middle = start + half.integration_time / 2
+    (shorter,) = half.expose_fields(scene, (field,), middle, check)
     longer = model.sources.exposures[0]
     gain = _size(camera, longer, reference) - _size(half, shorter, reference)
     variables["gain_half_exposure"] = ("y", "x"), gain, _KELVIN
@@ -167,7 +170,7 @@ def attribute(
 
 
 def read_attribution(
-    data: xr.Dataset, place: Place, images: Sequence[Array], pitch: float
+    data: xr.Dataset, place: Place, images: Sequence[Array], pixels: Raster
 ) -> tuple[Array, dict[str, Array]]:
     """Return contributions at the readings of a place, (reading, effect), and along its lines.
 
@@ -175,16 +178,10 @@ def read_attribution(
     image, `images`; their last column is the gain of half the exposure. The lines by name are of
     shape (effect, point).
     """
-    raster = Raster(
-        float(data.x[0]) - pitch / 2, float(data.y[0]) + pitch / 2, pitch, *images[0].shape
-    )
     first, gain = len(images), data.gain_half_exposure.values
     stack = np.concatenate([np.stack(images), data.contribution.values, gain[None]])
-    lines = {
-        name: np.array([sample(image, raster, line.points) for image in stack])
-        for name, line in place.lines(pitch).items()
-    }
-    read = place.read(stack, raster, lines)[:, first:]
+    lines = place.sampled(stack, pixels)
+    read = place.read(stack, pixels, lines)[:, first:]
     return read, {name: along[first:-1] for name, along in lines.items()}
 
 
@@ -260,11 +257,16 @@ class _Sources:
 
 
 def _sources(
-    scene: Scene, camera: Camera, surface: Surface, start: float, check: Check | None
+    scene: Scene,
+    camera: Camera,
+    surface: Surface,
+    field: EmissivityField,
+    start: float,
+    check: Check | None,
 ) -> _Sources:
     band, plain = camera.band, _unreflecting(surface)
     views = [
-        View(camera.prepare(surface, scene), band, camera.reflected),
+        View(field, band, camera.reflected),
         View(plain.prepare(scene, band), band),
         View(UniformSurface(1.0).prepare(scene, band), band),
     ]
@@ -346,12 +348,13 @@ class _Model:
             "noise": camera.detector is not None,
             "range limit": camera.lower_limit is not None,
         }
-        names = [name for name in EFFECTS if present.get(name, True) and name not in self.contained]
-        if psf is None or "footprint" not in psf.includes:
-            return {name: frozenset({name}) for name in names}
-        blur = {"psf": frozenset({"psf", "footprint"})}
-        groups = {name: blur.get(name, frozenset({name})) for name in names if name != "footprint"}
-        return {BLUR if name == "psf" else name: effects for name, effects in groups.items()}
+        groups: dict[str, _Coalition] = {}
+        for name in EFFECTS:
+            if present.get(name, True) and name not in self.contained:
+                blurs = name in ("psf", "footprint") and psf and "footprint" in psf.includes
+                group = BLUR if blurs else name
+                groups[group] = groups.get(group, frozenset()) | {name}
+        return groups
 
     def _reading(self, on: _Coalition) -> tuple[Array, NDArray[np.bool_]]:
         """Return temperatures, and the pixels that the detector marks as unusable."""

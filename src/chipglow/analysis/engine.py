@@ -22,7 +22,7 @@ from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect
 from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
-from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace, polyline
+from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
 from chipglow.camera import Camera, GaussianPSF, Measurement
@@ -37,7 +37,6 @@ from chipglow.laboratory.chip import (
 )
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.frame import FILLED, QUALITY
-from chipglow.scene.lines import nearest
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.surface import EmissivityField, Surface
 
@@ -454,11 +453,12 @@ def _attribution(task: _Task, schedule: Schedule, looked: Looked) -> Variables:
     readings = np.full((len(looked.readings), data.sizes["effect"] + 1), np.nan)
     along = np.full((len(looked.lines), data.sizes["effect"], looked.along.shape[-1]), np.nan)
     exposure, names = schedule.drawn.index(shown), list(task.surfaces)
+    pixels = task.camera.pixels(task.scene.raster)
     for number, view in enumerate(schedule.views):
         of_surface = names.index(view.surface)
         images = looked.references[view.surface][shown], looked.shown[view.surface][1][0]
         for i, place in enumerate(view.places[exposure]):
-            read, lines = read_attribution(every[of_surface], place, images, task.camera.pitch)
+            read, lines = read_attribution(every[of_surface], place, images, pixels)
             readings[[one[:2] == (number, i) for one in looked.readings]] = read
             for name, values in lines.items():
                 along[looked.lines.index((number, i, name)), :, : values.shape[1]] = values
@@ -539,18 +539,15 @@ def _range_warnings(
     """Yield a sentence for each image and place that the camera hardly sees."""
     for name, one in measurements.items():
         unusable = ~one.usable[shown]
-        parts: dict[str, tuple[float, Array]] = {f"Image of {name}": (0.9, unusable)}
+        parts = {f"Image of {name}": (0.9, float(unusable.mean()))}
         for surface, place in read:
-            outline = place.outline()
-            if surface == name and outline is not None:
-                if len(outline) > 1:
-                    outline = polyline(outline, one.raster.spacing).points
-                seen = nearest(unusable.astype(np.float64), one.raster, outline)
-                parts[f"{place.name[0].upper()}{place.name[1:]} ({name})"] = 0.5, seen
-        for title, (most, values) in parts.items():
-            if np.nanmean(values) >= most:
+            if surface == name:
+                covered = place.covered(unusable, one.raster)
+                parts[f"{_capitalised(place.name)} ({name})"] = 0.5, covered
+        for title, (most, covered) in parts.items():
+            if covered >= most:
                 yield (
-                    f"{title}: {100 * np.nanmean(values):.0f} % of the pixels are outside the "
+                    f"{title}: {100 * covered:.0f} % of the pixels are outside the "
                     "camera's range, so that a real camera does not show them."
                 )
 
@@ -563,19 +560,18 @@ def _filled_warnings(
         return
     first, last = (scene.frame_at(time) for time in (start, start + duration))
     flags = scene.data[QUALITY].isel(time=slice(first, last + 1)).values
-    filled = (flags == FILLED).any(axis=0).astype(np.float64)
-    for place in dict.fromkeys(place.name for _, place in read):
-        outline = next(one.outline() for _, one in read if one.name == place)
-        if outline is None:
-            continue
-        if len(outline) > 1:
-            outline = polyline(outline, scene.raster.spacing).points
-        fraction = float(nearest(filled, scene.raster, outline).mean())
+    filled = (flags == FILLED).any(axis=0)
+    for place in {place.name: place for _, place in read}.values():
+        fraction = place.covered(filled, scene.raster)
         if fraction > 0:
             yield (
-                f"{place[0].upper()}{place[1:]}: {100 * fraction:.0f} % of its samples had no "
+                f"{_capitalised(place.name)}: {100 * fraction:.0f} % of its samples had no "
                 "temperature during the shown exposure and were filled from their neighbours."
             )
+
+
+def _capitalised(text: str) -> str:
+    return text[0].upper() + text[1:]
 
 
 def _unread(data: xr.Dataset) -> Iterator[str]:

@@ -140,10 +140,7 @@ class Looked:
     ) -> None:
         """Read a place by the camera itself (case 0) or one of the other cameras."""
         case, exposure, texture, phase = indices
-        lines = {
-            name: np.array([sample(image, pixels, line.points) for image in stack])
-            for name, line in place.lines(pixels.spacing).items()
-        }
+        lines = place.sampled(stack, pixels)
         rows = [one[:2] == key for one in self.readings]
         values = place.read(stack, pixels, lines)
         if case:

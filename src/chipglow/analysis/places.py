@@ -1,7 +1,7 @@
 """Where the error is read: points, lines, regions, the hottest pixel, rake face, shear band."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from typing import ClassVar, Final
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.images import Array, Stack
 from chipglow.laboratory.chip import ShearBand
-from chipglow.scene import Line, Raster, Region, Tool, straight_line
+from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
@@ -44,6 +44,13 @@ class Place(ABC):
         """Return lines along which the images are sampled, by name; `pitch` is in m."""
         return {}
 
+    def sampled(self, images: Sequence[Array] | Stack, pixels: Raster) -> dict[str, Stack]:
+        """Return images along its lines by name, each of shape (image, point)."""
+        return {
+            name: np.array([sample(image, pixels, line.points) for image in images])
+            for name, line in self.lines(pixels.spacing).items()
+        }
+
     @abstractmethod
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         """Return the `quantities` of images (reference first) and their `lines`; NaN for none."""
@@ -51,6 +58,15 @@ class Place(ABC):
     def outline(self) -> NDArray[np.float64] | None:
         """Return points to draw it, x and y in m, shape (n, 2); None for the whole image."""
         return None
+
+    def covered(self, where: NDArray[np.bool_], raster: Raster) -> float:
+        """Return the fraction of its outline where an image is true; NaN for the whole image."""
+        outline = self.outline()
+        if outline is None:
+            return nan
+        if len(outline) > 1:
+            outline = polyline(outline, raster.spacing).points
+        return float(np.nanmean(nearest(where.astype(np.float64), raster, outline)))
 
     def check_within(self, raster: Raster) -> None:
         """Raise a ValueError if a part of the place is outside the pixels."""

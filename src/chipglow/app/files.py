@@ -6,7 +6,6 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from matplotlib import rc_context
-from PIL.Image import open as open_image
 
 from chipglow.app.controls import State
 from chipglow.app.pictures import Picture, SceneModel
@@ -58,4 +57,4 @@ def chip_picture(scene: Scene, colour: str) -> str:
     with style(), rc_context(dict.fromkeys(_COLOURED, colour)):
         figure = draw_chip(scene.overview, scene.raster, scene.tool)
         figure.savefig(file, dpi=110, transparent=True)
-    return data_url(open_image(file))
+    return data_url(file.getvalue())

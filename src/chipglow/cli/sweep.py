@@ -1,7 +1,7 @@
 """The command that runs a study at many settings."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, cast
+from typing import TYPE_CHECKING, Annotated, Final, cast
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
@@ -56,9 +56,10 @@ def sweep(
     from chipglow.quantities import setting_at
     from chipglow.report.sweep_figure import draw_sweep
     from chipglow.study import Method, load_study, sweep as compute
+    from chipglow.study.workers import connected
     from chipglow.text import Notes
 
-    loaded, client = load_study(study), _client(scheduler)
+    loaded, client = load_study(study), connected(scheduler) if scheduler else None
     axes = dict(_axis(text) for text in vary)
     with progress_bars() as progress:
         result = compute(
@@ -92,11 +93,10 @@ def sweep(
 def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]") -> "pd.DataFrame":
     """Return the frame with the settings as text in their units."""
     texts = {
-        path: frame[path].map(
-            lambda value, quantity=quantity: (
-                quantity.text(value) if quantity and not isinstance(value, str) else str(value)
-            )
-        )
+        path: [
+            quantity.text(value) if quantity and not isinstance(value, str) else str(value)
+            for value in frame[path]
+        ]
         for path, quantity in quantities.items()
     }
     return frame.assign(**texts)
@@ -107,11 +107,3 @@ def _axis(text: str) -> tuple[str, str]:
     if not (path and equals and values):
         raise ValueError(f"--vary: {text!r}, expected a setting and its values, PATH=VALUES")
     return path.strip(), values
-
-
-def _client(scheduler: str | None) -> Any:
-    if scheduler is None:
-        return None
-    from importlib import import_module
-
-    return import_module("distributed").Client(scheduler)

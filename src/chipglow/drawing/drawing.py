@@ -118,11 +118,16 @@ def label_panels(figure: Figure) -> None:
             axes.set_ylabel(axes.get_ylabel() or first)
 
 
-def data_url(image: Image) -> str:
-    """Return an image as a data URL of a PNG."""
+def png(image: Image) -> bytes:
+    """Return an image as a PNG file."""
     file = BytesIO()
     image.save(file, "PNG")
-    return f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+    return file.getvalue()
+
+
+def data_url(png: bytes) -> str:
+    """Return a PNG file as a data URL."""
+    return f"data:image/png;base64,{b64encode(png).decode('ascii')}"
 
 
 def show_image(

@@ -8,22 +8,18 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.analysis import Array
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
+from chipglow.quantities import Array
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts
+from chipglow.report.figures import line_title, of_surface
 from chipglow.report.rows import MAIN
 
 _LEAST: Final = 0.5
 """Contribution in K below which a sentence and the maps leave an effect out."""
 
 _MAX_SENTENCES: Final = 3
-_LINES: Final = {
-    "rake": "across the rake face",
-    "contact": "along the contact",
-    "band": "across the shear band",
-}
 
 
 def attribution_sentence(data: xr.Dataset, x: float, y: float) -> str:
@@ -83,7 +79,7 @@ def maps(facts: Facts) -> Figure | None:
     limit = scales.round_limit(shown.values, 99.5, 10.0)
     panels = [
         ImagePanel(
-            f"{_label(effect)}, {name}" if len(names) > 1 else _label(effect),
+            of_surface(facts, _label(effect), name),
             "contribution / °C",
             shown.sel(surface=name, effect=effect).values,
             (-limit, limit),
@@ -101,15 +97,15 @@ def profiles(facts: Facts) -> Figure | None:
     data = facts.data
     if "effect" not in data.dims or "line" not in data.dims:
         return None
-    exposure = int(np.argmin(np.abs(data.exposure.values - _shown_start(data))))
+    data = data.sel(exposure=_shown_start(data), method="nearest")
     factor, unit = drawing.length_unit(facts.analysis.raster)
     figure = drawing.new_figure(2.9 * ((data.sizes["line"] + 1) // 2) + 0.6)
     grid = figure.subplots((data.sizes["line"] + 1) // 2, 2, squeeze=False).flat
     for name, axes in zip(data.line.values, grid, strict=False):
-        one = data.sel(line=name).isel(exposure=exposure)
+        one = data.sel(line=name)
         along = factor * one.line_distance.values
         _stack(axes, along, one.attribution_line.values, [*map(_label, data.effect.values)])
-        axes.set(title=f"{_LINES.get(name, name)}, {one.line_surface.item()}")
+        axes.set(title=line_title(facts, str(name)))
         axes.set_xlabel(f"distance / {unit}")
         axes.set_ylabel("contribution / °C")
     for axes in list(grid):

@@ -37,6 +37,11 @@ _ORDERS: Final = {
 _Series: TypeAlias = Callable[[xr.Dataset, str, str], Array]
 
 _MAX_CURVES: Final = 6
+_LINE_TITLES: Final = {
+    "rake": "across the rake face",
+    "contact": "along the contact",
+    "band": "across the shear band",
+}
 _LINE_LABELS: Final = {
     "rake": "distance from the rake face / µm\n← tool      chip →",
     "band": "distance from the ridge / µm\n← workpiece      chip →",
@@ -93,7 +98,9 @@ def scene(facts: Facts) -> Figure:
             panels.append(ImagePanel(name.replace("_", " "), label, image, (0.0, highest)))
     for name in facts.read_surfaces:
         image = data.emissivity.sel(surface=name).where(there).values
-        panels.append(ImagePanel(_of(facts, "emissivity", name), "emissivity", image, (0.0, 1.0)))
+        panels.append(
+            ImagePanel(of_surface(facts, "emissivity", name), "emissivity", image, (0.0, 1.0))
+        )
     return drawing.image_panels(panels, facts.analysis.raster, facts.analysis.tool)
 
 
@@ -110,7 +117,7 @@ def measurement(facts: Facts) -> Figure:
         pixels = analysis.measurements[name].raster
         drawing.show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
         picture = drawing.show_image(axes[1], measured, pixels, analysis.tool, scales.HEAT, limits)
-        axes[0].set_title(_of(facts, "scene, one moment", name))
+        axes[0].set_title(of_surface(facts, "scene, one moment", name))
         axes[1].set_title("as measured")
         for one in axes:
             one.label_outer()
@@ -133,7 +140,7 @@ def error_images(facts: Facts) -> Figure:
         for axes, name in zip(rows[:, column], names, strict=True):
             raster = analysis.measurements[name].raster
             ImagePanel(
-                _of(facts, title, name),
+                of_surface(facts, title, name),
                 f"{title} / °C",
                 images.sel(surface=name).values,
                 (-limit, limit),
@@ -170,7 +177,7 @@ def error_lines(facts: Facts) -> Figure | None:
             drawing.draw_mean(axes, at, _draws(values[shown].values), colour, label)
         if facts.is_compared:
             _draw_published(right, str(name))
-        left.set(title=_line_title(facts, str(name)), ylabel="radiance temperature / °C")
+        left.set(title=line_title(facts, str(name)), ylabel="radiance temperature / °C")
         right.set_ylabel("error / °C")
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
@@ -202,7 +209,9 @@ def over_time(facts: Facts) -> Figure | None:
             bars: Any = {"marker": "o", "markersize": 3, "capsize": 2, "label": label}
             axes.errorbar(starts * factor, values.mean(axis=1), values.std(axis=1), **bars)
         axes.axhline(0.0, color=GREY, linewidth=0.6)
-        axes.set(title=_of(facts, "error", surface), xlabel=f"start of the exposure / {unit}")
+        axes.set(
+            title=of_surface(facts, "error", surface), xlabel=f"start of the exposure / {unit}"
+        )
     panels[0].set_ylabel("error / °C")
     _legend(figure, list(panels), columns=2)
     return figure
@@ -243,14 +252,15 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
     return figure
 
 
-def _of(facts: Facts, title: str, surface: str) -> str:
+def of_surface(facts: Facts, title: str, surface: str) -> str:
     """Return the title of a panel, with the surface if there are several."""
     return f"{title}, {surface}" if len(facts.read_surfaces) > 1 else title
 
 
-def _line_title(facts: Facts, line: str) -> str:
-    title = {"rake": "across the rake face", "band": "across the shear band"}.get(line, line)
-    return _of(facts, title, str(facts.data.line_surface.sel(line=line).item()))
+def line_title(facts: Facts, line: str) -> str:
+    """Return the title of a line's panel."""
+    title = _LINE_TITLES.get(line, line)
+    return of_surface(facts, title, str(facts.data.line_surface.sel(line=line).item()))
 
 
 def _draws(values: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
-from chipglow.drawing.drawing import data_url
+from chipglow.drawing.drawing import data_url, png
 from chipglow.quantities.format import quantity_text
 from chipglow.text.yaml_file import parse_yaml
 
@@ -48,7 +48,7 @@ def environment() -> Environment:
         undefined=StrictUndefined,
     )
     made.filters |= {
-        "data_url": data_url,
+        "data_url": lambda image: data_url(png(image)),
         "degrees": degrees,
         "mean": lambda values: float(np.mean(list(values))),
         "median": lambda values: float(np.median(list(values))),

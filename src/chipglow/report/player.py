@@ -65,7 +65,7 @@ class View:
         palette = np.concatenate([[to_rgb(scales.VOID)], colours])
         image = Image.fromarray(np.nan_to_num(index).astype(np.uint8))
         image.putpalette(np.round(palette * 255).astype(np.uint8).tobytes())
-        return drawing.data_url(image)
+        return drawing.data_url(drawing.png(image))
 
 
 @dataclass(frozen=True)

@@ -132,6 +132,7 @@ def write_report(
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
         **tables(facts, rows, tool),
+        "scene": study.scene if study else None,
         "is_quick": facts.is_compared and study == type(study).quick(),
         "citation": paper.CITATION,
         "rake_missing": paper.RAKE_MISSING,

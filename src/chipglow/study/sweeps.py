@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from hashlib import file_digest, sha256
 from importlib.metadata import version
@@ -183,9 +183,7 @@ def sweep(
     axes = {path: axis(values) for path, values in vary.items()}
     points = list(_points(axes, method, samples, seed))
     # Neither is kept of a point, and each takes longer than the rest.
-    study = replace(
-        study, analysis=changed(study.analysis, {"psf_widths": ("8 um",)}), attribution=None
-    )
+    study = changed(study, {"analysis.psf_widths": ("8 um",), "attribution": None})
     studies = _studies(study, points)
     settings = [{path: _in_si(study, path, one[path]) for path in one} for one in points]
     keys = [_key(one, at) for one in studies]
@@ -333,8 +331,7 @@ def _key(study: Study | str, at: Sequence[str]) -> str:
     del content["title"], content["wavelengths"]
     if study.scene is None:
         content["cutting"] = scene_inputs(study)
-    given = sorted(study.analysis.given)
-    return _digest([_contents(content), given, sorted(at), version("chipglow")])
+    return _digest([_contents(content), sorted(at), version("chipglow")])
 
 
 def _contents(value: Any) -> Any:

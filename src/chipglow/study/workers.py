@@ -18,20 +18,19 @@ _ALLOWED_FAILURES: Final = 10
 """Number of workers that may die with a task before the task fails."""
 
 
+def connected(scheduler: str) -> Client:
+    """Return a client of the cluster with this scheduler, such as ``tcp://node1:8786``."""
+    return _distributed().Client(scheduler)
+
+
 @contextmanager
 def local_client(client: Client | None, workers: int | None, most: int) -> Iterator[Client | None]:
     """Yield the client, or one of new processes of this machine; None for this process."""
     if client is not None or workers == 0 or most == 0:
         yield client
         return
-    try:
-        dask: Any = import_module("dask")
-        distributed: Any = import_module("distributed")
-    except ImportError:
-        raise ImportError(
-            "a sweep on several processes needs Dask: install chipglow with the extra 'sweep', or "
-            "set the number of workers to 0"
-        ) from None
+    distributed = _distributed()
+    dask: Any = import_module("dask")
     count = min(workers or cpu_count() or 1, most)
     options = {"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES}
     with (
@@ -57,8 +56,7 @@ def on_client(
             function(*arguments)
             yield
         return
-    distributed: Any = import_module("distributed")
-    waiting = iter(every)
+    distributed, waiting = _distributed(), iter(every)
 
     def submit(count: int) -> list[Any]:
         return [
@@ -79,6 +77,16 @@ def on_client(
         future.release()
         running.update(submit(1))
         yield
+
+
+def _distributed() -> Any:
+    try:
+        return import_module("distributed")
+    except ImportError:
+        raise ValueError(
+            "a sweep on several processes needs Dask: install chipglow with the extra 'sweep', or "
+            "set the number of workers to 0"
+        ) from None
 
 
 def _with_one_thread(function: Callable[..., None], *arguments: Any) -> None:
