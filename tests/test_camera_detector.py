@@ -16,6 +16,7 @@ from chipglow.camera import (
     DarkCurrent,
     DeadElements,
     Detector,
+    EquivalentNoise,
     Exposure,
     Flag,
     FlickerNoise,
@@ -25,6 +26,7 @@ from chipglow.camera import (
     OffsetPattern,
     OperationPoint,
     PhotonResponse,
+    RangeResponse,
     ReadNoise,
     ShotNoise,
     lower_range_limit,
@@ -351,6 +353,19 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
         page = write_report(result, folder, "title", "", {}).read_text()
         assert ("NETD, half of the range filled" in page) == told
         assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
+
+
+def test_the_netd_is_at_least_that_of_rounding():
+    """14 bits to 900 °C: one count is some kelvins wide at 30 °C, and all frames are the same."""
+    response = RangeResponse(hottest=1173.15)
+    noise = EquivalentNoise(netd=0.02, temperature=303.15)
+    camera = Camera(psf=None, detector=Detector(response=response, bits=14, terms=(noise,)))
+    band = camera.band
+    count = float(band.radiance(1173.15)) / (2**14 - 1 - 400)
+    rounding = count / np.sqrt(12) / float(band.slope(303.15))
+    assert rounding > 1.0
+    # Each source's mean is rounded by half a count at most, of the 0.7 x 15983 between them.
+    assert camera.calibration((8, 8)).netd(303.15) == pytest.approx(rounding, rel=1e-4)
 
 
 def test_the_microbolometers_data_sheet_comes_back():

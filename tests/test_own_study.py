@@ -167,6 +167,17 @@ def test_what_is_left_to_the_paper_is_said():
     assert list(left_to_the_paper(whole)) == []
 
 
+def test_defaults_that_are_not_the_papers_are_said_to_be_chipglows():
+    detector = {"response": {"kind": "range", "hottest": "900 degC"}}
+    of_camera = [one for one in left_to_the_paper(Study(camera={"detector": detector}))
+                 if "settings of camera" in one]  # fmt: skip
+    papers, others = of_camera
+    assert papers.startswith("The paper's") and "detector" not in papers.replace(
+        "order detector", ""
+    )
+    assert others.startswith("chipglow's defaults") and "detector.bits 12" in others
+
+
 def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
     assert all(row.paper is None for row in result_rows(chip_analysis, titanium))

@@ -159,22 +159,30 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
     if not (of_a_cut and isinstance(study.surface, FeaturesSection)):
         without["analysis"] = without["analysis"] | {"rake_chip", "band_chip"}
     for name, fields in without.items():
-        left = list(_unset(getattr(study, name), fields, ""))
-        if left:
-            yield f"The paper's values of omitted settings of {name}: {', '.join(left)}."
+        section = getattr(study, name)
+        unset = list(_unset(section, type(section)(), fields, ""))
+        for origin, papers in (("The paper's values", True), ("chipglow's defaults", False)):
+            left = [text for text, is_papers in unset if is_papers == papers]
+            if left:
+                yield f"{origin} of omitted settings of {name}: {', '.join(left)}."
     if of_a_cut and "psf_widths" not in plan.given:
         low, *_, high = (LENGTH.text(width) for width in study.plan.psf_widths)
         yield f"PSF widths from {low} to {high}, around the camera's own (analysis.psf_widths)."
 
 
-def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
+def _unset(
+    section: Part, papers: Part | None, without: set[str], prefix: str
+) -> Iterator[tuple[str, bool]]:
+    """Yield the omitted settings, and whether the paper's study has such a section."""
     for one in own_settings(section):
         if one.name in without or one.plain in ("none", []):
             continue
         if one.name not in section.given:
-            yield f"{prefix}{one.name} {_written(one.plain)}"
+            yield f"{prefix}{one.name} {_written(one.plain)}", papers is not None
         elif one.is_section:
-            yield from _unset(one.value, {"kind"}, f"{prefix}{one.name}.")
+            inner = getattr(papers, one.name, None)
+            same = inner if type(inner) is type(one.value) else None
+            yield from _unset(one.value, same, {"kind"}, f"{prefix}{one.name}.")
 
 
 def _written(value: Any) -> str:

@@ -8,7 +8,12 @@ from typing import Annotated, Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.detector.response import RESPONSES, DetectorResponse, OperationPoint
+from chipglow.camera.detector.response import (
+    RESPONSES,
+    DetectorResponse,
+    OperationPoint,
+    RangeResponse,
+)
 from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout, Stage
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
@@ -40,7 +45,9 @@ class Detector(Part):
     gain: Annotated[
         float | None,
         Parameter(
-            "Counts of one electron (DN/e-); none: the full well fills the digitiser.", over=0.0
+            "Counts of one electron (DN/e-); none: the full well fills the digitiser, or 1 if only "
+            "the measuring range is known.",
+            over=0.0,
         ),
     ] = None
     offset: Annotated[float, Parameter("Counts without electrons.", least=0.0)] = 400.0
@@ -94,7 +101,8 @@ class Detector(Part):
                 f"Detector.offset: {self.offset:g}, expected less than the {self._top} of "
                 f"{self.bits} bits"
             )
-        if self.gain is None and self.full_well is None:
+        counted = isinstance(self.response, RangeResponse) or self.gain or self.full_well
+        if not counted:
             raise ValueError("Detector: gain or full_well is required")
         if self.cold is not None and self.hot is not None and not self.cold < self.hot:
             raise ValueError(
@@ -106,8 +114,7 @@ class Detector(Part):
         """Counts of one electron (DN/e-)."""
         if self.gain is not None:
             return self.gain
-        assert self.full_well is not None
-        return (self._top - self.offset) / self.full_well
+        return 1.0 if self.full_well is None else (self._top - self.offset) / self.full_well
 
     @property
     def capacity(self) -> float:

@@ -102,7 +102,7 @@ class FlatFieldCalibration:
 
         The standard deviation over time of the calibrated radiance, root mean square over the
         pixels, over dL/dT: temporal noise of the detector, as a laboratory measures it.
-        NaN for a blackbody that saturates it.
+        At least that of rounding to whole counts. NaN for a blackbody that saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
         if seen >= full_light(self.detector, self.point):
@@ -111,7 +111,9 @@ class FlatFieldCalibration:
             self.detector, self.point, self.bad.shape, seen, self.detector.frames, "netd"
         )
         variance = self.radiance(frames)[0].var(axis=0, ddof=1)
-        noise = np.sqrt(variance[~self.bad].mean())
+        (low, high), (dark, bright) = self.levels, self.sources
+        rounding = _QUANTISATION * (bright - dark) / (high - low)
+        noise = max(float(np.sqrt(variance[~self.bad].mean())), rounding)
         return float(noise / self.point.band.slope(temperature))
 
     @cached_property
