@@ -56,6 +56,16 @@ def test_a_program_reads_the_columns_that_the_table_file_has(file, tmp_path):
     assert {row["part"] for row in found["tables"]["budget"]} >= {"u"}
 
 
+def test_a_pipe_that_ends_early_loses_no_file(file, tmp_path):
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "chipglow", "shearband", file, "--out", "band.csv"]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, encoding="utf-8")
+    os.close(writing)
+    assert "Error" not in done.stderr
+    assert (tmp_path / "band.csv").is_file()
+
+
 def test_a_program_that_asks_wrongly_gets_the_line_and_no_object(file):
     result = chipglow("shearband", file, "--width", "3 s", "--json")
     assert (result.exit_code, result.stdout) == (2, "")

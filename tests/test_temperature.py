@@ -97,6 +97,15 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
     shifted = true_temperature([high], WHOLE, EmissivityLine.constant(0.42))
     expected = shifted.estimate.values - found.estimate.values
     assert found.estimate.contribution("calibration") == pytest.approx(expected, rel=1e-2)
+    # Stated in kelvins: of a camera that shows a tenth of a kelvin too much.
+    kelvins = BAND.temperature(radiance) + 0.1
+    seen = Measurement.from_radiance(BAND.radiance(kelvins), BAND, np.zeros(1), RASTER)
+    shifted = true_temperature([seen], WHOLE, EmissivityLine.constant(0.42))
+    found = true_temperature(
+        [image()], WHOLE, EmissivityLine.constant(0.42), camera_uncertainty=0.1
+    )
+    expected = shifted.estimate.values - found.estimate.values
+    assert found.estimate.contribution("calibration") == pytest.approx(expected, rel=1e-2)
 
 
 def test_cold_surroundings_are_part_of_the_uncertainty():

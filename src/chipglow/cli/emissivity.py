@@ -31,13 +31,7 @@ def emissivity(
         float, opt.kelvins("Standard uncertainty of the true temperature, e.g. '2 K'.")
     ] = 0.0,
     reflected_uncertainty: opt.ReflectedUncertainty = None,
-    camera_uncertainty: Annotated[
-        float | None,
-        opt.kelvins(
-            "Standard uncertainty of the radiance temperatures by the calibration. Default: as "
-            "the measurement states.",
-        ),
-    ] = None,
+    camera_uncertainty: opt.CameraUncertainty = None,
     drift: opt.Drift = None,
     metal: Annotated[
         str, opt.value("NAME", "Metal of the object, e.g. 'Ti-6Al-4V': stored with the emissivity.")
@@ -155,6 +149,7 @@ def temperature(
         ),
     ] = None,
     reflected_uncertainty: opt.ReflectedUncertainty = None,
+    camera_uncertainty: opt.CameraUncertainty = None,
     drift: opt.Drift = None,
     table: Annotated[Path | None, opt.file("Write the table of regions, CSV.")] = None,
     settings: opt.Settings = None,
@@ -173,12 +168,19 @@ def temperature(
     measurements = [load_measurement(image, settings or ()) for image in images]
     lines = _emissivities(emissivity, emissivity_uncertainty)
     names = list(map(str, images))
-    result = lab.true_temperatures(measurements, named, lines, surroundings, fitted, drift, names)
+    result = lab.true_temperatures(
+        measurements, named, lines, surroundings, fitted, drift, names, camera_uncertainty
+    )
     _print(result)
     notes = sum((one.notes for one in measurements), result.notes)
     if isinstance(lines, dict):
-        band, metal = measurements[0].band, str(measurements[0].data.attrs.get("metal", ""))
-        notes += Notes(warnings=list(lab.read_origin(emissivity).warnings(band, metal)))
+        origin = lab.read_origin(emissivity)
+        doubts = [
+            text
+            for one in measurements
+            for text in origin.warnings(one.band, str(one.data.attrs.get("metal", "")))
+        ]
+        notes += Notes(warnings=list(dict.fromkeys(doubts)))
     finish(notes, (table, partial(write_frame, result.to_frame())))
 
 
@@ -203,17 +205,17 @@ def _print(result: "lab.RegionTemperatures") -> None:
 
     screen, rows = current(), result.to_frame()
     for name in ("radiance_temperature", "true_temperature"):
-        rows[f"{name}_degC"] = rows[name] - 273.15
+        rows[f"{name}_degC"] = rows[f"{name}_K"] - 273.15
     columns = {
         "region": "region",
         "pixels": "pixels",
         "radiance temperature / °C": "radiance_temperature_degC",
         "emissivity": "emissivity",
-        "true temperature ± u / °C": "true_temperature_degC ± standard_uncertainty",
-        "U 95 % / K": "expanded_uncertainty",
+        "true temperature ± u / °C": "true_temperature_degC ± standard_uncertainty_K",
+        "U 95 % / K": "expanded_uncertainty_K",
         "k": "coverage_factor",
     }
     screen.table("regions", rows, columns)
     screen.heading()
-    parts = {cause: f"{cause}_uncertainty" for cause in TEMPERATURE_BUDGET}
+    parts = {cause: f"{cause}_uncertainty_K" for cause in TEMPERATURE_BUDGET}
     screen.table(None, rows, {"parts of u / K": "region"} | parts)

@@ -59,6 +59,13 @@ RegionsFile: TypeAlias = Annotated[Path, value("FILE", "Regions of the image, a 
 ReflectedUncertainty: TypeAlias = Annotated[
     float | None, kelvins("Standard uncertainty of the reflected temperature, e.g. '2 K'.")
 ]
+CameraUncertainty: TypeAlias = Annotated[
+    float | None,
+    kelvins(
+        "Standard uncertainty of the radiance temperatures by the calibration. Default: as the "
+        "measurement states."
+    ),
+]
 Drift: TypeAlias = Annotated[
     float | None,
     value(

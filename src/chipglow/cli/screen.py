@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
     from rich.table import Table
+    from rich.text import TextType
 
     from chipglow.cli.tables import Columns
     from chipglow.text import Notes
@@ -56,12 +57,12 @@ class Screen:
         rows = list(rows)
         self._record["facts"].setdefault(name, {}).update(rows)
         if not self.json:
-            self._console().print(facts_table(rows))
+            self._show(facts_table(rows))
 
     def heading(self, text: str = "", stream: TextIO | None = None) -> None:
         """Print a line that the JSON object omits, by default on stdout."""
         if not self.json:
-            print(text, file=stream, flush=True)
+            _write(text, stream)
 
     def say(
         self,
@@ -98,7 +99,7 @@ class Screen:
             from importlib.metadata import version
 
             result = {"chipglow": version("chipglow")} | _plain(self._record)
-            print(json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1), flush=True)
+            _write(json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1))
             self._record = {}
 
     def _print(self, table: "Table") -> None:
@@ -108,14 +109,20 @@ class Screen:
         console = self._console()
         unlimited = console.options.update(max_width=10 * _PIPE_WIDTH)
         if Measurement.get(console, unlimited, table).minimum <= console.width:
-            console.print(table)
+            self._show(table)
             return
         if table.title:
-            console.print(table.title)
+            self._show(table.title)
         heads = [str(column.header) for column in table.columns]
         for row in zip(*(column.cells for column in table.columns), strict=True):
-            console.print()
-            console.print(facts_table(zip(heads, map(str, row), strict=True)))
+            self.heading()
+            self._show(facts_table(zip(heads, map(str, row), strict=True)))
+
+    def _show(self, content: "Table | TextType") -> None:
+        console = self._console()
+        with console.capture() as text:
+            console.print(content)
+        self.heading(text.get().removesuffix("\n"))
 
     def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: TextIO) -> None:
         for sentence in sentences:
@@ -165,6 +172,14 @@ def figure(draw: "Callable[..., Figure]", *arguments: Any) -> Callable[[Path], N
             drawn.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
 
     return write
+
+
+def _write(text: str, stream: TextIO | None = None) -> None:
+    """Print a text; when the reader of a pipe ends, the command goes on and writes its files."""
+    try:
+        print(text, file=stream, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
 
 
 def _plain(value: Any) -> Any:

@@ -16,11 +16,11 @@ from chipglow.laboratory.emissivity.observations import (
     RANDOM,
     UsedPixels,
     area_estimate,
+    calibration_uncertainty,
     check_same_pixels,
     drift_effect,
     observed_flags,
     observed_radiance,
-    stated_calibration,
     used_pixels,
     with_drift,
 )
@@ -376,7 +376,9 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         raster=first.raster,
         radiance=radiance,
         flags=observed_flags(measurements),
-        calibration=_calibration(measurements, radiance.mean(axis=0), heating),
+        calibration=calibration_uncertainty(
+            measurements, radiance.mean(axis=0), heating.camera_uncertainty
+        ),
         lower_limit=max(map(_floor, measurements)),
         recordings=len(measurements),
     )
@@ -454,18 +456,6 @@ def _emissivity(radiance: Any, reference: Any, reflected: Any) -> Any:
 
 def _floor(measurement: Measurement) -> float:
     return float(measurement.data.attrs.get("lower_limit", 0.0))
-
-
-def _calibration(
-    measurements: Sequence[Measurement], radiance: Array, heating: Heating
-) -> Array | None:
-    """Return the standard uncertainty of the mean radiance by the calibration, shape (y, x)."""
-    if heating.camera_uncertainty is not None:
-        band, spread = measurements[0].band, heating.camera_uncertainty
-        temperature = np.asarray(band.temperature(radiance), np.float64)
-        ends = [band.radiance(temperature + sign * spread) for sign in (-1.0, 1.0)]
-        return np.asarray((ends[1] - ends[0]) / 2, np.float64)
-    return stated_calibration(measurements)
 
 
 def _celsius(temperature: float) -> str:

@@ -52,15 +52,17 @@ def _random(mean: float, parts: dict[str, float], freedom: float, identity: str)
     return Estimate(np.array(mean), (Component(cause, np.array([list(parts.values())])),))
 
 
-def uncertainty_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, float]:
+def uncertainty_columns(
+    estimate: Estimate, causes: Sequence[str], unit: str = ""
+) -> dict[str, float]:
     """Return columns for the uncertainty of one value: the total and its parts."""
     whole = {
-        "standard_uncertainty": estimate.standard_uncertainty,
+        f"standard_uncertainty{unit}": estimate.standard_uncertainty,
         "degrees_of_freedom": estimate.degrees_of_freedom,
         "coverage_factor": estimate.coverage_factor(),
-        "expanded_uncertainty": estimate.expanded_uncertainty(),
+        f"expanded_uncertainty{unit}": estimate.expanded_uncertainty(),
     }
-    parts = {f"{cause}_uncertainty": estimate.contribution(cause) for cause in causes}
+    parts = {f"{cause}_uncertainty{unit}": estimate.contribution(cause) for cause in causes}
     return {name: float(value) for name, value in (whole | parts).items()}
 
 
@@ -149,8 +151,18 @@ def observed_flags(measurements: Sequence[Measurement]) -> NDArray[np.uint8]:
     return np.asarray(np.bitwise_or.reduce(flags, axis=0), np.uint8)
 
 
-def stated_calibration(measurements: Sequence[Measurement]) -> Array | None:
-    """Return the uncertainty of the mean radiance by the calibration, if all state it, (y, x)."""
+def calibration_uncertainty(
+    measurements: Sequence[Measurement], radiance: Array, kelvins: float | None
+) -> Array | None:
+    """Return the standard uncertainty of the mean radiance by the calibration, shape (y, x).
+
+    `kelvins` is that of the radiance temperature; None: as all measurements state it, if they do.
+    """
+    if kelvins is not None:
+        band = measurements[0].band
+        temperature = np.asarray(band.temperature(radiance), np.float64)
+        low, high = (band.radiance(temperature + sign * kelvins) for sign in (-1.0, 1.0))
+        return np.asarray((high - low) / 2, np.float64)
     known = [measurement.calibration_uncertainty for measurement in measurements]
     stated = [image.mean(axis=0) for image in known if image is not None]
     return np.asarray(np.mean(stated, axis=0), np.float64) if len(stated) == len(known) else None

@@ -18,11 +18,11 @@ from chipglow.laboratory.emissivity.observations import (
     RANDOM,
     UsedPixels,
     area_estimate,
+    calibration_uncertainty,
     check_same_pixels,
     drift_effect,
     observed_flags,
     observed_radiance,
-    stated_calibration,
     uncertainty_columns,
     used_pixels,
     with_drift,
@@ -91,6 +91,7 @@ def true_temperature(
     surroundings: Estimate | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
+    camera_uncertainty: float | None = None,
 ) -> TrueTemperature:
     """Compute the true temperature of an even area from its mean radiance and emissivity.
 
@@ -113,6 +114,9 @@ def true_temperature(
     drift : float, optional
         Relative standard uncertainty of the radiance from one recording to the next, by default
         as several recordings show; of one it is unknown and not in the uncertainty.
+    camera_uncertainty : float, optional
+        Standard uncertainty in K of the radiance temperatures by the calibration, by default as
+        the measurements state.
 
     Notes
     -----
@@ -141,7 +145,7 @@ def true_temperature(
     derivatives = _derivatives(area.name, emissivity, float(value.values), at, room, band)
     correlation = _correlation(emissivity, at, mean, calibration, band)
     shared = (correlation or 0.0) if emissivity.heatings else 1.0
-    stated = stated_calibration(measurements)
+    stated = calibration_uncertainty(measurements, radiance.mean(axis=0), camera_uncertainty)
     error = 0.0 if stated is None else float(stated[used.mask].mean())
     estimate = propagate(
         lambda _, seen, __: temperature(seen),
@@ -186,10 +190,10 @@ class RegionTemperatures:
                 "pixels": row.used.count,
                 "left_out": row.used.left_out,
                 "emissivity": row.emissivity,
-                "radiance_temperature": row.radiance_temperature,
-                "true_temperature": float(row.estimate.values),
-                "standard_deviation": row.standard_deviation,
-                **uncertainty_columns(row.estimate, TEMPERATURE_BUDGET),
+                "radiance_temperature_K": row.radiance_temperature,
+                "true_temperature_K": float(row.estimate.values),
+                "standard_deviation_K": row.standard_deviation,
+                **uncertainty_columns(row.estimate, TEMPERATURE_BUDGET, "_K"),
             }
             for row in self.rows
         )
@@ -203,6 +207,7 @@ def true_temperatures(
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
     names: Sequence[str] = (),
+    camera_uncertainty: float | None = None,
 ) -> RegionTemperatures:
     """Compute the true temperatures of the regions of an image."""
     check_same_pixels(measurements, "temperature", names)
@@ -216,7 +221,9 @@ def true_temperatures(
             f"feature of a known emissivity ({', '.join(emissivities)})"
         )
     rows = tuple(
-        true_temperature(measurements, area, line, surroundings, calibration, drift)
+        true_temperature(
+            measurements, area, line, surroundings, calibration, drift, camera_uncertainty
+        )
         for area, line in known.items()
     )
     lines = list(known.values())
@@ -232,7 +239,9 @@ def true_temperatures(
     unknown_drift |= any(
         np.isnan(line.at(line.middle).contribution("drift")).any() for line in lines
     )
-    stated = stated_calibration(measurements) is not None
+    stated = camera_uncertainty is not None or all(
+        one.calibration_uncertainty is not None for one in measurements
+    )
     assumed = _assumptions(rows, lines, surroundings is None, unknown_drift, stated)
     return RegionTemperatures(rows, Notes(assumed, warnings))
 
@@ -277,9 +286,8 @@ def _assumptions(
         "The object reflects what it did when its emissivity was determined.": (
             not known and same_surroundings
         ),
-        "The camera's calibration is exact, as the measurement states no uncertainty of it.": (
-            not stated_calibration
-        ),
+        "The camera's calibration is exact, as the measurement states no uncertainty of it "
+        "(camera_uncertainty).": not stated_calibration,
         "The calibration's errors in the emissivity and here are independent, which makes u too "
         "large rather than too small (calibration).": (
             stated_calibration and not known and rows[0].correlation is None
