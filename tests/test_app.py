@@ -18,10 +18,11 @@ from chipglow.app.controls import OWN, TABLE
 from chipglow.app.files import chip_picture, measurement_file, study_file
 from chipglow.app.opening import open_any, open_uploaded, scene_model
 from chipglow.app.session import Newest, Session, SupersededError
-from chipglow.app.view import View as PageView, readable
+from chipglow.app.view import View as PageView
 from chipglow.camera import View, expose
 from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
+from chipglow.quantities.format import readable
 from chipglow.scene import sample
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit, load_study
@@ -269,7 +270,7 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples_and_no_finer_pixels(mod
         ({"surface": OWN, f"surface.chips.{OWN}.body.mean": "2"}, "mean: 2, expected 0 to 1"),
         ({"camera.band.0": "6"}, "Band from: 6-5.1 um is reversed"),
         ({"camera.psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
-        ({"seed": "1.5"}, "Seed: 1.5, expected a valid integer"),
+        ({"seed": "1.5"}, "Seed: 1.5, expected a whole number"),
         ({"seed": "-1"}, "Seed: -1, expected 0 or more"),
         ({"camera.integration_time": "90"}, "Exposure: exposure: 413 us to 503 us is not within"),
         ({"camera.pitch": "6 mm"}, "Pixel pitch: camera: pitch of 6000 um at an offset"),

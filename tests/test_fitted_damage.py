@@ -47,7 +47,7 @@ def test_a_material_whose_damage_was_not_fitted_is_not_drawn():
     [
         ("numbers: [d1,", "numbers: [onset,", "fitted_damage: numbers: 'onset', expected one of"),
         ("numbers: [d1, d2,", "numbers: [d1,", "expected 4 rows of 4 numbers"),
-        ("numbers: [d1,", "numbers: [1,", "fitted_damage.numbers.0: 1, expected a valid string"),
+        ("numbers: [d1,", "numbers: [1,", "fitted_damage.numbers.0: 1, expected text"),
     ],
 )
 def test_a_wrong_entry_is_one_line(tmp_path, old, new, expected):

@@ -134,7 +134,7 @@ def _write(path: Path, old: str, new: str) -> Path:
         ("[400 degC, 184 GPa]", "[400 degC]", "young_modulus: ['400 degC'], expected [temperature"),
         ("[400 degC, 184 GPa]", "[100 degC, 184 GPa]", "young_modulus: temperature table: temp"),
         ("    hardening: 580 MPa\n", "", "flow_stress.pantale.hardening: is missing"),
-        ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a valid number"),
+        ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a number"),
         ("d2: 3.44", "d2: -3.44", "damage: d1 + d2 exp(d3 triaxiality) falls to"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
         ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "duplicate key 'loss'"),

@@ -182,7 +182,9 @@ REFUSED = [
         "camera.integration_time: 200 us is longer than the scene, expected up to the 90.96 us",
     ),
     ("camera: {pitch: 2 mm}", "2000 um is larger than the field of view, expected up to the 690"),
-    ("camera: {fill_factor: yes}", "camera.fill_factor: True, expected a valid number"),
+    ("camera: {exposure: 10 us}", "unknown key 'exposure', did you mean 'integration_time'"),
+    ("camera: {array: 640x512}", "camera.array: '640x512', expected none, or such as [640, 512]"),
+    ("camera: {fill_factor: yes}", "camera.fill_factor: True, expected a number"),
     (
         "camera: {psf: {kind: lens}}",
         "kind: 'lens', expected one of annular-aperture, gaussian, airy",

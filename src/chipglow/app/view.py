@@ -1,7 +1,6 @@
 """The page: a session and its figures as a Panel component, see page.js."""
 
 import logging
-import re
 from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
 from collections.abc import Callable, Mapping
@@ -27,7 +26,7 @@ from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
-from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
+from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_text
 
 _FOLDER: Final = Path(__file__).parent
 _log = logging.getLogger(__name__)
@@ -327,13 +326,6 @@ def _bars(values: Mapping[Any, float]) -> dict[Any, float]:
     """Return the lengths of bars to both sides in percent of their track."""
     largest = np.nanmax([1e-9, *np.abs(list(values.values()))])
     return {name: 50 * np.nan_to_num(value) / largest for name, value in values.items()}
-
-
-def readable(text: str) -> str:
-    """Return a message of the library with µm, µs and °C for the spellings of YAML files."""
-    for word, unit in ((" um", " µm"), (" us", " µs"), (" degC", " °C")):
-        text = re.sub(rf"(?<=\d){word}\b", unit, text)
-    return text
 
 
 def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> str:

@@ -85,8 +85,6 @@ def error(
     from chipglow.study import Study, errors, load_study
     from chipglow.surface import UniformSurface
 
-    if not scene.is_file():
-        raise FileNotFoundError(f"{scene}: no such file")
     loaded = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
     if emissivity is not None:
         loaded = changed(loaded, {"surface": UniformSurface(emissivity)})

@@ -1,5 +1,6 @@
 """A number with its unit, as the tables print it."""
 
+import re
 from math import floor, isfinite, isnan, log10
 
 
@@ -30,3 +31,10 @@ def rounded_text(value: float, unit: str = "") -> str:
     if not -5 <= size <= 12:
         return f"{value:.3e} {unit}".strip()
     return quantity_text(value, unit, max(3 - size, 0))
+
+
+def readable(text: str) -> str:
+    """Return a text with µm, µs and °C for the spellings of YAML files."""
+    for word, unit in ((" um", " µm"), (" us", " µs"), (" degC", " °C")):
+        text = re.sub(rf"(?<=\d){word}\b", unit, text)
+    return text

@@ -11,6 +11,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     SerializationInfo,
     SerializerFunctionWrapHandler,
+    ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
 )
@@ -85,6 +86,8 @@ class Parameter:
         if self.quantity is None:
             schema = handler(plain)
             _take_lists(schema)
+            if self.allowed:
+                schema = core_schema.no_info_wrap_validator_function(self._shaped, schema)
         else:
             schema = self.quantity.__get_pydantic_core_schema__(plain, handler)
             tables = tuple(one for one in get_args(plain) or (plain,) if one not in (float, ...))
@@ -114,6 +117,16 @@ class Parameter:
     @property
     def _is_limited(self) -> bool:
         return any(one is not None for one in (self.over, self.least, self.under, self.most))
+
+    def _shaped(self, value: Any, rest: ValidatorFunctionWrapHandler) -> Any:
+        """State what is allowed if the whole value is of another type."""
+        try:
+            return rest(value)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            if first["loc"] or first["type"] == "value_error":
+                raise
+            raise ValueError(f"{value!r}, expected {self.allowed}") from None
 
     def _read(self, value: Any, rest: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         """Check the limits: numbers in SI units first, so that the error shows them as given."""

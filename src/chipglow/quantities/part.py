@@ -1,8 +1,9 @@
 """Parts: objects of the library whose settings are declared once, for Python and descriptions."""
 
 import inspect
+import re
 import reprlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import MISSING, fields as dataclass_fields
 from difflib import get_close_matches
@@ -19,6 +20,7 @@ from typing import (
     NotRequired,
     Self,
     TypeVar,
+    get_args,
 )
 from warnings import warn
 
@@ -157,7 +159,8 @@ class Part:
             if isinstance(data, cls):
                 return data
             from_file = bool(info.context)
-            data = _known_keys(cls.completed({} if data is None else data, from_file), _keys(cls))
+            data = _known_keys(cls.completed({} if data is None else data, from_file), cls)
+            _check_complete(data, cls)
             values = _section(cls).validate_python(data, context=info.context)
             if cls.kind:
                 values.pop("kind", None)
@@ -244,7 +247,10 @@ class Family:
             kind = value.get("kind") if isinstance(value, Mapping) else None
             part = self.find(kind)
             if part is None:
-                shown = reprlib.repr(value if kind is None else kind)
+                if not isinstance(value, Mapping):
+                    example = self.examples.split("\n")[0].strip()
+                    raise ValueError(f"{reprlib.repr(value)}, expected one such as {example}")
+                shown = "is missing" if kind is None else reprlib.repr(kind)
                 raise ValueError(f"kind: {shown}, expected one of {', '.join(self.kinds)}")
             return adapter(part).validate_python(value, context=info.context)
 
@@ -265,8 +271,30 @@ class Family:
         return {"oneOf": sections, "discriminator": {"propertyName": "kind"}}
 
 
+def families(annotation: Any) -> Iterator[Family]:
+    """Yield the families of which an annotation names parts."""
+    if isinstance(annotation, Family):
+        yield annotation
+    else:
+        yield from (
+            family
+            for inner in (*getattr(annotation, "__metadata__", ()), *get_args(annotation))
+            for family in families(inner)
+        )
+
+
 adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
 """Return the adapter that reads and writes a part, by its class."""
+
+
+_EXPECTED: Final = {
+    "a valid dictionary": "names with values",
+    "a valid integer": "a whole number",
+    "a valid number": "a number",
+    "a valid string": "text",
+    "a valid tuple": "a list",
+}
+"""What pydantic expects, in the words of a YAML file."""
 
 
 def problem(error: ValidationError) -> str:
@@ -279,6 +307,7 @@ def problem(error: ValidationError) -> str:
         message = "is missing, expected a value"
     else:
         expectation = first["msg"].removeprefix("Input should be ").removeprefix("Value should be ")
+        expectation = _EXPECTED.get(expectation, expectation)
         message = f"{first['input']!r}, expected {expectation}"
     message = message.removeprefix(f"{place.rpartition('.')[2]}: ")
     return f"{place}: {message}" if place else message
@@ -354,16 +383,46 @@ def _keys(part: Any) -> list[str]:
     return ["kind", *names] if part.kind else names
 
 
-def _known_keys(data: object, names: Iterable[str]) -> Mapping[str, Any]:
-    known = ", ".join(names)
+def _known_keys(data: object, part: Any) -> Mapping[str, Any]:
+    known = ", ".join(names := _keys(part))
     if not isinstance(data, Mapping):
         raise ValueError(f"{reprlib.repr(data)} is not a section, expected keys of {known}")
     for key in data:
         if key not in names:
-            close = get_close_matches(str(key), names, n=1)
+            close = get_close_matches(str(key), names, n=1) or _meaning(str(key), part)
             hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
             raise ValueError(f"unknown key {key!r}, {hint}")
     return data
+
+
+def _meaning(word: str, part: Any) -> list[str]:
+    """Return the setting of which the meaning is a word, such as exposure."""
+    declared = part.declared().items()
+    return [
+        name
+        for name, one in declared
+        if re.match(rf"{re.escape(word)}( time)?[.,:;]", one.meaning, re.I)
+    ]
+
+
+def _check_complete(data: Mapping[str, Any], part: Any) -> None:
+    """Raise a ValidationError with an example if a setting without a default is missing."""
+    known = part.defaults().keys() | data.keys()
+    for name, annotation in part._annotations.items():
+        if name in known:
+            continue
+        error = ValueError(f"is missing, expected {_example(annotation)}")
+        line: Any = {"type": "value_error", "loc": (name,), "input": data, "ctx": {"error": error}}
+        raise ValidationError.from_exception_data(part.__name__, [line])
+
+
+def _example(annotation: Any) -> str:
+    """Return an example of a setting; "a value" if it declares none."""
+    for family in families(annotation):
+        if family.examples:
+            return f"one such as {family.examples.splitlines()[0].strip()}"
+    quantity = _parameter(annotation).quantity
+    return quantity.expected.removeprefix("expected ") if quantity else "a value"
 
 
 def _parameter(annotation: Any) -> Any:

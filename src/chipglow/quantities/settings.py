@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import ValidationError
 
 from chipglow.quantities.parameter import Parameter
-from chipglow.quantities.part import Family, Part, PartType, adapter, first_sentence, problem
+from chipglow.quantities.part import Part, PartType, adapter, families, first_sentence, problem
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def own_settings(part: Part) -> Iterator[Setting]:
             yield Setting(name, kind, str, value, value, value)
             continue
         annotation, default = part._annotations[name], defaults.get(name)
-        examples = next((family.examples for family in _families(annotation)), "")
+        examples = next((family.examples for family in families(annotation)), "")
         of = annotation.__origin__
         yield Setting(name, part.parameter(name), of, value, plain[name], default, examples)
 
@@ -123,14 +123,3 @@ def _with_changes(part: Any, changes: Mapping[str, object], stated: Any = None) 
     for name, one in inner.items():
         data[name] = _with_changes(value_at(part, name), one, data.get(name))
     return tuple(data.values()) if isinstance(part, tuple) else data
-
-
-def _families(annotation: Any) -> Iterator[Family]:
-    if isinstance(annotation, Family):
-        yield annotation
-    else:
-        yield from (
-            family
-            for inner in (*getattr(annotation, "__metadata__", ()), *get_args(annotation))
-            for family in _families(inner)
-        )

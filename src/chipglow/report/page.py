@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from chipglow.drawing.drawing import data_url, png
-from chipglow.quantities.format import quantity_text
+from chipglow.quantities.format import quantity_text, readable
 from chipglow.text.yaml_file import parse_yaml
 
 _IMPORT: Final = '{% from "sentences.txt" import gaussian_widths, main_cause, wings with context %}'
@@ -67,5 +67,5 @@ def _number(value: float, unit: str, decimals: int = 0) -> str:
 
 
 def _shown(text: str) -> Markup:
-    """Escape a text and keep each number on one line with its unit."""
-    return Markup(_BEFORE_UNIT.sub("\u00a0", str(escape(text))))
+    """Escape a text with µm, µs and °C, and keep each number on one line with its unit."""
+    return Markup(_BEFORE_UNIT.sub("\u00a0", str(escape(readable(text)))))

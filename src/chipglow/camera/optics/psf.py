@@ -470,7 +470,7 @@ def _read_array(path: Path) -> Array:
 def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
     """Return kernel with uncertainty components, spacing and `includes`."""
     if not path.is_file():
-        raise FileNotFoundError(ENOENT, "no such file", str(path))
+        raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
         check_own_data(path)
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
