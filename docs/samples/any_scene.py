@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any, Final
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +55,8 @@ def kolsky_bar(folder: Path) -> None:
 
 def brake_disc(folder: Path) -> None:
     """Write a movie of a brake disc with hot spots and a colour scale, as a program exports it."""
+    import av
+
     with av.open(str(folder / "disc.avi"), "w") as movie:
         stream: Any = movie.add_stream("ffv1", rate=20)
         stream.width, stream.height, stream.pix_fmt = 400, 320, "bgr0"
