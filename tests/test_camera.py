@@ -378,6 +378,13 @@ def test_it_is_said_where_the_border_of_the_scene_matters(order):
     assert 0.3 * wrong.max() < most < 3 * wrong.max()
 
 
+@pytest.mark.parametrize(("spacing", "warns"), [(3e-6, False), (4e-6, True)])
+def test_samples_wider_than_half_a_pixel_are_a_warning(spacing, warns):
+    scene = make_scene(np.full((5, 40, 40), 900.0), spacing)
+    measured = Camera(pitch=6e-6, psf=None, integration_time=4 * STEP).measure(scene, BLACK, 0.0)
+    assert any("samples are" in one for one in measured.notes.warnings) == warns
+
+
 @pytest.mark.parametrize("order", ["optics", "detector"])
 def test_nothing_is_said_of_a_border_that_does_not_matter(order):
     temperature = np.full((1, 90, 90), 700.0)

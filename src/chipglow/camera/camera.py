@@ -45,6 +45,9 @@ PAPER_LIMIT: Final = 573.15
 Gather: TypeAlias = Callable[[Array, Raster, Raster, float], Array]
 
 _ROUNDING: Final = 1e-13
+_FEWEST_SAMPLES: Final = 2.0
+"""Samples of the scene in the width of a pixel."""
+
 _SUSPECT_LIMIT: Final = 373.15
 """Lower range limits in K that are probably meant in °C, if round."""
 
@@ -327,6 +330,7 @@ class Camera(Part):
             raise ValueError("camera: at least one exposure, all of the same grid, is required")
         measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
+        warnings |= dict.fromkeys(self._sampling_warning(scene))
         warnings |= dict.fromkeys(self._lag_warning(measured.times))
         warnings |= dict.fromkeys(self._border_warning(np.stack(images), np.stack(similar), scene))
         if warnings:
@@ -468,6 +472,15 @@ class Camera(Part):
     def _generator(self, start: float) -> np.random.Generator:
         """Return the noise generator of the frame with this start time."""
         return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
+
+    def _sampling_warning(self, scene: Raster) -> Iterator[str]:
+        """Yield a warning if the scene's samples are too coarse for blur and footprint."""
+        if self.pitch < _FEWEST_SAMPLES * scene.spacing * (1 - 1e-9):
+            yield (
+                f"The scene's samples are {1e6 * scene.spacing:.3g} µm wide, more than half a "
+                f"pixel of {1e6 * self.pitch:.3g} µm: what changes within a sample is missing, and "
+                "the errors by pixels and blur may be too small."
+            )
 
     def _lag_warning(self, starts: Array) -> Iterator[str]:
         """Yield warnings if lag is modelled but no frame follows another."""
