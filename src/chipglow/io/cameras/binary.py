@@ -92,22 +92,12 @@ def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) ->
 
 
 class CameraFile(ABC):
-    """An open file of a camera: a class that reads its headers when it is made, and adds the rest.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns of a picture.
-    complete : int
-        Number of whole frames.
-    quantity : str
-        The measured quantity.
-    dtype : dtype
-        Type of the samples.
-    """
+    """An open file of a camera: a class reads its headers when it is made and adds the rest."""
 
     shape: tuple[int, int]
+    """Rows and columns of a picture."""
     complete: int
+    """Number of whole frames."""
     quantity: Quantity = "counts"
     dtype: DTypeLike = np.uint16
 

@@ -26,33 +26,21 @@ Read = Callable[[Path, slice | None, float | None], Recording]
 
 @dataclass(frozen=True)
 class CameraFormat:
-    """A format of files.
-
-    Parameters
-    ----------
-    description : str
-        A description.
-    suffixes : tuple of str
-        Endings of such files' names.
-    begins : callable, optional
-        Whether a file is of this format, by its first bytes.
-    read : callable, optional
-        Reads frames of a file that says what was measured: its path, which frames, and the time
-        between frames in s, instead of the file's own, or None. It raises SourceError for a
-        file that is damaged, truncated or of another kind, and OSError for one that is missing or
-        not accessible. Without it the file holds an array, and the user says.
-    in_subprocess : callable
-        Whether libraries in C or C++ would unpack a file: they do so in a subprocess.
-    inside_hdf5 : bool
-        Whether files begin as those of HDF5 may: the ending of the name says which it is.
-    """
+    """A format of files."""
 
     description: str
     suffixes: tuple[str, ...]
+    """Endings of such files' names."""
     begins: Begins | None = None
+    """Whether a file is of this format, by its first bytes."""
     read: Read | None = None
+    """Reads frames of a file that says what was measured: its path, which frames, and the time
+    between frames in s, instead of the file's own, or None. Without it the file holds an array,
+    and the user says."""
     in_subprocess: Callable[[Path], bool] = lambda path: False
+    """Whether libraries in C or C++ would unpack a file: they do so in a subprocess."""
     inside_hdf5: bool = False
+    """Whether files begin as those of HDF5 may: the ending of the name says which it is."""
 
     @property
     def states_quantity(self) -> bool:
