@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import isfinite, prod
+from math import isfinite
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
     FileArray,
-    check_samples,
     open_arrays,
 )
 from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple
@@ -153,8 +152,6 @@ class _Layer:
                 raise SourceError(
                     f"{array}: has {length} samples along {axis}, expected 2 to {MOST_ON_A_SIDE}"
                 )
-        check_samples(f"{array}: a frame", samples)
-        check_samples(f"{array}: a chunk", prod(array.chunks or ()))
         if self.shape[0] < 1:
             raise SourceError(f"{array}: has no frame")
         self._first, self._block = 0, np.empty((0, 0, 0), np.float32)

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.arrays import FileArray, check_samples
+from chipglow.io.sources.arrays import FileArray
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
     OTHER_NAMES,
@@ -14,7 +14,7 @@ from chipglow.io.sources.conventions import (
     match_names,
     simple,
 )
-from chipglow.io.sources.source import SourceError, naming, reading
+from chipglow.io.sources.source import SourceError, naming
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
 
@@ -128,10 +128,7 @@ def coordinate(
 def read_list(axis: str, array: FileArray, own: Unit, notes: Notes) -> NDArray[np.float64]:
     """Return all values of a coordinate in SI; for its unit see `unit_of`."""
     unit = unit_of(axis, str(array), array.unit, own, notes)
-    check_samples(str(array), array.size)
-    with reading(array):
-        raw = array.read((slice(None),) * len(array.shape))
-    values = np.asarray(raw, np.float64).reshape(-1) * unit.scale + unit.offset
+    values = np.asarray(array.part(), np.float64).reshape(-1) * unit.scale + unit.offset
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
         raise SourceError(f"{array}: value {wrong[0]} is {values[wrong[0]]}, expected a number")
@@ -142,9 +139,8 @@ def read_frames(array: FileArray, axes: Sequence[str], frames: slice) -> NDArray
     """Return frames as they are in the file, shape (time, y, x), NaN where a number is missing."""
     lengths = dict(zip(axes, array.shape, strict=True))
     key = tuple(frames if axis == "time" else slice(None) for axis in axes)
-    with reading(array):
-        values = _unpacked(array.read(key), array.attributes)
-        values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
+    values = _unpacked(array.part(key), array.attributes)
+    values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
     values = values if "time" in axes else values[None]
     expected = (len(range(lengths.get("time", 1))[frames]), lengths["y"], lengths["x"])
     if values.shape != expected:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_vtk
-from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
+from chipglow.io.sources.arrays import FileArray, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
 from chipglow.io.sources.lammps_dump import ENDINGS, Snapshot, is_dump, snapshots
 from chipglow.io.sources.source import SourceError, files_of, reading, required
@@ -210,8 +209,7 @@ def _stacked(
     columns = [named[name] for name, depth in depths.items() if depth == 1 + timed]
     if not timed:
         return PointFrames([partial(_of_arrays, path, columns, None)], time_label=label)
-    check_samples(str(named[label]), named[label].size)
-    times = np.asarray(_read(named[label], None), np.float64).reshape(-1)
+    times = np.asarray(named[label].part(), np.float64).reshape(-1)
     for array in columns:
         if array.shape[0] != len(times):
             raise SourceError(
@@ -242,21 +240,19 @@ def _of_arrays(path: str, arrays: Sequence[FileArray], index: int | None) -> Poi
     columns: dict[str, NDArray[Any]] = {}
     units: dict[str, str] = {}
     for array in arrays:
-        parts = _components(array.short, _read(array, index))
+        values = array.part() if index is None else _frame(array, index)
+        parts = _components(array.short, values)
         columns |= parts
         if array.unit:
             units |= dict.fromkeys(parts, array.unit)
     return PointTable(path, columns, units)
 
 
-def _read(array: FileArray, index: int | None) -> NDArray[Any]:
-    """Read an array, or what it contains of a frame."""
-    check_samples(str(array), prod(array.shape if index is None else array.shape[1:]))
-    check_samples(f"{array}: a chunk", prod(array.chunks or ()))
-    first = slice(None) if index is None else slice(index, index + 1)
-    with reading(array):
-        values = array.read((first, *(slice(None),) * (len(array.shape) - 1))[: len(array.shape)])
-    return values if index is None else values[0]
+def _frame(array: FileArray, index: int) -> NDArray[Any]:
+    values: NDArray[Any] = array.part(
+        (slice(index, index + 1), *(slice(None),) * (len(array.shape) - 1))
+    )[0]
+    return values
 
 
 def _components(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
