@@ -3,7 +3,7 @@
 HDF5 ignores what follows its own data, and programs that change a file cut it off.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from hashlib import file_digest, sha256
 from io import FileIO
@@ -105,20 +105,14 @@ def check_file(path: Path) -> None:
     """
     intact = is_intact(path)
     if not intact and h5py.is_hdf5(path):
-        _examine(path, whole=intact is False)
+        patience = PATIENCE + PATIENCE_PER_BYTE * path.stat().st_size
+        Sandbox("HDF5", patience).answer(partial(_read_all, str(path), intact is False))
     if intact is False:
         raise ValueError("the file is damaged: its digest does not match")
     check_own_data(path)
 
 
-def _examine(path: Path, whole: bool) -> None:
-    patience = PATIENCE + PATIENCE_PER_BYTE * path.stat().st_size
-    with Sandbox("HDF5", patience).answers(partial(_read_all, str(path), whole)) as names:
-        for _ in names:
-            pass
-
-
-def _read_all(path: str, whole: bool) -> Iterator[str]:
+def _read_all(path: str, whole: bool) -> None:
     """Read all attributes and places of the data of a file and, if `whole`, its data."""
     with h5py.File(path, "r") as file:
         names = ["/"]
@@ -128,7 +122,6 @@ def _read_all(path: str, whole: bool) -> Iterator[str]:
                 _read(file[name], whole)
             except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
                 raise SourceError(f"{name!r} is damaged: {error}") from None
-    yield "whole"
 
 
 def _read(item: Any, whole: bool) -> None:

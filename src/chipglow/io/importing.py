@@ -9,7 +9,7 @@ from itertools import islice
 from math import ceil, isfinite
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any, Final, TypeAlias
+from typing import Annotated, Any, Final
 
 import numpy as np
 
@@ -80,22 +80,16 @@ class View(Part):
             )
         rows, columns = (max(ceil(side / spacing - 1e-6), 2) for side in (height, width))
         raster = Raster(left, top, spacing, rows, columns)
-        if not _overlap(raster.extent, survey.extent):
+        view, there = raster.extent, survey.extent
+        if not all(max(view[i], there[i]) < min(view[i + 1], there[i + 1]) for i in (0, 2)):
             raise SourceError(
-                f"{survey.kind}: extends over {_metres(survey.extent)}, nothing of which is in "
-                f"view: {_metres(raster.extent)}"
+                f"{survey.kind}: extends over {_metres(there)}, nothing of which is in view: "
+                f"{_metres(view)}"
             )
         return raster
 
 
-Extent: TypeAlias = tuple[float, float, float, float]
-
-
-def _overlap(one: Extent, other: Extent) -> bool:
-    return all(max(one[i], other[i]) < min(one[i + 1], other[i + 1]) for i in (0, 2))
-
-
-def _metres(extent: Extent) -> str:
+def _metres(extent: tuple[float, float, float, float]) -> str:
     left, right, bottom, top = extent
     return f"x {left:.4g} to {right:.4g} m, y {bottom:.4g} to {top:.4g} m"
 
@@ -297,18 +291,11 @@ def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
             f"temperature: {survey.found['temperature']} has no number in the frames that were "
             "looked at, expected some"
         )
-    if highest < COLDEST or (lowest < COLDEST and _holds_all(raster, survey)):
+    view, there = np.reshape(raster.extent, (2, 2)), np.reshape(survey.extent, (2, 2))
+    beyond = (there - view) * (-1, 1) > 1e-6 * raster.spacing
+    if highest < COLDEST or (lowest < COLDEST and not beyond.any()):
         worst = highest if highest < COLDEST else lowest
-        place = f"in {survey.found['temperature']}"
-        raise _not_kelvin(wanted, worst, place)
-
-
-def _holds_all(raster: Raster, survey: Survey) -> bool:
-    outer, inner = raster.extent, survey.extent
-    within = 1e-6 * raster.spacing
-    return all(
-        outer[i] <= inner[i] + within and outer[i + 1] >= inner[i + 1] - within for i in (0, 2)
-    )
+        raise _not_kelvin(wanted, worst, f"in {survey.found['temperature']}")
 
 
 def _doubtful_size(survey: Survey) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Formats of cameras' files: which they are, how they are recognised, and who reads them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -52,11 +52,6 @@ def _starts(*beginnings: bytes) -> Begins:
     return lambda head: head.startswith(beginnings)
 
 
-def _is_hcc(head: bytes) -> bool:
-    """Return whether a file begins with TC and a version that is not a letter."""
-    return head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32
-
-
 _array: Final = partial(CameraFormat, in_subprocess=lambda path: True)
 _hdf5: Final = partial(_array, inside_hdf5=True)
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
@@ -74,7 +69,12 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "ptw": CameraFormat(
         "FLIR PTW (Cedip, Altair)", (".ptw",), _starts(b"CED", b"AIO"), Ptw.recording
     ),
-    "hcc": CameraFormat("Telops HCC", (".hcc",), _is_hcc, Hcc.recording),
+    "hcc": CameraFormat(
+        "Telops HCC",
+        (".hcc",),
+        lambda head: head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32,
+        Hcc.recording,
+    ),
     "cine": CameraFormat("Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording),
     "tiff": _array("TIFF, a stack or one file per frame", (".tif", ".tiff"), _starts(*_TIFF)),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
@@ -178,13 +178,9 @@ def read_recording(
         )
     if not one.in_subprocess(path):
         return read_here(path, kind, frames, stated)
-    with Sandbox(str(path)).answers(partial(_answer, path, kind, frames, stated)) as answers:
-        recording: Recording = next(answers)
-        return recording
-
-
-def _answer(path: Path, kind: str, frames: slice | None, stated: Stated) -> Iterator[Recording]:
-    yield read_here(path, kind, frames, stated)
+    read = partial(read_here, path, kind, frames, stated)
+    recording: Recording = Sandbox(str(path)).answer(read)
+    return recording
 
 
 def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:

@@ -172,7 +172,10 @@ def _npz(path: Path, stack: ExitStack) -> Iterator[FileArray]:
         if not info.filename.endswith(".npy"):
             continue
         with archive.open(info) as stream:
-            shape, dtype = _npy_header(stream)
+            first = np.lib.format.read_magic(stream) == (1, 0)
+            header = np.lib.format
+            read_header = header.read_array_header_1_0 if first else header.read_array_header_2_0
+            shape, _, dtype = read_header(stream)
         if prod(shape) * dtype.itemsize > info.file_size:
             raise SourceError(
                 f"{path}: {info.filename} states shape {shape}, but has {info.file_size} bytes"
@@ -180,13 +183,6 @@ def _npz(path: Path, stack: ExitStack) -> Iterator[FileArray]:
         load = partial(_read_member, archive, info.filename)
         read = _from_whole(f"{path}: {info.filename}", prod(shape), load)
         yield from _numpy_arrays(info.filename[:-4], dtype, shape, read)
-
-
-def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    first = np.lib.format.read_magic(stream) == (1, 0)
-    read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
-    return shape, dtype
 
 
 def _read_member(archive: ZipFile, member: str) -> NDArray[Any]:
@@ -431,16 +427,12 @@ def _codecs(metadata: Mapping[str, Any]) -> Iterator[str]:
 # Text
 
 
-def _csv(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    yield _matrix(path, 0)
-
-
 def exported_table(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     """Read a matrix behind lines of text, as cameras' programs export it; an `ArrayReader`."""
-    yield _matrix(path, lines_of_text(path))
+    return _csv(path, stack, lines_of_text(path))
 
 
-def _matrix(path: Path, skipped: int) -> FileArray:
+def _csv(path: Path, stack: ExitStack, skipped: int = 0) -> Iterator[FileArray]:
     table = TextTable.look_at(path, skipped).read(header=None, skiprows=skipped)
     for column, kind in enumerate(table.dtypes):
         if kind.kind not in _KINDS:
@@ -450,7 +442,7 @@ def _matrix(path: Path, skipped: int) -> FileArray:
             )
     values = table.to_numpy(np.float32)
     attributes = {"lines_of_text": skipped}
-    return FileArray("", values.shape, lambda key: values[key], attributes=attributes)
+    yield FileArray("", values.shape, lambda key: values[key], attributes=attributes)
 
 
 ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {

@@ -264,16 +264,13 @@ class Meshes:
             for name in sizes
             if simple(name) in ("displacement", "u") and name not in self.found.values()
         ]
-        if moving and self._source.displacement is None and not self._is_exodus:
+        # The reader of Exodus adds the displacement by itself.
+        by_reader = mesh_vtk.kind_of(self._source.files) == "Exodus II"
+        if moving and self._source.displacement is None and not by_reader:
             sentences.append(f"Positions are taken from the file; {moving[0]} is not added.")
         if not self._source.tool_parts:
             sentences.append("No part is named as tool: all elements are workpiece.")
         return sentences
-
-    @property
-    def _is_exodus(self) -> bool:
-        """Its reader adds the displacement by itself."""
-        return mesh_vtk.kind_of(self._source.files) == "Exodus II"
 
     def remarks(self) -> list[str]:
         """Describe blocks without a temperature, and missing values in the first and last mesh."""

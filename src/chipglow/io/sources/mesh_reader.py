@@ -84,9 +84,7 @@ def grid_of(
 
 def offsets_of(grid: Any) -> NDArray[np.int64]:
     """Return where the nodes of each element begin, and where those of the last one end."""
-    # PyVista gave it another name in 0.49.
-    offsets = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset
-    return np.asarray(offsets, np.int64)
+    return np.asarray(grid.cell_offsets, np.int64)
 
 
 def check_grid(file: Path, grid: Any) -> None:

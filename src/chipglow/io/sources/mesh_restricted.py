@@ -107,18 +107,13 @@ def _fields_by_block(ours: str, frames: Frames, names: Sequence[str]) -> dict[An
 def _has_values(frames: Frames, block: Block, name: str) -> bool:
     """Return whether most values of a block are not 0 in the first or last frame."""
     same = [other.grid for frame in frames for other in frame if other.names == block.names]
-    blank = [
-        _is_blank(data[name])
+    fields = [
+        np.nan_to_num(np.asarray(data[name], np.float64), posinf=0.0, neginf=0.0)
         for grid in same
         for data in (grid.point_data, grid.cell_data)
         if name in data and grid.n_cells
     ]
-    return any(values.mean() <= _LARGEST_BLANK_FRACTION for values in blank)
-
-
-def _is_blank(values: Any) -> NDArray[np.bool_]:
-    numbers = np.asarray(values, np.float64)
-    return np.asarray(~np.isfinite(numbers) | (numbers == 0.0))
+    return any((values == 0.0).mean() <= _LARGEST_BLANK_FRACTION for values in fields)
 
 
 def _elements_at_nodes(blocks: Sequence[Block]) -> "pd.Series[int]":

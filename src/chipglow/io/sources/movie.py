@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, ValidationInfo
+from pydantic import AfterValidator
 
 from chipglow.io.sources.colour_scale import (
     ColourScale,
@@ -62,12 +62,10 @@ _LOWEST: Final = 0.02
 """Fraction of a scale up to which a colour at the border is taken for its lowest value."""
 
 
-def _text_of_file(value: str | float, info: ValidationInfo) -> str | float:
-    """Return a number of a file as text: it may lack its unit. Python's numbers are in SI."""
-    return str(value) if info.context else value
-
-
-_Value = Annotated[str | int | float, AfterValidator(_text_of_file)]
+# A number of a file is text, which may lack its unit; Python's numbers are in SI.
+_Value = Annotated[
+    str | int | float, AfterValidator(lambda value, info: str(value) if info.context else value)
+]
 
 
 @dataclass(frozen=True)

@@ -58,10 +58,6 @@ class _Zone:
     columns: list[NDArray[Any] | None] = field(default_factory=list)
     cells: NDArray[Any] | None = None
 
-    @property
-    def is_empty(self) -> bool:
-        return not prod(self.shape) or (self.kind != ORDERED and not self.elements)
-
     def stored_shape(self, ghosts: bool) -> tuple[int, int, int]:
         """Return how values of elements of an ordered zone are stored along i, j and k."""
         # The guide has as many as points, TecIO leaves out the last ones along the slowest index.
@@ -101,7 +97,7 @@ def binary_zones(file: Path) -> tuple[Zone, ...]:
             partial(_block, file, number, names, zone, ghosts),
         )
         for number, zone in enumerate(zones, start=1)
-        if not zone.is_empty
+        if prod(zone.shape) and (zone.kind == ORDERED or zone.elements)
     )
 
 
@@ -206,7 +202,8 @@ def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Zone]:
         elif marker == _GEOMETRY:
             _skip_geometry(cursor)
         elif marker == _TEXT:
-            _skip_text(cursor)
+            cursor.take("iidddiididdiiddiii")
+            _skip_remark(cursor)
         elif marker == _LABELS:
             for _ in range(cursor.integer()):
                 cursor.text()
@@ -278,11 +275,6 @@ def _skip_geometry(cursor: _Cursor) -> None:
         return
     for _ in range(cursor.integer()):
         cursor.skip(kind, cursor.integer() * (3 if system == _GRID_3D else 2))
-
-
-def _skip_text(cursor: _Cursor) -> None:
-    cursor.take("iidddiididdiiddiii")
-    _skip_remark(cursor)
 
 
 def _locate(cursor: _Cursor, names: Sequence[str], zones: Sequence[_Zone], ghosts: bool) -> None:
