@@ -179,14 +179,8 @@ def import_scene(
     fields = completion.fields(survey.found, len(survey.times))
     key = _key(wanted, looked)
     done = len(resume.frames()[0]) if resume else 0
-    with SceneWriter(
-        path,
-        raster,
-        completion.tool,
-        _attributes(key, looked),
-        fields,
-        resume=resume,
-    ) as writer:
+    attributes = _attributes(key, looked)
+    with SceneWriter(path, raster, completion.tool, attributes, fields, resume=resume) as writer:
         kept = f"{done} frames are kept" if done else ""
         due = monotonic() + _CHECKPOINT_INTERVAL
         try:

@@ -43,15 +43,11 @@ def find_legend(picture: Picture) -> Box | None:
     if best is None:
         return None
     # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
-    left, top, right, bottom = best
-    within = [
-        box
-        for box in boxes
-        if 0 <= box[0] - left <= _BLUR
-        and 0 <= box[1] - top <= _BLUR
-        and 0 <= right - box[2] <= _BLUR
-        and 0 <= bottom - box[3] <= _BLUR
-    ]
+    within = []
+    for box in boxes:
+        inward = np.subtract(box, best) * (1, 1, -1, -1)
+        if ((inward >= 0) & (inward <= _BLUR)).all():
+            within.append(box)
     return _extended(picture, min(within, key=lambda box: (box[2] - box[0]) * (box[3] - box[1])))
 
 
