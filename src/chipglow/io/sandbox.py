@@ -48,11 +48,7 @@ class Sandbox:
 
     @contextmanager
     def answers(self, job: Job) -> Iterator[Iterator[Any]]:
-        """Yield an iterator of the answers of a job; its process ends with the block.
-
-        The iterator raises SourceError if a file cannot be read, the process ends before it has
-        answered or takes too long, and FileNotFoundError if a file is missing.
-        """
+        """Yield an iterator of the answers of a job; its process ends with the block."""
         request = pickle.dumps((job, self.name, self.memory))
         with subprocess.Popen(
             [sys.executable, *_CHILD],

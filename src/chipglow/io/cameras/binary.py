@@ -137,10 +137,7 @@ class CameraFile(ABC):
             )
 
     def stamped(self, chosen: range, stamps: Array | None, rate: float) -> Array:
-        """Return stamps in s after the first frame, or times by a frame rate in Hz.
-
-        The rate is used where the stamps do not ascend; it is 0 if it is not known.
-        """
+        """Return stamps in s after the first frame if they ascend, or times by a rate in Hz."""
         if stamps is not None:
             steps = np.diff(stamps) * np.sign(chosen.step)
             if np.isfinite(stamps).all() and (steps > 0).all():

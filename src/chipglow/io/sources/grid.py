@@ -284,11 +284,7 @@ class _Grid:
         return check_times(str(array), read_list("time", array, source.units.time, self.notes))
 
     def check_ends(self) -> tuple[float, float] | None:
-        """Return the smallest and the largest temperature of the first and the last frame.
-
-        Errors in these are so found before all are read. Others are read until one has a
-        temperature.
-        """
+        """Return the range of temperature of the first and the last frame, or of one that has any."""
         last = len(self.times) - 1
         found: list[float] = []
         for index in dict.fromkeys((0, last, *range(last))):

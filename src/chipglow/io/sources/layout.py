@@ -29,10 +29,7 @@ _LARGEST_UNEVENNESS: Final = 0.05
 def find_fields(
     arrays: Mapping[str, FileArray], given: Mapping[str, str], known: Sequence[str], notes: Notes
 ) -> dict[str, FileArray]:
-    """Return a file's arrays by fields: those given, and guesses for those known.
-
-    If the file has only one array, it is the first field of those known.
-    """
+    """Return arrays by fields: those given, and guesses; a file's only array is the first known."""
     path = next(iter(arrays.values())).path
     if "velocity" in given:
         raise SourceError(f"{path}: velocity needs velocity_x and velocity_y, an array each")

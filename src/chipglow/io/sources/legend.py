@@ -121,10 +121,7 @@ def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
 
 
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
-    """Return colours along a legend, from its bottom or left end, shape (n, 3).
-
-    They are medians across its centre; where its ends are blurred, the colour next to them.
-    """
+    """Return medians of the colours along a legend, from its bottom or left end, shape (n, 3)."""
     left, top, right, bottom = box
     rows, columns = picture.shape[:2]
     if not (0 <= left < right <= columns and 0 <= top < bottom <= rows):

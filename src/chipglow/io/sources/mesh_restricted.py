@@ -32,10 +32,7 @@ _LARGEST_BLANK_FRACTION: Final = 0.5
 
 
 def restricted_fields(frames: Frames, given: Mapping[str, str]) -> dict[str, BlockFields]:
-    """Return the fields that differ from block to block in the first and the last frame.
-
-    They are by the names of a scene, some of which the user gave.
-    """
+    """Return the fields, by the names of a scene, that differ from block to block."""
     blocks = frames[0]
     scalars = [name for name, size in fields_of(blocks).items() if size == 1]
     found: dict[str, BlockFields] = {}

@@ -247,10 +247,7 @@ class MovieSource(Source, Part):
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the pictures: means of values, not of colours; see `Source.frames`.
-
-        A tool that is known by its colour has no values.
-        """
+        """Sample the pictures: means of values, not of colours; see `Source.frames`."""
         indices, readers, _ = self._opened
         index = indices["temperature"]
         times, _ = self._times(index)

@@ -81,11 +81,7 @@ class FieldReader:
                     )
 
     def read(self, picture: Picture) -> FieldPicture:
-        """Return values, material and quality of a picture.
-
-        Pixels of lines and text take the material and the value of the nearest pixel
-        that shows them; in the tool, of the nearest one in the tool.
-        """
+        """Return a picture's contents; pixels of lines and text take those of the nearest pixel."""
         values, distance = self.scale.invert(picture)
         void, tool = self._marked(picture, distance)
         off_scale = (distance > self.limit) & ~void & ~tool
