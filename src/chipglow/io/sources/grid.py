@@ -9,12 +9,7 @@ from typing import Annotated, Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.arrays import (
-    ARRAY_READERS,
-    MOST_ON_A_SIDE,
-    FileArray,
-    open_arrays,
-)
+from chipglow.io.sources.arrays import ARRAY_READERS, MOST_ON_A_SIDE, FileArray, open_arrays
 from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple
 from chipglow.io.sources.layout import (
     AXES,
@@ -28,14 +23,7 @@ from chipglow.io.sources.layout import (
     read_list,
     unit_of,
 )
-from chipglow.io.sources.source import (
-    Source,
-    SourceError,
-    Survey,
-    even_times,
-    extent_of,
-    span_of,
-)
+from chipglow.io.sources.source import Source, SourceError, Survey, even_times, extent_of, span_of
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
@@ -284,7 +272,7 @@ class _Grid:
         return check_times(str(array), read_list("time", array, source.units.time, self.notes))
 
     def check_ends(self) -> tuple[float, float] | None:
-        """Return the range of temperature of the first and the last frame, or of one that has any."""
+        """Return the range of temperature of the first and the last frame, or of one with any."""
         last = len(self.times) - 1
         found: list[float] = []
         for index in dict.fromkeys((0, last, *range(last))):

@@ -7,13 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import FileArray
-from chipglow.io.sources.conventions import (
-    COMMON_NAMES,
-    OTHER_NAMES,
-    SI_UNITS,
-    match_names,
-    simple,
-)
+from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, SI_UNITS, match_names, simple
 from chipglow.io.sources.source import SourceError, naming
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
