@@ -13,8 +13,14 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
 from chipglow.io.sources.source import SourceError, naming
-from chipglow.io.sources.tecplot_binary import MAGIC, binary_zones
-from chipglow.io.sources.tecplot_zone import ELEMENTS, ORDERED, Zone, block_of
+from chipglow.io.sources.tecplot_binary import (
+    ELEMENTS,
+    MAGIC,
+    ORDERED,
+    Zone,
+    binary_zones,
+    block_of,
+)
 
 ENDINGS: Final = (".dat", ".tec", ".plt")
 
