@@ -119,7 +119,11 @@ class Prospect:
 def prospect(wanted: Import) -> Prospect:
     """Look at a source and find out what a scene of it would be."""
     survey = wanted.source.survey()
-    _check_times(survey)
+    if survey.times.size == 0:
+        raise SourceError(f"{survey.kind}: has no frame, expected 1 or more")
+    if not np.isfinite(survey.times).all():
+        raise SourceError(f"{survey.kind}: its times are not finite")
+    check_times(survey.kind, survey.times)
     if "temperature" not in survey.found:
         listed = ", ".join(survey.unused) or "none"
         raise SourceError(
@@ -128,8 +132,11 @@ def prospect(wanted: Import) -> Prospect:
         )
     raster = wanted.view.raster(survey)
     _check_temperatures(wanted, survey, raster)
+    left, right, bottom, top = survey.extent
+    size = max(right - left, top - bottom)
+    doubt = f"The source is {size:.3g} m large by units.length; a chip is about 1 mm."
     assumed = [
-        *_doubtful_size(survey),
+        *([] if _SMALLEST <= size <= _LARGEST else [doubt]),
         *(text for name, text in wanted.assumptions.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
@@ -292,22 +299,7 @@ def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
         raise _not_kelvin(wanted, worst, f"in {survey.found['temperature']}")
 
 
-def _doubtful_size(survey: Survey) -> tuple[str, ...]:
-    """Return a sentence if the source is larger or smaller than a microscope's field of view."""
-    left, right, bottom, top = survey.extent
-    size = max(right - left, top - bottom)
-    if _SMALLEST <= size <= _LARGEST:
-        return ()
-    return (f"The source is {size:.3g} m large by units.length; a chip is about 1 mm.",)
-
-
-def _check_times(survey: Survey) -> None:
-    times = survey.times
-    if times.size == 0:
-        raise SourceError(f"{survey.kind}: has no frame, expected 1 or more")
-    if not np.isfinite(times).all():
-        raise SourceError(f"{survey.kind}: its times are not finite")
-    check_times(survey.kind, times)
+_SMALLEST, _LARGEST = 5e-6, 0.05
 
 
 def _key(wanted: Import, looked: Prospect) -> str:

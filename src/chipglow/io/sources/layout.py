@@ -59,7 +59,10 @@ def _short_names(labels: Collection[str]) -> dict[str, str]:
 def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tuple[str, ...]:
     """Return the axes of an array in their order: ``y``, ``x`` and possibly ``time``."""
     shape = array.shape
-    names = tuple(_axis(dim) for dim in array.dims)
+    names = tuple(
+        next((axis for axis in COORDINATES if simple(dim) in OTHER_NAMES[axis]), "")
+        for dim in array.dims
+    )
     if given is not None:
         names = tuple(given)
     elif sorted(names) not in (sorted(AXES), ["x", "y"]):
@@ -70,10 +73,6 @@ def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tupl
             f"{array}: has shape {shape}, expected the axes {', '.join(given or AXES)}"
         )
     return names
-
-
-def _axis(dim: str) -> str:
-    return next((axis for axis in COORDINATES if simple(dim) in OTHER_NAMES[axis]), "")
 
 
 def unit_of(name: str, label: str, text: str | None, own: Unit, notes: Notes) -> Unit:

@@ -96,8 +96,10 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     paths = files_of(pattern)
     path, suffix = paths[0], paths[0].suffix.lower()
     _check_empty(path)
-    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES) and _is_dump(path):
-        return _dumps(paths)
+    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES):
+        with path.open("rb") as stream:
+            if stream.read(len(_ITEM)) == _ITEM:
+                return _dumps(paths)
     if len(paths) == 1 and suffix in TEXT_SUFFIXES:
         return _split(_read_text(path), time)
     if len(paths) == 1 and suffix not in VTK_SUFFIXES:
@@ -238,19 +240,13 @@ def _of_arrays(path: str, arrays: Sequence[FileArray], index: int | None) -> Poi
     columns: dict[str, NDArray[Any]] = {}
     units: dict[str, str] = {}
     for array in arrays:
-        values = array.part() if index is None else _frame(array, index)
-        parts = _components(array.short, values)
+        frames = slice(index, None if index is None else index + 1)
+        values = array.part((frames, *(slice(None),) * len(array.shape[1:])))
+        parts = _components(array.short, values if index is None else values[0])
         columns |= parts
         if array.unit:
             units |= dict.fromkeys(parts, array.unit)
     return PointTable(path, columns, units)
-
-
-def _frame(array: FileArray, index: int) -> NDArray[Any]:
-    values: NDArray[Any] = array.part(
-        (slice(index, index + 1), *(slice(None),) * (len(array.shape) - 1))
-    )[0]
-    return values
 
 
 def _components(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
@@ -335,12 +331,6 @@ def _dumps(paths: Sequence[Path]) -> PointFrames:
     times = np.array(known) if known and len(known) == len(found) else None
     unit = found[0].units.get("time") if found else None
     return PointFrames([snapshot.table for snapshot in found], times, unit)
-
-
-def _is_dump(path: Path) -> bool:
-    """Return whether a file begins as a dump of LAMMPS in text does."""
-    with path.open("rb") as stream:
-        return stream.read(len(_ITEM)) == _ITEM
 
 
 def _mapped(path: Path) -> mmap:
