@@ -7,16 +7,13 @@ divided by the number of all elements there.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import COMMON_NAMES, match_names, simple
 from chipglow.io.sources.mesh_reader import Block, fields_of, offsets_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Frames: TypeAlias = Sequence[Sequence[Block]]
 BlockFields: TypeAlias = Mapping[tuple[str, ...], str | None]
@@ -59,12 +56,13 @@ def with_own_fields(
 ) -> tuple[Block, ...]:
     """Return blocks with the fields that they have, under the names of those put together."""
     numbered = all(NODE_NUMBER in block.grid.point_data for block in blocks)
-    counts = _elements_at_nodes(blocks) if numbered and restricted else None
-    return tuple(_with_own(block, restricted, counts) for block in blocks)
+    counts = _elements_at_nodes(blocks) if numbered and restricted else [None] * len(blocks)
+    pairs = zip(blocks, counts, strict=True)
+    return tuple(_with_own(block, restricted, count) for block, count in pairs)
 
 
 def _with_own(
-    block: Block, restricted: Mapping[str, BlockFields], counts: "pd.Series[int] | None"
+    block: Block, restricted: Mapping[str, BlockFields], count: NDArray[Any] | None
 ) -> Block:
     grid = block.grid.copy(deep=False)
     for fields in restricted.values():
@@ -76,7 +74,7 @@ def _with_own(
                 del data[name]
             if values is not None:
                 of_nodes = data.association == grid.point_data.association
-                data[label] = _undivided(grid, values, counts) if of_nodes else values
+                data[label] = _undivided(grid, values, count) if of_nodes else values
     if NODE_NUMBER in grid.point_data:
         del grid.point_data[NODE_NUMBER]
     return replace(block, grid=grid)
@@ -113,21 +111,17 @@ def _has_values(frames: Frames, block: Block, name: str) -> bool:
     return any((values == 0.0).mean() <= _LARGEST_BLANK_FRACTION for values in fields)
 
 
-def _elements_at_nodes(blocks: Sequence[Block]) -> "pd.Series[int]":
-    """Return how many elements of all blocks are at each node, by the node's number."""
-    import pandas as pd
-
-    counts = [
-        pd.Series(
-            np.bincount(np.asarray(block.grid.cell_connectivity), minlength=block.grid.n_points),
-            np.asarray(block.grid.point_data[NODE_NUMBER]),
-        )
-        for block in blocks
-    ]
-    return pd.concat(counts).groupby(level=0).sum()
+def _elements_at_nodes(blocks: Sequence[Block]) -> list[NDArray[Any]]:
+    """Return how many elements of all blocks are at each node of each block."""
+    grids = [block.grid for block in blocks]
+    own = [np.bincount(grid.cell_connectivity, minlength=grid.n_points) for grid in grids]
+    numbers = np.concatenate([grid.point_data[NODE_NUMBER] for grid in grids])
+    _, at = np.unique(numbers, return_inverse=True)
+    together = np.bincount(at, np.concatenate(own))[at]
+    return np.split(together, np.cumsum([grid.n_points for grid in grids])[:-1])
 
 
-def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None") -> NDArray[Any]:
+def _undivided(grid: Any, values: NDArray[Any], count: NDArray[Any] | None) -> NDArray[Any]:
     """Return a block's values at its nodes, those that MOOSE divided restored.
 
     At a node that blocks share the restored value is taken if it is nearer to the mean of the
@@ -136,14 +130,13 @@ def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None")
     from scipy.sparse import csr_array
 
     values = np.array(values, np.float64)
-    if counts is None:
+    if count is None:
         return values
     nodes = np.asarray(grid.cell_connectivity)
     shape = (grid.n_cells, grid.n_points)
     incidence = csr_array((np.ones(len(nodes)), nodes, offsets_of(grid)), shape=shape)
     own = np.asarray(incidence.sum(axis=0))
-    everywhere = counts.loc[np.asarray(grid.point_data[NODE_NUMBER])].to_numpy()
-    factors = everywhere / np.maximum(own, 1.0)
+    factors = count / np.maximum(own, 1.0)
     free = (factors <= 1.0).astype(np.float64)
     sums, number = (incidence.T @ (incidence @ of) for of in (np.where(free, values, 0.0), free))
     with np.errstate(invalid="ignore", divide="ignore"):
