@@ -56,13 +56,13 @@ def with_own_fields(
 ) -> tuple[Block, ...]:
     """Return blocks with the fields that they have, under the names of those put together."""
     numbered = all(NODE_NUMBER in block.grid.point_data for block in blocks)
-    counts = _elements_at_nodes(blocks) if numbered and restricted else [None] * len(blocks)
-    pairs = zip(blocks, counts, strict=True)
-    return tuple(_with_own(block, restricted, count) for block, count in pairs)
+    factors = _divisors(blocks) if numbered and restricted else [None] * len(blocks)
+    pairs = zip(blocks, factors, strict=True)
+    return tuple(_with_own(block, restricted, of_block) for block, of_block in pairs)
 
 
 def _with_own(
-    block: Block, restricted: Mapping[str, BlockFields], count: NDArray[Any] | None
+    block: Block, restricted: Mapping[str, BlockFields], factors: NDArray[Any] | None
 ) -> Block:
     grid = block.grid.copy(deep=False)
     for fields in restricted.values():
@@ -74,7 +74,7 @@ def _with_own(
                 del data[name]
             if values is not None:
                 of_nodes = data.association == grid.point_data.association
-                data[label] = _undivided(grid, values, count) if of_nodes else values
+                data[label] = _undivided(grid, values, factors) if of_nodes else values
     if NODE_NUMBER in grid.point_data:
         del grid.point_data[NODE_NUMBER]
     return replace(block, grid=grid)
@@ -111,17 +111,17 @@ def _has_values(frames: Frames, block: Block, name: str) -> bool:
     return any((values == 0.0).mean() <= _LARGEST_BLANK_FRACTION for values in fields)
 
 
-def _elements_at_nodes(blocks: Sequence[Block]) -> list[NDArray[Any]]:
-    """Return how many elements of all blocks are at each node of each block."""
+def _divisors(blocks: Sequence[Block]) -> list[NDArray[Any]]:
+    """Return how many times as many elements all blocks have at each node as its own block has."""
     grids = [block.grid for block in blocks]
-    own = [np.bincount(grid.cell_connectivity, minlength=grid.n_points) for grid in grids]
+    of_blocks = [np.bincount(grid.cell_connectivity, minlength=grid.n_points) for grid in grids]
     numbers = np.concatenate([grid.point_data[NODE_NUMBER] for grid in grids])
-    _, at = np.unique(numbers, return_inverse=True)
-    together = np.bincount(at, np.concatenate(own))[at]
-    return np.split(together, np.cumsum([grid.n_points for grid in grids])[:-1])
+    own, (_, at) = np.concatenate(of_blocks), np.unique(numbers, return_inverse=True)
+    factors = np.bincount(at, own)[at] / np.maximum(own, 1)
+    return np.split(factors, np.cumsum([grid.n_points for grid in grids])[:-1])
 
 
-def _undivided(grid: Any, values: NDArray[Any], count: NDArray[Any] | None) -> NDArray[Any]:
+def _undivided(grid: Any, values: NDArray[Any], factors: NDArray[Any] | None) -> NDArray[Any]:
     """Return a block's values at its nodes, those that MOOSE divided restored.
 
     At a node that blocks share the restored value is taken if it is nearer to the mean of the
@@ -130,13 +130,11 @@ def _undivided(grid: Any, values: NDArray[Any], count: NDArray[Any] | None) -> N
     from scipy.sparse import csr_array
 
     values = np.array(values, np.float64)
-    if count is None:
+    if factors is None:
         return values
     nodes = np.asarray(grid.cell_connectivity)
     shape = (grid.n_cells, grid.n_points)
     incidence = csr_array((np.ones(len(nodes)), nodes, offsets_of(grid)), shape=shape)
-    own = np.asarray(incidence.sum(axis=0))
-    factors = count / np.maximum(own, 1.0)
     free = (factors <= 1.0).astype(np.float64)
     sums, number = (incidence.T @ (incidence @ of) for of in (np.where(free, values, 0.0), free))
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -275,20 +275,18 @@ class MovieSource(Source, Part):
         for name, reader in readers.items():
             last = indices[name].count - 1
             numbers = sorted({0, last // 2, last})
-            values, distance, lines = [], [], []
-            for number, picture in zip(
-                numbers, pictures(self._path(name), indices[name], numbers), strict=True
-            ):
-                read = self._read(name, reader, picture, number)
-                values.append(read.values[read.seen])
-                distance.append(read.distance[read.seen])
-                lines.append(reader.error_of_filling(read))
+            shown = pictures(self._path(name), indices[name], numbers)
+            reads = [
+                self._read(name, reader, picture, number)
+                for number, picture in zip(numbers, shown, strict=True)
+            ]
+            values = np.concatenate([read.values[read.seen] for read in reads])
+            distance = np.concatenate([read.distance[read.seen] for read in reads])
+            movie = self._movies[name]
             result[name] = replace(
-                colour_uncertainty(reader.scale, np.concatenate(values), np.concatenate(distance)),
-                legend=_uncertainty_of_legend(
-                    self._movies[name], reader.legend, self._movies[name].ends(name)
-                ),
-                lines=sqrt(fmean(error**2 for error in lines)),
+                colour_uncertainty(reader.scale, values, distance),
+                legend=_uncertainty_of_legend(movie, reader.legend, movie.ends(name)),
+                lines=sqrt(fmean(reader.error_of_filling(read) ** 2 for read in reads)),
             )
         return result
 
