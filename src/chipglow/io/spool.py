@@ -73,7 +73,6 @@ class Spool:
     ends: list[int] = field(default_factory=list)
 
     def append(self, time: float, chunks: Iterable[bytes]) -> None:
-        """Write the chunks of a frame."""
         for chunk in chunks:
             self.file.write(chunk)
             self.ends.append(self.file.tell())

@@ -35,7 +35,6 @@ class Binary:
     size: int
 
     def read(self, start: int, count: int) -> bytes:
-        """Return bytes from a place."""
         if not (start >= 0 and count >= 0 and start + count <= self.size):
             raise CutShortError(
                 f"{self.path}: is truncated or damaged, bytes {start} to {start + count} are "

@@ -63,7 +63,6 @@ class FileArray:
 
     @property
     def unit(self) -> str | None:
-        """Unit that the file states."""
         unit = self.attributes.get("units")
         return unit if isinstance(unit, str) else None
 

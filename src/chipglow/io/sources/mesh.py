@@ -141,7 +141,6 @@ class Meshes:
         """The file's fields by the names of a scene; a vector of velocity is both components."""
 
     def read(self, number: int) -> tuple[Block, ...]:
-        """Return the mesh of a frame."""
         return with_own_fields(self._read(number), self._restricted)
 
     def _read(self, number: int) -> list[Block]:
@@ -237,7 +236,6 @@ class Meshes:
         return tool
 
     def times(self, notes: Notes) -> NDArray[np.float64]:
-        """Return the times of the frames in s."""
         source, count = self._source, self.reader.count
         if source.times:
             if len(source.times) != count:
@@ -251,7 +249,6 @@ class Meshes:
         return even_times(count, source.interval, notes)
 
     def assumptions(self) -> list[str]:
-        """Return the assumptions about the first mesh."""
         sizes, sentences = fields_of(self.ends[0]), []
         for ours, theirs in self.found.items():
             if ours not in _COMPONENTS and sizes[theirs] > 1:

@@ -52,7 +52,6 @@ class PointTable:
 
     @property
     def count(self) -> int:
-        """Number of points."""
         return len(next(iter(self.columns.values()), ()))
 
     def check(self) -> None:
@@ -281,9 +280,7 @@ class _Snapshot:
     rows: slice
     """Bytes of the lines of its atoms."""
     count: int
-    """Number of atoms."""
     labels: tuple[str, ...]
-    """Names of the columns."""
     box: NDArray[np.float64]
     """Lowest and highest place along x, y and z, shape (3, 2)."""
     tilted: bool
