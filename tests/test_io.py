@@ -149,18 +149,14 @@ def test_frames_are_chunks_and_are_read_lazily(tmp_path):
 )
 def test_any_scene_comes_back(tmp_path, temperature, strain, speed, position):
     raster = Raster(0.0, 0.0, 1e-6, 2, 3)
-    frame = Frame(
-        time=1e-6,
-        temperature=temperature,
-        plastic_strain=strain,
-        plastic_strain_rate=strain * np.float32(1e4),
-        velocity_x=speed,
-        velocity_y=-speed,
-        material=np.ones((2, 3), dtype=np.uint8),
-        material_x=position,
-        material_y=-position,
-    )
-    path = tmp_path / "any.nc"
+    fields = {
+        "temperature": temperature,
+        "plastic_strain": strain,
+        "plastic_strain_rate": strain * np.float32(1e4),
+        **{"velocity_x": speed, "velocity_y": -speed},
+        **{"material_x": position, "material_y": -position},
+    }
+    frame, path = a_frame(1e-6, raster=raster, **fields), tmp_path / "any.nc"
     with SceneWriter(path, raster) as writer:
         writer.append(frame)
     # Below float32's least normal value, 1e-38, rounding is no longer relative.
