@@ -83,19 +83,16 @@ def test_a_file_of_another_program_is_read_and_its_damage_named(tmp_path):
         open_scene(path).frame(0)
 
 
-def test_a_bit_that_makes_hdf5_loop_costs_no_more_than_the_time_limit(tmp_path, monkeypatch):
+def test_a_file_at_which_hdf5_takes_too_long_is_given_up(tmp_path, monkeypatch):
     path = without_digest(a_file(tmp_path))
+    with monkeypatch.context() as patch:
+        patch.setattr(digest, "PATIENCE", 0.0)
+        with pytest.raises(ValueError, match=r"scene\.nc: .*HDF5: .* no answer in 0 s"):
+            open_scene(path)
     # The length of the first text in the global heap: HDF5 2.0 never ends reading it.
     flip(path, path.read_bytes().index(b"GCOL") + 25, 2)
     monkeypatch.setattr(digest, "PATIENCE", 2.0)
     with pytest.raises(ValueError, match=r"scene\.nc: .*(HDF5: .* no answer in 2 s|is damaged)"):
-        open_scene(path)
-
-
-def test_a_file_at_which_hdf5_takes_too_long_is_given_up(tmp_path, monkeypatch):
-    path = without_digest(a_file(tmp_path))
-    monkeypatch.setattr(digest, "PATIENCE", 0.0)
-    with pytest.raises(ValueError, match=r"scene\.nc: .*HDF5: .* no answer in 0 s"):
         open_scene(path)
 
 

@@ -12,6 +12,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
+from test_io import a_frame
 from test_preview import assert_same_frames
 
 from chipglow.cutting import (
@@ -24,7 +25,7 @@ from chipglow.cutting import (
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import HDF5Sink
-from chipglow.scene import Frame, Raster
+from chipglow.scene import Raster
 from chipglow.study import cut, is_cut, kept_progress, load_study, running
 
 STUDY = """
@@ -304,20 +305,7 @@ def test_a_checkpoint_before_the_first_frame_is_one_to_go_on_from(tmp_path):
     (left,) = unfinished_scenes(path)
     with SceneWriter(path, raster, resume=left) as writer:
         np.testing.assert_array_equal(left.state()["a"], np.arange(3))
-        field = np.full(raster.shape, 300.0, np.float32)
-        zero = np.zeros_like(field)
-        names = ("plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
-        places = {"material_x": zero, "material_y": zero}
-        material = np.zeros(raster.shape, np.uint8)
-        writer.append(
-            Frame(
-                time=1e-6,
-                temperature=field,
-                material=material,
-                **dict.fromkeys(names, zero),
-                **places,
-            )
-        )
+        writer.append(a_frame(1e-6, raster=raster))
     left.remove()
     assert len(open_scene(path).times) == 1
     assert list(tmp_path.iterdir()) == [path]

@@ -1,7 +1,4 @@
-from .atomic import (
-    atomic_folder as atomic_folder,
-    atomic_path as atomic_path,
-)
+from .atomic import atomic_folder as atomic_folder, atomic_path as atomic_path
 from .import_file import (
     ImportDescription as ImportDescription,
     import_description as import_description,
@@ -21,10 +18,7 @@ from .measurement_file import (
     write_dataset as write_dataset,
     write_measurement as write_measurement,
 )
-from .movie_file import (
-    check_movie_path as check_movie_path,
-    movie_writer as movie_writer,
-)
+from .movie_file import check_movie_path as check_movie_path, movie_writer as movie_writer
 from .scene_file import (
     SCENE_FORMAT as SCENE_FORMAT,
     SceneWriter as SceneWriter,
@@ -34,11 +28,5 @@ from .scene_file import (
     open_scene as open_scene,
     write_scene as write_scene,
 )
-from .spool import (
-    UnfinishedScene as UnfinishedScene,
-    unfinished_scenes as unfinished_scenes,
-)
-from .tool_section import (
-    ToolSection as ToolSection,
-    read_tool_outline as read_tool_outline,
-)
+from .spool import UnfinishedScene as UnfinishedScene, unfinished_scenes as unfinished_scenes
+from .tool_section import ToolSection as ToolSection, read_tool_outline as read_tool_outline

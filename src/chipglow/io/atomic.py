@@ -148,10 +148,7 @@ def errors_name(path: Path, temporary: Path) -> Iterator[None]:
 
 @contextmanager
 def _temporary(path: Path, create: Callable[[Path], None]) -> Iterator[Path]:
-    """Create a file or folder next to `path` and hold it; it is removed if it still exists.
-
-    Those whose process ended before it could do so are removed at the beginning.
-    """
+    """Hold a new file or folder next to `path`; remove it, and before it what ended runs left."""
     place = path.absolute()  # "." has no name
     for left in place.parent.glob(f".{escape(place.stem)}.{TOKEN}.part{escape(place.suffix)}"):
         if (lock := _lock(left)) is not None:

@@ -3,7 +3,7 @@
 HDF5 ignores what follows its own data, and programs that change a file cut it off.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from hashlib import file_digest, sha256
 from io import FileIO
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import h5py
+import numpy as np
 
 from chipglow.io.atomic import atomic_path, uninterrupted
 from chipglow.io.sandbox import Sandbox
@@ -25,7 +26,6 @@ PATIENCE_PER_BYTE: Final = 1e-6
 
 _MARK: Final = b"\nchipglow sha256:"
 _LENGTH: Final = len(_MARK) + sha256().digest_size
-_BLOCK: Final = 1 << 20
 
 
 class HDF5Sink(FileIO):
@@ -85,16 +85,11 @@ def is_intact(path: Path) -> bool | None:
     size = path.stat().st_size - _LENGTH
     if size < 0:
         return None
-    computed = sha256()
-    with path.open("rb") as file:
-        file.seek(size)
-        end = file.read()
-        if not end.startswith(_MARK):
-            return None
-        file.seek(0)
-        for start in range(0, size, _BLOCK):
-            computed.update(file.read(min(_BLOCK, size - start)))
-    return end == _MARK + computed.digest()
+    content = np.memmap(path, np.uint8, "r")
+    end = content[size:].tobytes()
+    if not end.startswith(_MARK):
+        return None
+    return end == _MARK + sha256(content[:size].data).digest()
 
 
 def check_file(path: Path) -> None:
@@ -105,20 +100,14 @@ def check_file(path: Path) -> None:
     """
     intact = is_intact(path)
     if not intact and h5py.is_hdf5(path):
-        _examine(path, whole=intact is False)
+        patience = PATIENCE + PATIENCE_PER_BYTE * path.stat().st_size
+        Sandbox("HDF5", patience).answer(partial(_read_all, str(path), intact is False))
     if intact is False:
         raise ValueError("the file is damaged: its digest does not match")
     check_own_data(path)
 
 
-def _examine(path: Path, whole: bool) -> None:
-    patience = PATIENCE + PATIENCE_PER_BYTE * path.stat().st_size
-    with Sandbox("HDF5", patience).answers(partial(_read_all, str(path), whole)) as names:
-        for _ in names:
-            pass
-
-
-def _read_all(path: str, whole: bool) -> Iterator[str]:
+def _read_all(path: str, whole: bool) -> None:
     """Read all attributes and places of the data of a file and, if `whole`, its data."""
     with h5py.File(path, "r") as file:
         names = ["/"]
@@ -128,7 +117,6 @@ def _read_all(path: str, whole: bool) -> Iterator[str]:
                 _read(file[name], whole)
             except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
                 raise SourceError(f"{name!r} is damaged: {error}") from None
-    yield "whole"
 
 
 def _read(item: Any, whole: bool) -> None:

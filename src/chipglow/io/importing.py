@@ -9,7 +9,7 @@ from itertools import islice
 from math import ceil, isfinite
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any, Final, TypeAlias
+from typing import Annotated, Any, Final
 
 import numpy as np
 
@@ -80,22 +80,16 @@ class View(Part):
             )
         rows, columns = (max(ceil(side / spacing - 1e-6), 2) for side in (height, width))
         raster = Raster(left, top, spacing, rows, columns)
-        if not _overlap(raster.extent, survey.extent):
+        view, there = raster.extent, survey.extent
+        if not all(max(view[i], there[i]) < min(view[i + 1], there[i + 1]) for i in (0, 2)):
             raise SourceError(
-                f"{survey.kind}: extends over {_metres(survey.extent)}, nothing of which is in "
-                f"view: {_metres(raster.extent)}"
+                f"{survey.kind}: extends over {_metres(there)}, nothing of which is in view: "
+                f"{_metres(view)}"
             )
         return raster
 
 
-Extent: TypeAlias = tuple[float, float, float, float]
-
-
-def _overlap(one: Extent, other: Extent) -> bool:
-    return all(max(one[i], other[i]) < min(one[i + 1], other[i + 1]) for i in (0, 2))
-
-
-def _metres(extent: Extent) -> str:
+def _metres(extent: tuple[float, float, float, float]) -> str:
     left, right, bottom, top = extent
     return f"x {left:.4g} to {right:.4g} m, y {bottom:.4g} to {top:.4g} m"
 
@@ -125,7 +119,11 @@ class Prospect:
 def prospect(wanted: Import) -> Prospect:
     """Look at a source and find out what a scene of it would be."""
     survey = wanted.source.survey()
-    _check_times(survey)
+    if survey.times.size == 0:
+        raise SourceError(f"{survey.kind}: has no frame, expected 1 or more")
+    if not np.isfinite(survey.times).all():
+        raise SourceError(f"{survey.kind}: its times are not finite")
+    check_times(survey.kind, survey.times)
     if "temperature" not in survey.found:
         listed = ", ".join(survey.unused) or "none"
         raise SourceError(
@@ -134,8 +132,11 @@ def prospect(wanted: Import) -> Prospect:
         )
     raster = wanted.view.raster(survey)
     _check_temperatures(wanted, survey, raster)
+    left, right, bottom, top = survey.extent
+    size = max(right - left, top - bottom)
+    doubt = f"The source is {size:.3g} m large by units.length; a chip is about 1 mm."
     assumed = [
-        *_doubtful_size(survey),
+        *([] if _SMALLEST <= size <= _LARGEST else [doubt]),
         *(text for name, text in wanted.assumptions.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
@@ -185,14 +186,8 @@ def import_scene(
     fields = completion.fields(survey.found, len(survey.times))
     key = _key(wanted, looked)
     done = len(resume.frames()[0]) if resume else 0
-    with SceneWriter(
-        path,
-        raster,
-        completion.tool,
-        _attributes(key, looked),
-        fields,
-        resume=resume,
-    ) as writer:
+    attributes = _attributes(key, looked)
+    with SceneWriter(path, raster, completion.tool, attributes, fields, resume=resume) as writer:
         kept = f"{done} frames are kept" if done else ""
         due = monotonic() + _CHECKPOINT_INTERVAL
         try:
@@ -297,36 +292,14 @@ def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
             f"temperature: {survey.found['temperature']} has no number in the frames that were "
             "looked at, expected some"
         )
-    if highest < COLDEST or (lowest < COLDEST and _holds_all(raster, survey)):
+    view, there = np.reshape(raster.extent, (2, 2)), np.reshape(survey.extent, (2, 2))
+    beyond = (there - view) * (-1, 1) > 1e-6 * raster.spacing
+    if highest < COLDEST or (lowest < COLDEST and not beyond.any()):
         worst = highest if highest < COLDEST else lowest
-        place = f"in {survey.found['temperature']}"
-        raise _not_kelvin(wanted, worst, place)
+        raise _not_kelvin(wanted, worst, f"in {survey.found['temperature']}")
 
 
-def _holds_all(raster: Raster, survey: Survey) -> bool:
-    outer, inner = raster.extent, survey.extent
-    within = 1e-6 * raster.spacing
-    return all(
-        outer[i] <= inner[i] + within and outer[i + 1] >= inner[i + 1] - within for i in (0, 2)
-    )
-
-
-def _doubtful_size(survey: Survey) -> tuple[str, ...]:
-    """Return a sentence if the source is larger or smaller than a microscope's field of view."""
-    left, right, bottom, top = survey.extent
-    size = max(right - left, top - bottom)
-    if _SMALLEST <= size <= _LARGEST:
-        return ()
-    return (f"The source is {size:.3g} m large by units.length; a chip is about 1 mm.",)
-
-
-def _check_times(survey: Survey) -> None:
-    times = survey.times
-    if times.size == 0:
-        raise SourceError(f"{survey.kind}: has no frame, expected 1 or more")
-    if not np.isfinite(times).all():
-        raise SourceError(f"{survey.kind}: its times are not finite")
-    check_times(survey.kind, times)
+_SMALLEST, _LARGEST = 5e-6, 0.05
 
 
 def _key(wanted: Import, looked: Prospect) -> str:

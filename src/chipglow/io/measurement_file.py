@@ -61,10 +61,7 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
 
 
 def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str) -> Made:
-    """Return the result of `made_of` for the data of a NetCDF-4 file.
-
-    If that fails, the error says that the file is not `what`, and `kind` was expected.
-    """
+    """Return `made_of` the data of a NetCDF-4 file, which should be `what` in a file of `kind`."""
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
     try:

@@ -40,67 +40,52 @@ def movie_writer(
     both even. `palette` are the colours of a GIF, shape (up to `PALETTE_SIZE`, 3).
     """
     check_movie_path(path)
-    kind = _Gif if Path(path).suffix.lower() == ".gif" else _Mp4
     with atomic_path(path) as part:
-        movie, count = kind(part, shape, palette), 0
+        is_gif = Path(path).suffix.lower() == ".gif"
+        with _gif(part, palette) if is_gif else _mp4(part, shape) as append:
+            count = 0
 
-        def append(picture: NDArray[np.uint8]) -> None:
-            nonlocal count
-            movie.append(picture)
-            count += 1
+            def counted(picture: NDArray[np.uint8]) -> None:
+                nonlocal count
+                append(picture)
+                count += 1
 
-        try:
-            yield append
+            yield counted
             if count == 0:
                 raise ValueError(f"{path}: there was no picture to show, expected 1 or more")
-            movie.finish()
-        finally:
-            movie.close()
 
 
-class _Mp4:
-    def __init__(self, part: Path, shape: tuple[int, int], palette: NDArray[np.uint8]) -> None:
-        import av
+@contextmanager
+def _mp4(part: Path, shape: tuple[int, int]) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
+    import av
 
-        self._frame = av.VideoFrame.from_ndarray
-        self._container: Any = av.open(str(part), "w", format="mp4")
-        self._stream = self._container.add_stream("h264", rate=_RATE)
-        self._stream.options = {"preset": "veryfast"}
-        self._stream.height, self._stream.width = shape
-        self._stream.pix_fmt = "yuv420p"  # the one that every player knows
+    container: Any
+    with av.open(str(part), "w", format="mp4") as container:
+        stream = container.add_stream("h264", rate=_RATE)
+        stream.options = {"preset": "veryfast"}
+        stream.height, stream.width = shape
+        stream.pix_fmt = "yuv420p"  # the one that every player knows
 
-    def append(self, picture: NDArray[np.uint8]) -> None:
-        frame = self._frame(picture, format="rgb24")
-        self._container.mux(self._stream.encode(frame))
+        def append(picture: NDArray[np.uint8]) -> None:
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            container.mux(stream.encode(frame))
 
-    def finish(self) -> None:
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
-
-    def close(self) -> None:
-        self._container.close()
+        yield append
+        container.mux(stream.encode(None))
 
 
-class _Gif:
-    def __init__(self, part: Path, shape: tuple[int, int], palette: NDArray[np.uint8]) -> None:
-        from PIL import Image
+@contextmanager
+def _gif(part: Path, palette: NDArray[np.uint8]) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
+    from PIL import Image
 
-        self._part = part
-        self._pictures: list[Image.Image] = []
-        self._palette = Image.new("P", (1, 1))
-        self._palette.putpalette(palette.tobytes())
+    colours = Image.new("P", (1, 1))
+    colours.putpalette(palette.tobytes())
+    pictures: list[Image.Image] = []
 
-    def append(self, picture: NDArray[np.uint8]) -> None:
-        from PIL import Image
-
+    def append(picture: NDArray[np.uint8]) -> None:
         plain, dither = Image.fromarray(picture), Image.Dither.NONE
-        self._pictures.append(plain.quantize(palette=self._palette, dither=dither))
+        pictures.append(plain.quantize(palette=colours, dither=dither))
 
-    def finish(self) -> None:
-        first, *others = self._pictures
-        first.save(
-            self._part, "GIF", save_all=True, append_images=others, duration=1000 // _RATE, loop=0
-        )
-
-    def close(self) -> None:
-        self._pictures.clear()
+    yield append
+    first, *others = pictures
+    first.save(part, "GIF", save_all=True, append_images=others, duration=1000 // _RATE, loop=0)

@@ -48,11 +48,7 @@ class Sandbox:
 
     @contextmanager
     def answers(self, job: Job) -> Iterator[Iterator[Any]]:
-        """Yield an iterator of the answers of a job; its process ends with the block.
-
-        The iterator raises SourceError if a file cannot be read, the process ends before it has
-        answered or takes too long, and FileNotFoundError if a file is missing.
-        """
+        """Yield an iterator of the answers of a job; its process ends with the block."""
         request = pickle.dumps((job, self.name, self.memory))
         with subprocess.Popen(
             [sys.executable, *_CHILD],
@@ -68,6 +64,11 @@ class Sandbox:
                 yield self._answers(process)
             finally:
                 process.kill()
+
+    def answer(self, function: Callable[[], Any]) -> Any:
+        """Return what a function returns; it can be pickled. For errors see `answers`."""
+        with self.answers(partial(_once, function)) as answers:
+            return next(answers)
 
     def _answers(self, process: "subprocess.Popen[bytes]") -> Iterator[Any]:
         while not isinstance(answer := self._in_time(process), str) or answer != _END:
@@ -110,13 +111,10 @@ class Isolated(Source):
     patience: float = PATIENCE
 
     def survey(self) -> Survey:
-        """Survey the source; see `Source.survey`."""
-        with self._sandbox.answers(partial(_survey, self.source)) as answers:
-            survey: Survey = next(answers)
+        survey: Survey = self._sandbox.answer(self.source.survey)
         return survey
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the frames one after the other; see `Source.frames`."""
         with self._sandbox.answers(partial(self.source.frames, raster, start)) as answers:
             yield from answers
 
@@ -125,8 +123,8 @@ class Isolated(Source):
         return Sandbox(self.name, self.patience, self.memory)
 
 
-def _survey(source: Source) -> Iterator[Survey]:
-    yield source.survey()
+def _once(function: Callable[[], Any]) -> Iterator[Any]:
+    yield function()
 
 
 def main() -> None:
@@ -166,13 +164,7 @@ def limit_memory(memory: int) -> None:
     with suppress(ImportError):
         import resource
 
-        used = int(_status("VmData")) * 1024
-        resource.setrlimit(resource.RLIMIT_DATA, (used + memory, used + memory))
-
-
-def _status(name: str) -> str:
-    with suppress(OSError):
-        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-            if line.startswith(name):
-                return line.split()[1]
-    return "0"
+        with suppress(OSError, IndexError):  # only Linux tells what is in use
+            status = Path("/proc/self/status").read_text(encoding="ascii")
+            memory += 1024 * int(status.partition("VmData:")[2].split()[0])
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))

@@ -287,11 +287,7 @@ class StoredScene(Scene):
         super().__init__(data)
 
     def coarser(self, step: int, every: int = 1) -> "StoredScene":
-        """Return the scene of splines with fewer samples, for a quick look.
-
-        `step` samples in either direction become one; one frame of `every` is kept, the first
-        after each gap.
-        """
+        """Return the scene of splines with one of `step` samples either way, of `every` frames."""
         if self.lattice is None:
             raise ValueError(f"{self.path}: has samples, expected splines")
         kept = [index for block in self.blocks for index in block[::every]]

@@ -60,7 +60,7 @@ class UnfinishedScene:
                 file.unlink(missing_ok=True)
 
     def _files(self) -> tuple[Path, ...]:
-        return _draft(self.part), self.checkpoint, self.part
+        return self.part.with_suffix(".tmp"), self.checkpoint, self.part
 
 
 @dataclass
@@ -73,7 +73,6 @@ class Spool:
     ends: list[int] = field(default_factory=list)
 
     def append(self, time: float, chunks: Iterable[bytes]) -> None:
-        """Write the chunks of a frame."""
         for chunk in chunks:
             self.file.write(chunk)
             self.ends.append(self.file.tell())
@@ -88,7 +87,7 @@ class Spool:
             _TIMES: np.asarray(self.times, np.float64),
             _ENDS: np.asarray(self.ends, np.int64),
         }
-        draft = _draft(self.part)
+        draft = self.part.with_suffix(".tmp")
         try:
             with draft.open("wb") as file:
                 np.savez(file, **own, **state)  # type: ignore[arg-type]
@@ -150,10 +149,6 @@ def _is_abandoned(part: Path) -> bool:
         return True
     except OSError:
         return False
-
-
-def _draft(part: Path) -> Path:
-    return part.with_suffix(".tmp")
 
 
 def _progress(part: Path) -> float:

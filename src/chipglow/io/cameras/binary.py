@@ -35,7 +35,6 @@ class Binary:
     size: int
 
     def read(self, start: int, count: int) -> bytes:
-        """Return bytes from a place."""
         if not (start >= 0 and count >= 0 and start + count <= self.size):
             raise CutShortError(
                 f"{self.path}: is truncated or damaged, bytes {start} to {start + count} are "
@@ -92,22 +91,12 @@ def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) ->
 
 
 class CameraFile(ABC):
-    """An open file of a camera: a class that reads its headers when it is made, and adds the rest.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns of a picture.
-    complete : int
-        Number of whole frames.
-    quantity : str
-        The measured quantity.
-    dtype : dtype
-        Type of the samples.
-    """
+    """An open file of a camera: a class reads its headers when it is made and adds the rest."""
 
     shape: tuple[int, int]
+    """Rows and columns of a picture."""
     complete: int
+    """Number of whole frames."""
     quantity: Quantity = "counts"
     dtype: DTypeLike = np.uint16
 
@@ -147,10 +136,7 @@ class CameraFile(ABC):
             )
 
     def stamped(self, chosen: range, stamps: Array | None, rate: float) -> Array:
-        """Return stamps in s after the first frame, or times by a frame rate in Hz.
-
-        The rate is used where the stamps do not ascend; it is 0 if it is not known.
-        """
+        """Return stamps in s after the first frame if they ascend, or times by a rate in Hz."""
         if stamps is not None:
             steps = np.diff(stamps) * np.sign(chosen.step)
             if np.isfinite(stamps).all() and (steps > 0).all():

@@ -1,6 +1,6 @@
 """Formats of cameras' files: which they are, how they are recognised, and who reads them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -26,33 +26,21 @@ Read = Callable[[Path, slice | None, float | None], Recording]
 
 @dataclass(frozen=True)
 class CameraFormat:
-    """A format of files.
-
-    Parameters
-    ----------
-    description : str
-        A description.
-    suffixes : tuple of str
-        Endings of such files' names.
-    begins : callable, optional
-        Whether a file is of this format, by its first bytes.
-    read : callable, optional
-        Reads frames of a file that says what was measured: its path, which frames, and the time
-        between frames in s, instead of the file's own, or None. It raises SourceError for a
-        file that is damaged, truncated or of another kind, and OSError for one that is missing or
-        not accessible. Without it the file holds an array, and the user says.
-    in_subprocess : callable
-        Whether libraries in C or C++ would unpack a file: they do so in a subprocess.
-    inside_hdf5 : bool
-        Whether files begin as those of HDF5 may: the ending of the name says which it is.
-    """
+    """A format of files."""
 
     description: str
     suffixes: tuple[str, ...]
+    """Endings of such files' names."""
     begins: Begins | None = None
+    """Whether a file is of this format, by its first bytes."""
     read: Read | None = None
+    """Reads frames of a file that says what was measured: its path, which frames, and the time
+    between frames in s, instead of the file's own, or None. Without it the file holds an array,
+    and the user says."""
     in_subprocess: Callable[[Path], bool] = lambda path: False
+    """Whether libraries in C or C++ would unpack a file: they do so in a subprocess."""
     inside_hdf5: bool = False
+    """Whether files begin as those of HDF5 may: the ending of the name says which it is."""
 
     @property
     def states_quantity(self) -> bool:
@@ -62,11 +50,6 @@ class CameraFormat:
 
 def _starts(*beginnings: bytes) -> Begins:
     return lambda head: head.startswith(beginnings)
-
-
-def _is_hcc(head: bytes) -> bool:
-    """Return whether a file begins with TC and a version that is not a letter."""
-    return head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32
 
 
 _array: Final = partial(CameraFormat, in_subprocess=lambda path: True)
@@ -86,7 +69,12 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "ptw": CameraFormat(
         "FLIR PTW (Cedip, Altair)", (".ptw",), _starts(b"CED", b"AIO"), Ptw.recording
     ),
-    "hcc": CameraFormat("Telops HCC", (".hcc",), _is_hcc, Hcc.recording),
+    "hcc": CameraFormat(
+        "Telops HCC",
+        (".hcc",),
+        lambda head: head[:2] == b"TC" and len(head) > 3 and 5 <= head[3] < 32,
+        Hcc.recording,
+    ),
     "cine": CameraFormat("Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording),
     "tiff": _array("TIFF, a stack or one file per frame", (".tif", ".tiff"), _starts(*_TIFF)),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
@@ -190,13 +178,9 @@ def read_recording(
         )
     if not one.in_subprocess(path):
         return read_here(path, kind, frames, stated)
-    with Sandbox(str(path)).answers(partial(_answer, path, kind, frames, stated)) as answers:
-        recording: Recording = next(answers)
-        return recording
-
-
-def _answer(path: Path, kind: str, frames: slice | None, stated: Stated) -> Iterator[Recording]:
-    yield read_here(path, kind, frames, stated)
+    read = partial(read_here, path, kind, frames, stated)
+    recording: Recording = Sandbox(str(path)).answer(read)
+    return recording
 
 
 def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:

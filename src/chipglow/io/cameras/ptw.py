@@ -76,7 +76,9 @@ class Ptw(CameraFile):
         self.stride = self._stride()
         self.complete = min(header["frames"], (binary.size - header["header_size"]) // self.stride)
         self.start = header["header_size"] + header["frame_header_size"]
-        if lock_in := self._has_lock_in():
+        first = binary.numbers(self.start, min(columns, 4), "<u2")
+        # A line of lock-in data may come before each picture.
+        if lock_in := rows > 1 and tuple(first) == _LOCK_IN:
             lines = (self.stride - header["frame_header_size"]) // (2 * columns)
             self.start, rows = self.start + 2 * columns, min(rows, lines - 1)
         self.shape = rows, columns
@@ -96,11 +98,6 @@ class Ptw(CameraFile):
                 f"{size} bytes or words, and its picture needs {needed} bytes"
             )
         return stride
-
-    def _has_lock_in(self) -> bool:
-        """Return whether a line of lock-in data comes before each picture."""
-        first = self.binary.numbers(self.start, min(self.header["columns"], 4), "<u2")
-        return tuple(first) == _LOCK_IN and self.header["rows"] > 1
 
     def picture(self, number: int) -> NDArray[np.uint16]:
         rows, columns = self.shape

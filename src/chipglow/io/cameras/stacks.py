@@ -112,7 +112,12 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
 
 def _dataset(path: Path, arrays: Mapping[str, FileArray], name: str | None) -> FileArray:
     if name is None:
-        labels = [label for label, array in arrays.items() if _may_be_pictures(array)]
+        # MATLAB keeps lists as matrices of one row or column.
+        labels = [
+            label
+            for label, array in arrays.items()
+            if len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
+        ]
         wrong = "give the dataset with the frames"
     else:
         labels = [label for label in arrays if name in (label, label.rsplit("/", 1)[-1])]
@@ -122,11 +127,6 @@ def _dataset(path: Path, arrays: Mapping[str, FileArray], name: str | None) -> F
         return arrays[labels[0]]
     listed = ", ".join(f"{name!r} of shape {arrays[name].shape}" for name in sorted(arrays)[:10])
     raise SourceError(f"{path}: {wrong}, it has {listed}")
-
-
-def _may_be_pictures(array: FileArray) -> bool:
-    # MATLAB keeps lists as matrices of one row or column.
-    return len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
 
 
 def _unit(one: FileArray, stated: Stated) -> tuple[Quantity, Unit] | None:

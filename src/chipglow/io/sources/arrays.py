@@ -24,7 +24,6 @@ MOST_SAMPLES: Final = 100_000_000
 MOST_ON_A_SIDE: Final = 1_000_000
 """Maximum number of samples along an axis other than time."""
 
-_MOST_ARRAYS: Final = 10_000
 _KINDS: Final = "fiub"
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
@@ -33,6 +32,8 @@ _CODECS: Final = (
 )  # fmt: skip
 
 Key = tuple[slice, ...]
+Read: TypeAlias = Callable[[Key], NDArray[Any]]
+"""Returns the part of an array given by a slice for every axis."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,7 @@ class FileArray:
     name: str
     """Its name in the file; empty where the format has none."""
     shape: tuple[int, ...]
-    read: Callable[[Key], NDArray[Any]]
-    """Returns the part given by a slice for every axis."""
+    read: Read
     dims: tuple[str, ...] = ()
     """Names of its axes, if the file states them."""
     attributes: Mapping[str, Any] = field(default_factory=dict)
@@ -63,13 +63,21 @@ class FileArray:
 
     @property
     def unit(self) -> str | None:
-        """Unit that the file states."""
         unit = self.attributes.get("units")
         return unit if isinstance(unit, str) else None
 
     @property
     def size(self) -> int:
         return prod(self.shape)
+
+    def part(self, key: Key = ()) -> NDArray[Any]:
+        """Read the part given by a slice for every axis, or all of it."""
+        key = key or (slice(None),) * len(self.shape)
+        lengths = [len(range(length)[along]) for length, along in zip(self.shape, key, strict=True)]
+        check_samples(str(self), prod(lengths))
+        check_samples(f"{self}: a chunk", prod(self.chunks or ()))
+        with reading(self):
+            return self.read(key)
 
 
 ArrayReader: TypeAlias = Callable[[Path, ExitStack], Iterator[FileArray]]
@@ -94,8 +102,6 @@ def open_arrays(
     first = _open_file(paths[0], stack, reader)
     if not first:
         raise SourceError(f"{paths[0]}: there is no array of numbers in it")
-    if len(first) > _MOST_ARRAYS:
-        raise SourceError(f"{paths[0]}: {len(first)} arrays, expected up to {_MOST_ARRAYS}")
     arrays = list(first.values())
     if len(paths) > 1 or paths[0] != Path(pattern):
         arrays = [_series(paths, array, reader) for array in arrays]
@@ -116,7 +122,7 @@ def _open_file(
     if path.is_file() and path.stat().st_size == 0:
         raise SourceError(f"{path}: is empty")
     with reading(path):
-        return {array.name: array for array in reader(path, stack)}
+        return {array.name: replace(array, path=str(path)) for array in reader(path, stack)}
 
 
 def _series(paths: Sequence[Path], first: FileArray, reader: ArrayReader | None) -> FileArray:
@@ -139,8 +145,7 @@ def _read_whole(path: Path, first: FileArray, reader: ArrayReader | None) -> NDA
             raise SourceError(
                 f"{path}: expected an array {first.name!r} of shape {first.shape}, it has {found}"
             )
-        with reading(path):
-            return array.read((slice(None),) * len(first.shape))
+        return array.part()
 
 
 # NumPy
@@ -166,35 +171,37 @@ def _npz(path: Path, stack: ExitStack) -> Iterator[FileArray]:
         if not info.filename.endswith(".npy"):
             continue
         with archive.open(info) as stream:
-            shape, dtype = _npy_header(stream)
+            first = np.lib.format.read_magic(stream) == (1, 0)
+            header = np.lib.format
+            read_header = header.read_array_header_1_0 if first else header.read_array_header_2_0
+            shape, _, dtype = read_header(stream)
         if prod(shape) * dtype.itemsize > info.file_size:
             raise SourceError(
                 f"{path}: {info.filename} states shape {shape}, but has {info.file_size} bytes"
             )
-        whole = cache(partial(_read_member, archive, info.filename, prod(shape)))
-        yield from _numpy_arrays(info.filename[:-4], dtype, shape, partial(_of_member, whole))
+        load = partial(_read_member, archive, info.filename)
+        read = _from_whole(f"{path}: {info.filename}", prod(shape), load)
+        yield from _numpy_arrays(info.filename[:-4], dtype, shape, read)
 
 
-def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    first = np.lib.format.read_magic(stream) == (1, 0)
-    read = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
-    return shape, dtype
-
-
-def _read_member(archive: ZipFile, member: str, count: int) -> NDArray[Any]:
-    """Return an array of an archive, which cannot be read in parts."""
-    check_samples(f"{archive.filename}: {member}", count)
+def _read_member(archive: ZipFile, member: str) -> NDArray[Any]:
     with archive.open(member) as stream:
         return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
 
 
-def _of_member(whole: Callable[[], NDArray[Any]], key: Key) -> NDArray[Any]:
-    return np.asarray(whole()[key])
+def _from_whole(label: str, count: int, load: Callable[[], NDArray[Any]]) -> Read:
+    """Return how to read parts of an array that is loaded as a whole, once."""
+
+    @cache
+    def whole() -> NDArray[Any]:
+        check_samples(label, count)
+        return load()
+
+    return lambda key: np.asarray(whole()[key])
 
 
 def _numpy_arrays(
-    name: str, dtype: np.dtype[Any], shape: tuple[int, ...], read: Callable[[Key], NDArray[Any]]
+    name: str, dtype: np.dtype[Any], shape: tuple[int, ...], read: Read
 ) -> Iterator[FileArray]:
     """Yield one array, or one for every field of a structured one."""
     if dtype.names is None:
@@ -207,7 +214,7 @@ def _numpy_arrays(
             yield FileArray(label, shape, partial(_part, read, part))
 
 
-def _part(read: Callable[[Key], NDArray[Any]], name: str, key: Key) -> NDArray[Any]:
+def _part(read: Read, name: str, key: Key) -> NDArray[Any]:
     return np.asarray(read(key)[name])
 
 
@@ -221,14 +228,13 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     file = stack.enter_context(h5py.File(path, "r"))
     found: list[FileArray] = []
 
-    def visit(name: str, item: Any) -> bool | None:
+    def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset):
             settings = item.id.get_create_plist()
             filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
             if not all(map(h5py.h5z.filter_avail, filters)):
                 required("hdf5plugin", path, "grid")
             found.extend(_hdf5_arrays(name, item))
-        return True if len(found) > _MOST_ARRAYS else None
 
     file.visititems(visit)
     yield from found
@@ -249,7 +255,7 @@ def _hdf5_arrays(name: str, item: Any) -> Iterator[FileArray]:
     dims = dims if all(dims) else ()
     kind = item.attrs.get("MATLAB_class")
     if kind is None:
-        read: Callable[[Key], NDArray[Any]] = lambda key: np.asarray(item[key])  # noqa: E731
+        read: Read = lambda key: np.asarray(item[key])  # noqa: E731
         yield FileArray(name, item.shape, read, dims, attributes, item.chunks)
     elif "MATLAB_empty" not in item.attrs and bytes(kind) not in (b"cell", b"char", b"struct"):
         # MATLAB's axes run the other way in its files.
@@ -305,22 +311,19 @@ def _matlab(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     for name, shape, kind in whosmat(path):
         numeric = kind.startswith(("double", "single", "int", "uint", "logical"))
         if numeric and not name.startswith("__"):
-            yield _matlab_array(path, name, tuple(int(length) for length in shape))
+            sides = tuple(int(length) for length in shape)
+            load = partial(_load_matlab, path, name)
+            yield FileArray(name, sides, _from_whole(f"{path}: {name}", prod(sides), load))
 
 
-def _matlab_array(path: Path, name: str, shape: tuple[int, ...]) -> FileArray:
-    """Return an array of MATLAB's formats up to 7.2, which cannot be read in parts."""
+def _load_matlab(path: Path, name: str) -> NDArray[Any]:
+    """Return an array of MATLAB's formats up to 7.2."""
     from scipy.io import loadmat
 
-    @cache
-    def whole() -> NDArray[Any]:
-        check_samples(f"{path}: {name}", prod(shape))
-        values = loadmat(path, variable_names=[name])[name]
-        if not isinstance(values, np.ndarray) or values.dtype.kind not in _KINDS:
-            raise SourceError(f"{path}: {name} is sparse or {values.dtype}, expected numbers")
-        return values
-
-    return FileArray(name, shape, lambda key: np.asarray(whole()[key]))
+    values = loadmat(path, variable_names=[name])[name]
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in _KINDS:
+        raise SourceError(f"{path}: {name} is sparse or {values.dtype}, expected numbers")
+    return values
 
 
 # TIFF
@@ -355,7 +358,7 @@ def _errors_logged(name: str) -> Iterator[list[str]]:
         logging.getLogger(name).removeHandler(handler)
 
 
-def _tiff_reader(path: Path, series: Any) -> Callable[[Key], NDArray[Any]]:
+def _tiff_reader(path: Path, series: Any) -> Read:
     if series.dataoffset is not None:
         dtype = np.dtype(series.parent.byteorder + series.dtype.char)
         values = np.memmap(path, dtype, "r", series.dataoffset, tuple(series.shape))
@@ -404,10 +407,8 @@ def _zarr_array(name: str, array: Any) -> FileArray:
     attributes = dict(array.attrs)
     dims = getattr(array.metadata, "dimension_names", None) or attributes.get("_ARRAY_DIMENSIONS")
     names = tuple(str(dim) for dim in dims or ())
-    shape = tuple(array.shape)
-    return FileArray(
-        name, shape, lambda key: np.asarray(array[key]), names, attributes, array.chunks
-    )
+    read: Read = lambda key: np.asarray(array[key])  # noqa: E731
+    return FileArray(name, tuple(array.shape), read, names, attributes, array.chunks)
 
 
 def _codecs(metadata: Mapping[str, Any]) -> Iterator[str]:
@@ -425,16 +426,12 @@ def _codecs(metadata: Mapping[str, Any]) -> Iterator[str]:
 # Text
 
 
-def _csv(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    yield _matrix(path, 0)
-
-
 def exported_table(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     """Read a matrix behind lines of text, as cameras' programs export it; an `ArrayReader`."""
-    yield _matrix(path, lines_of_text(path))
+    return _csv(path, stack, lines_of_text(path))
 
 
-def _matrix(path: Path, skipped: int) -> FileArray:
+def _csv(path: Path, stack: ExitStack, skipped: int = 0) -> Iterator[FileArray]:
     table = TextTable.look_at(path, skipped).read(header=None, skiprows=skipped)
     for column, kind in enumerate(table.dtypes):
         if kind.kind not in _KINDS:
@@ -444,7 +441,7 @@ def _matrix(path: Path, skipped: int) -> FileArray:
             )
     values = table.to_numpy(np.float32)
     attributes = {"lines_of_text": skipped}
-    return FileArray("", values.shape, lambda key: values[key], attributes=attributes)
+    yield FileArray("", values.shape, lambda key: values[key], attributes=attributes)
 
 
 ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {

@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources import lammps_dump
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
     OTHER_NAMES,
@@ -18,7 +17,7 @@ from chipglow.io.sources.conventions import (
     simple,
 )
 from chipglow.io.sources.layout import check_times, unit_of
-from chipglow.io.sources.point_files import PointTable, open_points
+from chipglow.io.sources.point_files import DUMP_ENDINGS, PointTable, open_points
 from chipglow.io.sources.source import Source, SourceError, Survey, even_times, naming, span_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, Unit
@@ -44,7 +43,7 @@ class CloudSource(Source, Part):
 
     title: ClassVar[str] = "points"
     # Most files of points have another ending: they are called by their kind.
-    endings: ClassVar[tuple[str, ...]] = lammps_dump.ENDINGS
+    endings: ClassVar[tuple[str, ...]] = DUMP_ENDINGS
     files: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     spacing: Annotated[

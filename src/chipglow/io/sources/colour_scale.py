@@ -89,10 +89,7 @@ class ColourScale:
 
     @classmethod
     def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":
-        """Return the scale of a legend's colours, shape (n, 3), and values at its two edges.
-
-        It has bands if these are equally wide.
-        """
+        """Return the scale of a legend's colours, shape (n, 3), by the values at its two edges."""
         colours = pixels / 255.0
         count = _equal_bands(colours)
         if count:

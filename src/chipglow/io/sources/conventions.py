@@ -81,10 +81,7 @@ def match_names(
     among: Iterable[str] | None = None,
     names: Mapping[str, Sequence[str]] = COMMON_NAMES,
 ) -> dict[str, str]:
-    """Return a source's fields by the names of a scene: those given, then guesses for those known.
-
-    The guesses are ``among`` some of the available fields, by their usual names.
-    """
+    """Return a source's fields by the names of a scene: those given, then guesses by name."""
     there = sorted(available)
     for ours, theirs in given.items():
         if ours not in names:

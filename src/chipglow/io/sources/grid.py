@@ -3,19 +3,13 @@
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from math import isfinite, prod
+from math import isfinite
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.arrays import (
-    ARRAY_READERS,
-    MOST_ON_A_SIDE,
-    FileArray,
-    check_samples,
-    open_arrays,
-)
+from chipglow.io.sources.arrays import ARRAY_READERS, MOST_ON_A_SIDE, FileArray, open_arrays
 from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple
 from chipglow.io.sources.layout import (
     AXES,
@@ -29,14 +23,7 @@ from chipglow.io.sources.layout import (
     read_list,
     unit_of,
 )
-from chipglow.io.sources.source import (
-    Source,
-    SourceError,
-    Survey,
-    even_times,
-    extent_of,
-    span_of,
-)
+from chipglow.io.sources.source import Source, SourceError, Survey, even_times, extent_of, span_of
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
@@ -153,8 +140,6 @@ class _Layer:
                 raise SourceError(
                     f"{array}: has {length} samples along {axis}, expected 2 to {MOST_ON_A_SIDE}"
                 )
-        check_samples(f"{array}: a frame", samples)
-        check_samples(f"{array}: a chunk", prod(array.chunks or ()))
         if self.shape[0] < 1:
             raise SourceError(f"{array}: has no frame")
         self._first, self._block = 0, np.empty((0, 0, 0), np.float32)
@@ -287,11 +272,7 @@ class _Grid:
         return check_times(str(array), read_list("time", array, source.units.time, self.notes))
 
     def check_ends(self) -> tuple[float, float] | None:
-        """Return the smallest and the largest temperature of the first and the last frame.
-
-        Errors in these are so found before all are read. Others are read until one has a
-        temperature.
-        """
+        """Return the range of temperature of the first and the last frame, or of one with any."""
         last = len(self.times) - 1
         found: list[float] = []
         for index in dict.fromkeys((0, last, *range(last))):

@@ -6,15 +6,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.arrays import FileArray, check_samples
-from chipglow.io.sources.conventions import (
-    COMMON_NAMES,
-    OTHER_NAMES,
-    SI_UNITS,
-    match_names,
-    simple,
-)
-from chipglow.io.sources.source import SourceError, naming, reading
+from chipglow.io.sources.arrays import FileArray
+from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, SI_UNITS, match_names, simple
+from chipglow.io.sources.source import SourceError, naming
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
 
@@ -29,10 +23,7 @@ _LARGEST_UNEVENNESS: Final = 0.05
 def find_fields(
     arrays: Mapping[str, FileArray], given: Mapping[str, str], known: Sequence[str], notes: Notes
 ) -> dict[str, FileArray]:
-    """Return a file's arrays by fields: those given, and guesses for those known.
-
-    If the file has only one array, it is the first field of those known.
-    """
+    """Return arrays by fields: those given, and guesses; a file's only array is the first known."""
     path = next(iter(arrays.values())).path
     if "velocity" in given:
         raise SourceError(f"{path}: velocity needs velocity_x and velocity_y, an array each")
@@ -68,7 +59,10 @@ def _short_names(labels: Collection[str]) -> dict[str, str]:
 def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tuple[str, ...]:
     """Return the axes of an array in their order: ``y``, ``x`` and possibly ``time``."""
     shape = array.shape
-    names = tuple(_axis(dim) for dim in array.dims)
+    names = tuple(
+        next((axis for axis in COORDINATES if simple(dim) in OTHER_NAMES[axis]), "")
+        for dim in array.dims
+    )
     if given is not None:
         names = tuple(given)
     elif sorted(names) not in (sorted(AXES), ["x", "y"]):
@@ -79,10 +73,6 @@ def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tupl
             f"{array}: has shape {shape}, expected the axes {', '.join(given or AXES)}"
         )
     return names
-
-
-def _axis(dim: str) -> str:
-    return next((axis for axis in COORDINATES if simple(dim) in OTHER_NAMES[axis]), "")
 
 
 def unit_of(name: str, label: str, text: str | None, own: Unit, notes: Notes) -> Unit:
@@ -128,10 +118,7 @@ def coordinate(
 def read_list(axis: str, array: FileArray, own: Unit, notes: Notes) -> NDArray[np.float64]:
     """Return all values of a coordinate in SI; for its unit see `unit_of`."""
     unit = unit_of(axis, str(array), array.unit, own, notes)
-    check_samples(str(array), array.size)
-    with reading(array):
-        raw = array.read((slice(None),) * len(array.shape))
-    values = np.asarray(raw, np.float64).reshape(-1) * unit.scale + unit.offset
+    values = np.asarray(array.part(), np.float64).reshape(-1) * unit.scale + unit.offset
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
         raise SourceError(f"{array}: value {wrong[0]} is {values[wrong[0]]}, expected a number")
@@ -142,9 +129,8 @@ def read_frames(array: FileArray, axes: Sequence[str], frames: slice) -> NDArray
     """Return frames as they are in the file, shape (time, y, x), NaN where a number is missing."""
     lengths = dict(zip(axes, array.shape, strict=True))
     key = tuple(frames if axis == "time" else slice(None) for axis in axes)
-    with reading(array):
-        values = _unpacked(array.read(key), array.attributes)
-        values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
+    values = _unpacked(array.part(key), array.attributes)
+    values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
     values = values if "time" in axes else values[None]
     expected = (len(range(lengths.get("time", 1))[frames]), lengths["y"], lengths["x"])
     if values.shape != expected:

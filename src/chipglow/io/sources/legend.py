@@ -43,15 +43,11 @@ def find_legend(picture: Picture) -> Box | None:
     if best is None:
         return None
     # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
-    left, top, right, bottom = best
-    within = [
-        box
-        for box in boxes
-        if 0 <= box[0] - left <= _BLUR
-        and 0 <= box[1] - top <= _BLUR
-        and 0 <= right - box[2] <= _BLUR
-        and 0 <= bottom - box[3] <= _BLUR
-    ]
+    within = []
+    for box in boxes:
+        inward = np.subtract(box, best) * (1, 1, -1, -1)
+        if ((inward >= 0) & (inward <= _BLUR)).all():
+            within.append(box)
     return _extended(picture, min(within, key=lambda box: (box[2] - box[0]) * (box[3] - box[1])))
 
 
@@ -125,10 +121,7 @@ def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
 
 
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
-    """Return colours along a legend, from its bottom or left end, shape (n, 3).
-
-    They are medians across its centre; where its ends are blurred, the colour next to them.
-    """
+    """Return medians of the colours along a legend, from its bottom or left end, shape (n, 3)."""
     left, top, right, bottom = box
     rows, columns = picture.shape[:2]
     if not (0 <= left < right <= columns and 0 <= top < bottom <= rows):

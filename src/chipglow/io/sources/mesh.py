@@ -141,7 +141,6 @@ class Meshes:
         """The file's fields by the names of a scene; a vector of velocity is both components."""
 
     def read(self, number: int) -> tuple[Block, ...]:
-        """Return the mesh of a frame."""
         return with_own_fields(self._read(number), self._restricted)
 
     def _read(self, number: int) -> list[Block]:
@@ -237,7 +236,6 @@ class Meshes:
         return tool
 
     def times(self, notes: Notes) -> NDArray[np.float64]:
-        """Return the times of the frames in s."""
         source, count = self._source, self.reader.count
         if source.times:
             if len(source.times) != count:
@@ -251,7 +249,6 @@ class Meshes:
         return even_times(count, source.interval, notes)
 
     def assumptions(self) -> list[str]:
-        """Return the assumptions about the first mesh."""
         sizes, sentences = fields_of(self.ends[0]), []
         for ours, theirs in self.found.items():
             if ours not in _COMPONENTS and sizes[theirs] > 1:
@@ -264,16 +261,13 @@ class Meshes:
             for name in sizes
             if simple(name) in ("displacement", "u") and name not in self.found.values()
         ]
-        if moving and self._source.displacement is None and not self._is_exodus:
+        # The reader of Exodus adds the displacement by itself.
+        by_reader = mesh_vtk.kind_of(self._source.files) == "Exodus II"
+        if moving and self._source.displacement is None and not by_reader:
             sentences.append(f"Positions are taken from the file; {moving[0]} is not added.")
         if not self._source.tool_parts:
             sentences.append("No part is named as tool: all elements are workpiece.")
         return sentences
-
-    @property
-    def _is_exodus(self) -> bool:
-        """Its reader adds the displacement by itself."""
-        return mesh_vtk.kind_of(self._source.files) == "Exodus II"
 
     def remarks(self) -> list[str]:
         """Describe blocks without a temperature, and missing values in the first and last mesh."""

@@ -4,6 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -53,7 +54,7 @@ class AbaqusReader(MeshReader):
             )
         self.count = len(self._frames)
         self.kind = f"mesh, Abaqus input with {self.count} frame{'s' * (self.count > 1)} of tables"
-        self._deck: tuple[Path, _Deck] | None = None
+        self._deck = lru_cache(1)(_read_deck)
 
     def file(self, number: int) -> Path:
         """Return the first table of a frame."""
@@ -61,9 +62,7 @@ class AbaqusReader(MeshReader):
 
     def read(self, number: int) -> Sequence[Block]:
         file, tables = self._frames[number]
-        if self._deck is None or self._deck[0] != file:
-            self._deck = (file, _read_deck(file))
-        return (_block(self._deck[1], tables),)
+        return (_block(self._deck(file), tables),)
 
 
 def _tables(file: Path) -> list[tuple[Path, ...]]:
@@ -88,7 +87,8 @@ def _read_deck(file: Path) -> _Deck:
     deck, instances, outside = _Deck(), 0, False
     for part in re.split(r"(?m)^\s*\*", text)[1:]:
         head, *lines = part.split("\n")
-        rows = filter(None, map(_words, lines))
+        words = ([word.strip() for word in line.split(",") if word.strip()] for line in lines)
+        rows = filter(None, words)
         keyword, options = _keyword(head)
         instances += keyword == "INSTANCE"
         # Nodes of the assembly itself are reference points with separate labels.
@@ -109,10 +109,6 @@ def _read_deck(file: Path) -> _Deck:
     if not deck.nodes or not deck.elements:
         raise SourceError(f"{file}: has no *NODE and *ELEMENT, expected an Abaqus input file")
     return deck
-
-
-def _words(line: str) -> list[str]:
-    return [word.strip() for word in line.split(",") if word.strip()]
 
 
 def _keyword(text: str) -> tuple[str, dict[str, str]]:
@@ -173,8 +169,13 @@ def _block(deck: _Deck, tables: Sequence[Path]) -> Block:
         unknown = table.index.difference(list(labels[kind]))
         if len(unknown):
             raise SourceError(f"{file}: label {unknown[0]:.12g} is not in the input file")
-        fields[kind] |= _columns(table, labels[kind])
-    points = _moved(np.array(list(deck.nodes.values())), fields["node"])
+        # Lines of one label are averaged; a label without a line is NaN.
+        means = table.groupby(level=0).mean().reindex(list(labels[kind]))
+        fields[kind] |= {str(name).strip(): means[name].to_numpy(np.float64) for name in means}
+    points = np.array(list(deck.nodes.values()))
+    for axis in range(3):
+        points[:, axis] = fields["node"].pop(f"COOR{axis + 1}", points[:, axis])
+        points[:, axis] += fields["node"].pop(f"U{axis + 1}", 0.0)
     kinds = np.array([kind for kind, _ in deck.elements.values()], np.uint8)
     table_of_cells = np.concatenate([np.array(cell) for cell in cells])
     grid = grid_of(table_of_cells, kinds, points, fields["node"], fields["element"])
@@ -201,19 +202,3 @@ def _read_table(file: Path) -> "pd.DataFrame":
     if table.empty:
         raise SourceError(f"{file}: has no row of numbers")
     return table.rename_axis(index=label)
-
-
-def _columns(table: "pd.DataFrame", labels: Iterable[int]) -> dict[str, NDArray[np.float64]]:
-    """Return the mean of each field at each label, NaN where there is no row."""
-    means = table.groupby(level=0).mean().reindex(list(labels))
-    return {str(name).strip(): values.to_numpy(np.float64) for name, values in means.items()}
-
-
-def _moved(
-    points: NDArray[np.float64], of_nodes: dict[str, NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    moved = points.copy()
-    for axis in range(3):
-        moved[:, axis] = of_nodes.pop(f"COOR{axis + 1}", moved[:, axis])
-        moved[:, axis] += of_nodes.pop(f"U{axis + 1}", 0.0)
-    return moved

@@ -142,46 +142,30 @@ def _seen(grid: Any) -> list[FlatMesh]:
 
 
 def _surface(grid: Any) -> Any:
-    """Return a filter for flat elements and the outside of solid ones, curved edges in pieces."""
+    """Return flat elements and the outside of solid ones, curved edges in pieces."""
+    import pyvista
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
     surface = vtkDataSetSurfaceFilter()
     surface.SetNonlinearSubdivisionLevel(2)
     surface.SetInputData(grid)
-    return surface
+    surface.Update()
+    return pyvista.wrap(surface.GetOutput())
 
 
 def _cut(grid: Any, axis: int, position: float) -> list[FlatMesh]:
     """Return a cut through solid elements; position in the file's unit."""
-    from vtkmodules.vtkCommonDataModel import vtkPlane
-    from vtkmodules.vtkFiltersCore import vtkCutter
-
     low, high = grid.bounds[2 * axis :][:2]
     # A plane in the outermost face would cut the elements on one side of the mesh only.
     edge = _NUDGE * (high - low)
     if low - edge <= position <= high + edge:
         position = float(np.clip(position, low + edge, high - edge))
     normal = np.eye(3)[axis]
-    plane = vtkPlane()
-    plane.SetNormal(*normal)
-    plane.SetOrigin(*(normal * position))
-    cutter = vtkCutter()
-    cutter.SetCutFunction(plane)
-    cutter.SetInputData(grid)
-    return _polygons(cutter)
+    return _polygons(grid.slice(normal, origin=normal * position, generate_triangles=True))
 
 
-def _polygons(source: Any) -> list[FlatMesh]:
-    """Return the output of a filter of VTK as triangles."""
-    import pyvista
-    from vtkmodules.vtkFiltersCore import vtkTriangleFilter
-
-    split = vtkTriangleFilter()
-    split.PassVertsOff()
-    split.PassLinesOff()
-    split.SetInputConnection(source.GetOutputPort())
-    split.Update()
-    surface = pyvista.wrap(split.GetOutput())
+def _polygons(polygons: Any) -> list[FlatMesh]:
+    surface = polygons.triangulate()
     if surface.n_cells == 0:
         return []
     triangles = np.asarray(surface.faces, np.int64).reshape(-1, 4)[:, 1:]

@@ -32,7 +32,6 @@ class Block:
     """Membership of the elements in named sets, shape (elements,), bool."""
 
     def has(self, name: str) -> bool:
-        """Return whether nodes or elements have a field."""
         return name in self.grid.point_data or name in self.grid.cell_data
 
 
@@ -40,11 +39,9 @@ class MeshReader(ABC):
     """Meshes over time in files of one kind: a frame per file, or one file with all frames."""
 
     kind: str
-    """Human-readable description."""
     times: tuple[float, ...] | None = None
     """Times of the frames in the file's unit; None if the files contain none."""
     count: int
-    """Number of frames."""
     known: Mapping[str, str] = MappingProxyType({})
     """Names that fields have in this format alone, by the names of a scene."""
 
@@ -84,9 +81,7 @@ def grid_of(
 
 def offsets_of(grid: Any) -> NDArray[np.int64]:
     """Return where the nodes of each element begin, and where those of the last one end."""
-    # PyVista gave it another name in 0.49.
-    offsets = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset
-    return np.asarray(offsets, np.int64)
+    return np.asarray(grid.cell_offsets, np.int64)
 
 
 def check_grid(file: Path, grid: Any) -> None:

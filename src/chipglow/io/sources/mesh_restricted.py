@@ -7,16 +7,13 @@ divided by the number of all elements there.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import COMMON_NAMES, match_names, simple
 from chipglow.io.sources.mesh_reader import Block, fields_of, offsets_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Frames: TypeAlias = Sequence[Sequence[Block]]
 BlockFields: TypeAlias = Mapping[tuple[str, ...], str | None]
@@ -32,10 +29,7 @@ _LARGEST_BLANK_FRACTION: Final = 0.5
 
 
 def restricted_fields(frames: Frames, given: Mapping[str, str]) -> dict[str, BlockFields]:
-    """Return the fields that differ from block to block in the first and the last frame.
-
-    They are by the names of a scene, some of which the user gave.
-    """
+    """Return the fields, by the names of a scene, that differ from block to block."""
     blocks = frames[0]
     scalars = [name for name, size in fields_of(blocks).items() if size == 1]
     found: dict[str, BlockFields] = {}
@@ -62,12 +56,13 @@ def with_own_fields(
 ) -> tuple[Block, ...]:
     """Return blocks with the fields that they have, under the names of those put together."""
     numbered = all(NODE_NUMBER in block.grid.point_data for block in blocks)
-    counts = _elements_at_nodes(blocks) if numbered and restricted else None
-    return tuple(_with_own(block, restricted, counts) for block in blocks)
+    factors = _divisors(blocks) if numbered and restricted else [None] * len(blocks)
+    pairs = zip(blocks, factors, strict=True)
+    return tuple(_with_own(block, restricted, of_block) for block, of_block in pairs)
 
 
 def _with_own(
-    block: Block, restricted: Mapping[str, BlockFields], counts: "pd.Series[int] | None"
+    block: Block, restricted: Mapping[str, BlockFields], factors: NDArray[Any] | None
 ) -> Block:
     grid = block.grid.copy(deep=False)
     for fields in restricted.values():
@@ -79,7 +74,7 @@ def _with_own(
                 del data[name]
             if values is not None:
                 of_nodes = data.association == grid.point_data.association
-                data[label] = _undivided(grid, values, counts) if of_nodes else values
+                data[label] = _undivided(grid, values, factors) if of_nodes else values
     if NODE_NUMBER in grid.point_data:
         del grid.point_data[NODE_NUMBER]
     return replace(block, grid=grid)
@@ -107,35 +102,26 @@ def _fields_by_block(ours: str, frames: Frames, names: Sequence[str]) -> dict[An
 def _has_values(frames: Frames, block: Block, name: str) -> bool:
     """Return whether most values of a block are not 0 in the first or last frame."""
     same = [other.grid for frame in frames for other in frame if other.names == block.names]
-    blank = [
-        _is_blank(data[name])
+    fields = [
+        np.nan_to_num(np.asarray(data[name], np.float64), posinf=0.0, neginf=0.0)
         for grid in same
         for data in (grid.point_data, grid.cell_data)
         if name in data and grid.n_cells
     ]
-    return any(values.mean() <= _LARGEST_BLANK_FRACTION for values in blank)
+    return any((values == 0.0).mean() <= _LARGEST_BLANK_FRACTION for values in fields)
 
 
-def _is_blank(values: Any) -> NDArray[np.bool_]:
-    numbers = np.asarray(values, np.float64)
-    return np.asarray(~np.isfinite(numbers) | (numbers == 0.0))
+def _divisors(blocks: Sequence[Block]) -> list[NDArray[Any]]:
+    """Return how many times as many elements all blocks have at each node as its own block has."""
+    grids = [block.grid for block in blocks]
+    of_blocks = [np.bincount(grid.cell_connectivity, minlength=grid.n_points) for grid in grids]
+    numbers = np.concatenate([grid.point_data[NODE_NUMBER] for grid in grids])
+    own, (_, at) = np.concatenate(of_blocks), np.unique(numbers, return_inverse=True)
+    factors = np.bincount(at, own)[at] / np.maximum(own, 1)
+    return np.split(factors, np.cumsum([grid.n_points for grid in grids])[:-1])
 
 
-def _elements_at_nodes(blocks: Sequence[Block]) -> "pd.Series[int]":
-    """Return how many elements of all blocks are at each node, by the node's number."""
-    import pandas as pd
-
-    counts = [
-        pd.Series(
-            np.bincount(np.asarray(block.grid.cell_connectivity), minlength=block.grid.n_points),
-            np.asarray(block.grid.point_data[NODE_NUMBER]),
-        )
-        for block in blocks
-    ]
-    return pd.concat(counts).groupby(level=0).sum()
-
-
-def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None") -> NDArray[Any]:
+def _undivided(grid: Any, values: NDArray[Any], factors: NDArray[Any] | None) -> NDArray[Any]:
     """Return a block's values at its nodes, those that MOOSE divided restored.
 
     At a node that blocks share the restored value is taken if it is nearer to the mean of the
@@ -144,14 +130,11 @@ def _undivided(grid: Any, values: NDArray[Any], counts: "pd.Series[int] | None")
     from scipy.sparse import csr_array
 
     values = np.array(values, np.float64)
-    if counts is None:
+    if factors is None:
         return values
     nodes = np.asarray(grid.cell_connectivity)
     shape = (grid.n_cells, grid.n_points)
     incidence = csr_array((np.ones(len(nodes)), nodes, offsets_of(grid)), shape=shape)
-    own = np.asarray(incidence.sum(axis=0))
-    everywhere = counts.loc[np.asarray(grid.point_data[NODE_NUMBER])].to_numpy()
-    factors = everywhere / np.maximum(own, 1.0)
     free = (factors <= 1.0).astype(np.float64)
     sums, number = (incidence.T @ (incidence @ of) for of in (np.where(free, values, 0.0), free))
     with np.errstate(invalid="ignore", divide="ignore"):

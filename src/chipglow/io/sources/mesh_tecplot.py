@@ -13,8 +13,14 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
 from chipglow.io.sources.source import SourceError, naming
-from chipglow.io.sources.tecplot_binary import MAGIC, binary_zones
-from chipglow.io.sources.tecplot_zone import ELEMENTS, ORDERED, Zone, block_of
+from chipglow.io.sources.tecplot_binary import (
+    ELEMENTS,
+    MAGIC,
+    ORDERED,
+    Zone,
+    binary_zones,
+    block_of,
+)
 
 ENDINGS: Final = (".dat", ".tec", ".plt")
 
@@ -79,7 +85,8 @@ def _ascii_zones(file: Path) -> tuple[Zone, ...]:
         data = _NUMBER.search(content, start, end)
         if not names or data is None:
             break
-        keys = _keys(_text(content[start : data.start()]))
+        head = re.sub(r"^\s*ZONE", "", _text(content[start : data.start()]), flags=re.I)
+        keys = {key.upper(): value.strip('"') for key, value in re.findall(_KEY, head)}
         with naming(f"{file}: zone {number}: SOLUTIONTIME"):
             time = float(keys["SOLUTIONTIME"]) if "SOLUTIONTIME" in keys else None
         read = partial(_load, file, content, number, names, keys, data.start(), end)
@@ -101,11 +108,6 @@ def _names(header: str) -> tuple[str, ...]:
         return ()
     words = re.findall(r'"([^"]*)"|([^\s,"]+)', found.group(1))
     return tuple((quoted or plain).strip() for quoted, plain in words)
-
-
-def _keys(text: str) -> dict[str, str]:
-    pairs = re.findall(_KEY, re.sub(r"^\s*ZONE", "", text, flags=re.I))
-    return {key.upper(): value.strip('"') for key, value in pairs}
 
 
 def _load(

@@ -56,8 +56,8 @@ class VtkReader(MeshReader):
             if self.times:
                 self._opened, self.count = opened, len(self.times)
         if self.times is None:
-            times = [_time_in_head(file) for file in files]
-            found = tuple(time for time in times if time is not None)
+            heads = [re.search(_TIME, _head(file, _HEAD)) for file in files]
+            found = tuple(float(head[1]) for head in heads if head)
             self.times = found if len(found) == len(files) else None
 
     def read(self, number: int) -> Sequence[Block]:
@@ -199,11 +199,6 @@ def _at_time(reader: Any, number: int, time: float) -> Any:
     # PyVista reads without saying the time again, which XDMF's reader takes for the first.
     algorithm.UpdateTimeStep(time)
     return pyvista.wrap(algorithm.GetOutputDataObject(0))
-
-
-def _time_in_head(file: Path) -> float | None:
-    found = re.search(_TIME, _head(file, _HEAD))
-    return float(found.group(1)) if found else None
 
 
 def _blocks(file: Path, data: Any, path: tuple[str, ...]) -> Iterator[Block]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, ValidationInfo
+from pydantic import AfterValidator
 
 from chipglow.io.sources.colour_scale import (
     ColourScale,
@@ -62,12 +62,10 @@ _LOWEST: Final = 0.02
 """Fraction of a scale up to which a colour at the border is taken for its lowest value."""
 
 
-def _text_of_file(value: str | float, info: ValidationInfo) -> str | float:
-    """Return a number of a file as text: it may lack its unit. Python's numbers are in SI."""
-    return str(value) if info.context else value
-
-
-_Value = Annotated[str | int | float, AfterValidator(_text_of_file)]
+# A number of a file is text, which may lack its unit; Python's numbers are in SI.
+_Value = Annotated[
+    str | int | float, AfterValidator(lambda value, info: str(value) if info.context else value)
+]
 
 
 @dataclass(frozen=True)
@@ -249,10 +247,7 @@ class MovieSource(Source, Part):
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the pictures: means of values, not of colours; see `Source.frames`.
-
-        A tool that is known by its colour has no values.
-        """
+        """Sample the pictures: means of values, not of colours; see `Source.frames`."""
         indices, readers, _ = self._opened
         index = indices["temperature"]
         times, _ = self._times(index)
@@ -280,20 +275,18 @@ class MovieSource(Source, Part):
         for name, reader in readers.items():
             last = indices[name].count - 1
             numbers = sorted({0, last // 2, last})
-            values, distance, lines = [], [], []
-            for number, picture in zip(
-                numbers, pictures(self._path(name), indices[name], numbers), strict=True
-            ):
-                read = self._read(name, reader, picture, number)
-                values.append(read.values[read.seen])
-                distance.append(read.distance[read.seen])
-                lines.append(reader.error_of_filling(read))
+            shown = pictures(self._path(name), indices[name], numbers)
+            reads = [
+                self._read(name, reader, picture, number)
+                for number, picture in zip(numbers, shown, strict=True)
+            ]
+            values = np.concatenate([read.values[read.seen] for read in reads])
+            distance = np.concatenate([read.distance[read.seen] for read in reads])
+            movie = self._movies[name]
             result[name] = replace(
-                colour_uncertainty(reader.scale, np.concatenate(values), np.concatenate(distance)),
-                legend=_uncertainty_of_legend(
-                    self._movies[name], reader.legend, self._movies[name].ends(name)
-                ),
-                lines=sqrt(fmean(error**2 for error in lines)),
+                colour_uncertainty(reader.scale, values, distance),
+                legend=_uncertainty_of_legend(movie, reader.legend, movie.ends(name)),
+                lines=sqrt(fmean(reader.error_of_filling(read) ** 2 for read in reads)),
             )
         return result
 

@@ -37,7 +37,6 @@ class MovieIndex:
     rows: int
     columns: int
     count: int
-    """Number of pictures."""
     times: NDArray[np.float64] | None
     """Times of the pictures in s from the first; None if the movie contains none."""
     square: bool

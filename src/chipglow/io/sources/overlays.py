@@ -81,15 +81,13 @@ class FieldReader:
                     )
 
     def read(self, picture: Picture) -> FieldPicture:
-        """Return values, material and quality of a picture.
-
-        Pixels of lines and text take the material and the value of the nearest pixel
-        that shows them; in the tool, of the nearest one in the tool.
-        """
+        """Return a picture's contents; pixels of lines and text take those of the nearest pixel."""
         values, distance = self.scale.invert(picture)
         void, tool = self._marked(picture, distance)
         off_scale = (distance > self.limit) & ~void & ~tool
-        drawn = _grown(off_scale | (dark_lines(picture) & ~void & ~tool)) | self.covered
+        lines = off_scale | (dark_lines(picture) & ~void & ~tool)
+        # What is drawn over a field shades into the pixels around.
+        drawn = maximum_filter(lines.view(np.uint8), 3).view(np.bool_) | self.covered
         seen = ~(drawn | void | tool)
         material = np.full(values.shape, Material.WORKPIECE, np.uint8)
         material[void], material[tool] = Material.VOID, Material.TOOL
@@ -239,11 +237,6 @@ def place_of(scale: ColourScale, colour: Colour) -> tuple[float, float]:
     """Return the value of the nearest place of a scale, and its distance."""
     value, apart = scale.invert(np.array([[colour]], np.uint8))
     return float(value[0, 0]), float(apart[0, 0])
-
-
-def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Add the pixels around: what is drawn over a field shades into it."""
-    return np.asarray(maximum_filter(mask.view(np.uint8), 3)).view(np.bool_)
 
 
 def _without_lines(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

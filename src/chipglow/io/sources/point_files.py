@@ -1,11 +1,12 @@
 """Tables of points over time: text, dumps of LAMMPS, NumPy, HDF5, MATLAB and VTK files."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import prod
+from io import BytesIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,13 +16,21 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.lammps_dump import ENDINGS, Snapshot, is_dump, snapshots
 from chipglow.io.sources.source import SourceError, files_of, reading, required
 from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".dat", ".tsv")
 MOST_POINTS: Final = 10_000_000
+DUMP_ENDINGS: Final = (".dump", ".lammpstrj", ".lammpsdump")
+
+_ITEM: Final = b"ITEM: "
+_ATOMS: Final = re.compile(rb"(?m)^ITEM: ATOMS ([^\r\n]*)\r?\n")
+_LENGTHS: Final[Mapping[str, tuple[str, str]]] = {
+    "si": ("m", "s"), "cgs": ("cm", "s"), "micro": ("um", "us"), "nano": ("nm", "ns"),
+    "metal": ("angstrom", "ps"), "real": ("angstrom", "fs"),
+}  # fmt: skip
+"""Units of length and time by LAMMPS's names of its systems of units."""
 
 _PLACES: Final = ("points", "positions", "position", "coordinates", "coords", "pos", "location")
 _PERHAPS_TIME: Final = "t"
@@ -43,7 +52,6 @@ class PointTable:
 
     @property
     def count(self) -> int:
-        """Number of points."""
         return len(next(iter(self.columns.values()), ()))
 
     def check(self) -> None:
@@ -87,8 +95,10 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     paths = files_of(pattern)
     path, suffix = paths[0], paths[0].suffix.lower()
     _check_empty(path)
-    if suffix in (*ENDINGS, *TEXT_SUFFIXES) and is_dump(path):
-        return _dumps(paths)
+    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES):
+        with path.open("rb") as stream:
+            if stream.read(len(_ITEM)) == _ITEM:
+                return _dumps(paths)
     if len(paths) == 1 and suffix in TEXT_SUFFIXES:
         return _split(_read_text(path), time)
     if len(paths) == 1 and suffix not in VTK_SUFFIXES:
@@ -111,18 +121,6 @@ def _read_file(path: Path) -> PointTable:
         return _read_vtk(path)
     with ExitStack() as stack:
         return _stacked(str(path), open_arrays(str(path), stack), None, one_frame=True).tables[0]()
-
-
-def _dumps(paths: Sequence[Path]) -> PointFrames:
-    found = [snapshot for path in paths for snapshot in snapshots(path)]
-    known = [snapshot.time for snapshot in found if snapshot.time is not None]
-    times = np.array(known) if known and len(known) == len(found) else None
-    unit = found[0].units.get("time") if found else None
-    return PointFrames([partial(_of_snapshot, snapshot) for snapshot in found], times, unit)
-
-
-def _of_snapshot(snapshot: Snapshot) -> PointTable:
-    return PointTable(str(snapshot.path), snapshot.columns(), snapshot.units)
 
 
 # Text
@@ -210,8 +208,7 @@ def _stacked(
     columns = [named[name] for name, depth in depths.items() if depth == 1 + timed]
     if not timed:
         return PointFrames([partial(_of_arrays, path, columns, None)], time_label=label)
-    check_samples(str(named[label]), named[label].size)
-    times = np.asarray(_read(named[label], None), np.float64).reshape(-1)
+    times = np.asarray(named[label].part(), np.float64).reshape(-1)
     for array in columns:
         if array.shape[0] != len(times):
             raise SourceError(
@@ -242,21 +239,13 @@ def _of_arrays(path: str, arrays: Sequence[FileArray], index: int | None) -> Poi
     columns: dict[str, NDArray[Any]] = {}
     units: dict[str, str] = {}
     for array in arrays:
-        parts = _components(array.short, _read(array, index))
+        frames = slice(index, None if index is None else index + 1)
+        values = array.part((frames, *(slice(None),) * len(array.shape[1:])))
+        parts = _components(array.short, values if index is None else values[0])
         columns |= parts
         if array.unit:
             units |= dict.fromkeys(parts, array.unit)
     return PointTable(path, columns, units)
-
-
-def _read(array: FileArray, index: int | None) -> NDArray[Any]:
-    """Read an array, or what it contains of a frame."""
-    check_samples(str(array), prod(array.shape if index is None else array.shape[1:]))
-    check_samples(f"{array}: a chunk", prod(array.chunks or ()))
-    first = slice(None) if index is None else slice(index, index + 1)
-    with reading(array):
-        values = array.read((first, *(slice(None),) * (len(array.shape) - 1))[: len(array.shape)])
-    return values if index is None else values[0]
 
 
 def _components(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
@@ -278,3 +267,102 @@ def _read_vtk(path: Path) -> PointTable:
         if values.dtype.kind in "fiub" and (values.ndim == 1 or values.shape[1] in (2, 3)):
             columns |= _components(name, values)
     return PointTable(str(path), columns)
+
+
+# Dumps of LAMMPS, as ``dump custom`` writes them
+
+
+@dataclass(frozen=True)
+class _Snapshot:
+    """Frame of a dump."""
+
+    path: Path
+    rows: slice
+    """Bytes of the lines of its atoms."""
+    count: int
+    labels: tuple[str, ...]
+    box: NDArray[np.float64]
+    """Lowest and highest place along x, y and z, shape (3, 2)."""
+    tilted: bool
+    """Whether the box is oblique."""
+    time: float | None
+    """Time in the dump's unit."""
+    units: Mapping[str, str]
+    """Units of places, velocities and times, if the dump states its system of units."""
+
+    def table(self) -> PointTable:
+        """Read the numbers of the atoms, with their places as ``x``, ``y``, ``z``."""
+        import pandas as pd
+
+        check_samples(f"{self.path}: a frame", self.count * len(self.labels))
+        with reading(self.path), _mapped(self.path) as content:
+            table = pd.read_csv(BytesIO(content[self.rows]), sep=r"\s+", header=None)
+        shape = self.count, len(self.labels)
+        if table.shape != shape or table.iloc[:, -1].isna().any():
+            raise SourceError(
+                f"{self.path}: a frame has {table.shape[0]} atoms of {table.shape[1]} numbers, "
+                f"expected {shape[0]} of {shape[1]}: it is truncated"
+            )
+        table.columns = pd.Index(self.labels)
+        numbers = table.select_dtypes("number")
+        columns = {label: numbers[label].to_numpy(np.float64) for label in numbers}
+        for (low, high), axis in zip(self.box, "xyz", strict=True):
+            # Places may be unwrapped or fractions of the box.
+            names = [
+                name for name in (axis, f"{axis}u", f"{axis}s", f"{axis}su") if name in columns
+            ]
+            if names:
+                values = columns.pop(names[0])
+                scaled = "s" in names[0]
+                if scaled and self.tilted:
+                    raise SourceError(
+                        f"{self.path}: {names[0]} in an oblique box, expected places as {axis}"
+                    )
+                columns[axis] = low + values * (high - low) if scaled else values
+        return PointTable(str(self.path), columns, self.units)
+
+
+def _dumps(paths: Sequence[Path]) -> PointFrames:
+    found = [snapshot for path in paths for snapshot in _snapshots(path)]
+    known = [snapshot.time for snapshot in found if snapshot.time is not None]
+    times = np.array(known) if known and len(known) == len(found) else None
+    unit = found[0].units.get("time") if found else None
+    return PointFrames([snapshot.table for snapshot in found], times, unit)
+
+
+def _mapped(path: Path) -> mmap:
+    with path.open("rb") as stream:
+        return mmap(stream.fileno(), 0, access=ACCESS_READ)
+
+
+def _snapshots(path: Path) -> Iterator[_Snapshot]:
+    """Yield all frames of a dump, whose atoms are not read yet."""
+    content = _mapped(path)
+    if content[-1:] != b"\n":
+        raise SourceError(f"{path}: its last line has no end, it is truncated")
+    begin, units = 0, _units("")
+    for atoms in _ATOMS.finditer(content):
+        head = content[begin : atoms.start()].decode("utf-8", "replace")
+        begin = content.find(b"\n" + _ITEM, atoms.end() - 1) + 1 or len(content)
+        items = dict(re.findall(r"ITEM: ([A-Z ]+)[^\n]*\n((?:(?!ITEM: ).*\n)*)", head))
+        items = {name.strip(): value.strip() for name, value in items.items()}
+        units = _units(items["UNITS"]) if "UNITS" in items else units
+        try:
+            count = int(items["NUMBER OF ATOMS"])
+            box = np.array([line.split()[:2] for line in items["BOX BOUNDS"].split("\n")], float)
+            time = float(items["TIME"]) if "TIME" in items else None
+        except (KeyError, ValueError):
+            raise SourceError(f"{path}: a frame's head is damaged") from None
+        labels = tuple(atoms[1].decode("utf-8", "replace").split())
+        if count < 1 or box.shape != (3, 2) or len(set(labels)) < max(len(labels), 1):
+            raise SourceError(f"{path}: a frame's head is damaged")
+        rows = slice(atoms.end(), begin)
+        yield _Snapshot(path, rows, count, labels, box, " xy " in head, time, units)
+
+
+def _units(system: str) -> dict[str, str]:
+    if system not in _LENGTHS:
+        return {}
+    length, time = _LENGTHS[system]
+    places = dict.fromkeys("xyz", length)
+    return {**places, **dict.fromkeys(("vx", "vy", "vz"), f"{length}/{time}"), "time": time}

@@ -162,17 +162,12 @@ class Source(ABC):
     another process. Its declared fields are the section of an import's description, which sets
     the fields ``files``, ``names``, ``units``, ``placement`` and ``interval`` if they exist; all
     need a default.
-
-    Attributes
-    ----------
-    title : str
-        Name of such sources for the comment on the section.
-    endings : tuple of str
-        Endings of the names of their files, in lower case.
     """
 
     title: ClassVar[str] = ""
+    """Name of such sources for the comment on the section."""
     endings: ClassVar[tuple[str, ...]] = ()
+    """Endings of the names of their files, in lower case."""
 
     @property
     def own_files(self) -> Any:
@@ -181,29 +176,8 @@ class Source(ABC):
 
     @abstractmethod
     def survey(self) -> Survey:
-        """Return what the source contains.
-
-        Raises
-        ------
-        SourceError
-            If it cannot be read.
-        OSError
-            If a file is missing or not accessible.
-        """
+        """Return what the source contains; raise SourceError if it cannot be read."""
 
     @abstractmethod
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the frames one by one; only a few are in memory at a time.
-
-        Parameters
-        ----------
-        raster : Raster
-            Positions of the samples.
-        start : int
-            Index of the first frame to sample.
-
-        Raises
-        ------
-        SourceError
-            If a frame cannot be read.
-        """
+        """Sample the frames from number `start` on; only a few are in memory at a time."""

@@ -1,24 +1,31 @@
-"""Binary files of Tecplot, versions 107 to 112 (``.plt``).
+"""Zones of Tecplot, and its binary files (``.plt``), versions 107 to 112.
 
-After the appendix on binary files of Tecplot's Data Format Guide; what differs between versions is
-as Tecplot's own library (TecIO) has it: no kind of packing from 112 on, tables of raw face
-neighbours from 108, the type of the file from 111.
+They follow the appendix on binary files of Tecplot's Data Format Guide; what differs between
+versions is as Tecplot's own library (TecIO) has it: no kind of packing from 112 on, tables of raw
+face neighbours from 108, the type of the file from 111.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite, prod
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources.conventions import simple
 from chipglow.io.sources.mesh_reader import Block
 from chipglow.io.sources.source import SourceError, naming
-from chipglow.io.sources.tecplot_zone import ELEMENTS, ORDERED, Zone, block_of
+
+ORDERED: Final = "ORDERED"
+ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
+    "LINESEG": (2, 3), "TRIANGLE": (3, 5), "QUADRILATERAL": (4, 9), "TETRAHEDRON": (4, 10),
+    "BRICK": (8, 12),
+}  # fmt: skip
+"""Number of nodes of the elements, and their type in VTK."""
 
 MAGIC: Final = b"#!TDV"
 
@@ -42,6 +49,58 @@ _LINE, _RECTANGLE, _ELLIPSE = 0, 1, 4
 _GRID_3D: Final = 4
 
 
+class Zone(NamedTuple):
+    """A zone in a file."""
+
+    time: float | None
+    """Its time; None if it exists at all times."""
+    load: Callable[[], Block]
+    """Reads its mesh and fields."""
+
+
+def block_of(
+    names: tuple[str, ...],
+    columns: Mapping[str, NDArray[np.float64]],
+    centred: set[str],
+    kind: str,
+    cells: NDArray[np.int64] | tuple[int, int, int],
+) -> Block:
+    """Return a block with the variables of a zone, its positions among them.
+
+    Some variables are ``centred`` in elements. The cells are the nodes of each element, from 0, or
+    the numbers of points along i, j and k.
+    """
+    import pyvista
+
+    fields = dict(columns)
+    points = _points(fields)
+    if isinstance(cells, tuple):
+        grid: Any = pyvista.StructuredGrid()
+        grid.points = points
+        grid.dimensions = cells
+        grid = grid.cast_to_unstructured_grid()
+    else:
+        size, vtk = ELEMENTS[kind]
+        if cells.min() < 0 or cells.max() >= len(points):
+            raise ValueError(f"elements have nodes {cells.min() + 1} to {cells.max() + 1}")
+        table = np.insert(cells, 0, size, axis=1)
+        grid = pyvista.UnstructuredGrid(table.ravel(), np.full(len(cells), vtk, np.uint8), points)
+    for name, values in fields.items():
+        (grid.cell_data if name in centred else grid.point_data)[name] = values
+    return Block(names, grid)
+
+
+def _points(fields: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Take the positions of the nodes out of the fields."""
+    found: list[NDArray[np.float64]] = []
+    for axis in "xyz":
+        own = next((own for own in fields if simple(own) in (axis, f"coordinate{axis}")), None)
+        if own is None and axis != "z":
+            raise ValueError(f"there is no {axis.upper()}")
+        found.append(np.zeros_like(found[0]) if own is None else fields.pop(own))
+    return np.stack(found, axis=1)
+
+
 @dataclass
 class _Zone:
     """Header of a zone, and its numbers, which are read from the file when they are used."""
@@ -57,10 +116,6 @@ class _Zone:
     """Numbers in the tables of neighbours of its faces."""
     columns: list[NDArray[Any] | None] = field(default_factory=list)
     cells: NDArray[Any] | None = None
-
-    @property
-    def is_empty(self) -> bool:
-        return not prod(self.shape) or (self.kind != ORDERED and not self.elements)
 
     def stored_shape(self, ghosts: bool) -> tuple[int, int, int]:
         """Return how values of elements of an ordered zone are stored along i, j and k."""
@@ -101,7 +156,7 @@ def binary_zones(file: Path) -> tuple[Zone, ...]:
             partial(_block, file, number, names, zone, ghosts),
         )
         for number, zone in enumerate(zones, start=1)
-        if not zone.is_empty
+        if prod(zone.shape) and (zone.kind == ORDERED or zone.elements)
     )
 
 
@@ -206,7 +261,8 @@ def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Zone]:
         elif marker == _GEOMETRY:
             _skip_geometry(cursor)
         elif marker == _TEXT:
-            _skip_text(cursor)
+            cursor.take("iidddiididdiiddiii")
+            _skip_remark(cursor)
         elif marker == _LABELS:
             for _ in range(cursor.integer()):
                 cursor.text()
@@ -278,11 +334,6 @@ def _skip_geometry(cursor: _Cursor) -> None:
         return
     for _ in range(cursor.integer()):
         cursor.skip(kind, cursor.integer() * (3 if system == _GRID_3D else 2))
-
-
-def _skip_text(cursor: _Cursor) -> None:
-    cursor.take("iidddiididdiiddiii")
-    _skip_remark(cursor)
 
 
 def _locate(cursor: _Cursor, names: Sequence[str], zones: Sequence[_Zone], ghosts: bool) -> None:

@@ -1,7 +1,9 @@
 """How a table in text is written: what is between its numbers, and whether it is whole."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -40,10 +42,14 @@ class TextTable:
         size = path.stat().st_size
         if size > _LARGEST_TABLE:
             raise SourceError(f"{path}: has {size} bytes, expected up to {_LARGEST_TABLE}")
-        first, second = _two_lines(path, skipped)
+        lines = list(islice(filter(None, _lines(path, skipped)), 2))
+        if not lines:
+            raise SourceError(f"{path}: there is no number in it")
+        first, last = lines[0], lines[-1]
+        if "\0" in first:
+            raise SourceError(f"{path}: is not text, expected a table of numbers")
         separator = next((mark for mark in ";\t," if mark in first), r"\s+")
-        text = second or first
-        decimal = "," if separator != "," and "," in text and "." not in text else "."
+        decimal = "," if separator != "," and "," in last and "." not in last else "."
         table = cls(path, first, separator, decimal)
         table._check_end()
         return table
@@ -106,32 +112,18 @@ def _without_comment(line: str) -> str:
 
 def lines_of_text(path: Path) -> int:
     """Return the number of lines before the first one of numbers alone; 0 without one."""
+    lines = enumerate(_lines(path))
+    return next((number for number, line in lines if _NUMBERS.fullmatch(line)), 0)
+
+
+def _lines(path: Path, skipped: int = 0) -> Iterator[str]:
+    """Yield the first lines after the skipped ones, without comments."""
     with path.open(encoding="utf-8-sig") as stream:
-        for number in range(_MOST_COMMENTS):
+        for number in range(skipped + _MOST_COMMENTS):
             line = stream.readline(_LONGEST_LINE)
             if not line:
-                return 0
-            if _NUMBERS.fullmatch(_without_comment(line)):
-                return number
-    return 0
-
-
-def _two_lines(path: Path, skipped: int) -> tuple[str, str]:
-    """Return the first two lines apart from comments, after the skipped ones."""
-    lines: list[str] = []
-    with path.open(encoding="utf-8-sig") as stream:
-        for _ in range(skipped):
-            stream.readline(_LONGEST_LINE)
-        for _ in range(_MOST_COMMENTS):
-            line = stream.readline(_LONGEST_LINE)
+                return
             if len(line) == _LONGEST_LINE:
                 raise SourceError(f"{path}: a line has over {_LONGEST_LINE} letters")
-            if known := _without_comment(line):
-                lines.append(known)
-            if not line or len(lines) == 2:
-                break
-    if not lines:
-        raise SourceError(f"{path}: there is no number in it")
-    if "\0" in lines[0]:
-        raise SourceError(f"{path}: is not text, expected a table of numbers")
-    return lines[0], lines[1] if len(lines) > 1 else ""
+            if number >= skipped:
+                yield _without_comment(line)
