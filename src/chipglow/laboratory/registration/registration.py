@@ -105,10 +105,7 @@ class Registration:
         return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
-        """Return median and largest standard uncertainty of a mapped position in m.
-
-        It is the root of the sum of the variances along x and y.
-        """
+        """Return median and largest standard uncertainty in m, of x and y together."""
         places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1)
         variance = np.trace(self.position_covariance(places), axis1=-2, axis2=-1)
         found = np.sqrt(np.maximum(variance, 0.0))
@@ -262,6 +259,10 @@ class NormalisedFrame:
         """Return columns and rows in these coordinates."""
         return (pixels - self.pixel_centre) / self.pixel_scale
 
+    def pixels(self, matrix: Array, unit: Array) -> Array:
+        """Return columns and rows of places that a matrix in these coordinates maps."""
+        return mapped_places(matrix, unit) * self.pixel_scale + self.pixel_centre
+
     def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
         """Return a matrix in these coordinates, and its covariance, for m and pixels."""
         x, y = self.centre / self.scale
@@ -279,10 +280,7 @@ class NormalisedFrame:
 
 
 def parameter_basis(model: Model, mirrored: bool) -> Array:
-    """Return the elements of a matrix by the parameters of a model, shape (9, parameters).
-
-    The matrix is this times the parameters, and 1 for its last element.
-    """
+    """Return the elements of a matrix by a model's parameters, but for the last one's 1; (9, k)."""
     if model != "similarity":
         return np.eye(9)[:, : _PARAMETERS[model]]
     sign = -1.0 if mirrored else 1.0
