@@ -398,11 +398,7 @@ def _read(
     position: float,
     nearer: Array,
 ) -> Array:
-    """Return the temperature at points of a frame and its changes, NaN beyond the curve's ends.
-
-    Rows: temperature; change by the place of the curve; by an edge that is nearer to the curve by
-    each of `nearer` in m; by each error of the calibration.
-    """
+    """Return temperature and its changes by the curve's place, `nearer` and the calibration."""
     effects, pitch = measurement.calibration_effects(number), measurement.raster.spacing
     rows = np.full((2 + nearer.size + len(effects), len(points)), nan)
     there = np.isfinite(points[:, 0])

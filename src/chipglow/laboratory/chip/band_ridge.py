@@ -84,15 +84,11 @@ class ThermalImage:
 
 
 def find_band(image: ThermalImage, tool: Tool) -> Line:
-    """Find the shear band in a measured image.
+    """Find the shear band in a measured image: the best path along ridges off the rake face.
 
-    A ridge is where the second derivative across it is negative (Lindeberg 1998: eigenvalues of
-    the Hessian after Gaussians of several widths, times the square of the width). Ridges along the
-    rake face, where friction heats the chip, are left out. The band is the path, with one angle at
-    every radius about the edge, of the largest sum of log(1 + response / 5 K): one that begins at
-    the edge, else the best anywhere. It is moved to the maximum across it and smoothed. Where that
-    leads to no band, the border of a cold strip below the edge may have drawn the path: the search
-    is repeated without what lies below the edge.
+    A ridge is where the second derivative across it is negative (Lindeberg 1998). Where the path
+    leads to no band, the border of a cold strip below the edge may have drawn it: the search is
+    repeated without what lies below the edge.
     """
     _check_edge(image.raster, tool)
     try:

@@ -53,10 +53,8 @@ def frame_mean(estimate: Estimate) -> Estimate:
 def frame_scatter(frames: Array) -> Component:
     """Return the errors of a mean over frames of shape (frames, ...), as the frames show them.
 
-    Correlated successive frames count as fewer: the variance of the mean grows by
-    1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that is
-    not positive (C. J. Geyer, Statistical Science 7 (1992) 473). Fewer than 8 frames do not show
-    their correlation: all of them count as one, with one degree of freedom.
+    Correlated successive frames count as fewer (C. J. Geyer, Statistical Science 7 (1992) 473);
+    fewer than 8 frames do not show their correlation and count as one.
     """
     known = np.isfinite(frames)
     count = known.sum(axis=0)
@@ -90,10 +88,7 @@ def _longer(away: Array) -> float:
 
 
 def unit_table(data: xr.Dataset, names: Mapping[str, str]) -> pd.DataFrame:
-    """Return variables in SI units as columns, in the units at the end of the columns' names.
-
-    A row for each element of the last variable, in the order of its dimensions.
-    """
+    """Return variables in SI units as columns, in the units at the end of the columns' names."""
     order = list(data[[*names][-1]].dims)
     table = data[[*names]].to_dataframe(dim_order=order).reset_index().rename(columns=names)
     for name in names.values():
@@ -107,10 +102,7 @@ def unit_table(data: xr.Dataset, names: Mapping[str, str]) -> pd.DataFrame:
 def budget_table(
     data: xr.Dataset, names: Mapping[str, str], estimate: Estimate, causes: Sequence[str]
 ) -> pd.DataFrame:
-    """Return `unit_table` with the standard uncertainty of temperatures in K and its parts.
-
-    NaN of a cause that is not in the budget, or of which nothing is known.
-    """
+    """Return `unit_table` with the standard uncertainty in K and its parts; NaN if unknown."""
     known, dims = np.isfinite(estimate.values), data[[*names][-1]].dims
     budget = {"standard_uncertainty_K": known_uncertainty(estimate)}
     for cause in causes:

@@ -102,12 +102,8 @@ class ChipMetrics(Segmentation):
 def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     """Measure a chip: thickness, segmentation, contact, speed and shear band.
 
-    A camera's view seldom holds two whole segments at once. So the chip is measured as it passes
-    one line at right angles to the rake face, the lowest on which its free surface is in the view
-    and over 1.2 times the feed all the time: higher up it has lifted off and curls. The means are
-    over whole periods, each moment weighted by the chip's speed, which makes them means over the
-    chip's length. At most 64 frames are looked at, of the scene's longest part without a gap.
-    Segments are found in the thickness that the scene states over the cut, or else on the line.
+    A camera's view seldom holds two whole segments at once: the chip is measured as it passes one
+    line at right angles to the rake face. Means are over the chip's length, in whole periods.
     """
     tool = scene.tool
     if tool is None:
@@ -218,10 +214,7 @@ def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
 
 
 def _profile(solid: NDArray[np.bool_], raster: Raster, tool: Tool, heights: Array) -> Array:
-    """Return the distance from the rake face to the chip's free surface; NaN outside the view.
-
-    The chip is the longest stretch of material on the line: it may have lifted off the face.
-    """
+    """Return the distance to the end of the longest stretch of material; NaN outside the view."""
     step = raster.spacing / 2
     distance = step * (np.arange(2 * (raster.rows + raster.columns)) + 0.5)
     places = tool.rake_point(heights)[:, None] + distance[:, None] * np.array(tool.rake_normal)

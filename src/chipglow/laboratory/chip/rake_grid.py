@@ -87,11 +87,7 @@ class RakeGrid:
 
     @cached_property
     def frame_estimate(self) -> Estimate:
-        """Mean over the frames in which a square is usable in K, shape (m, n).
-
-        The component ``frames`` is the scatter between them (`frame_scatter`), the pixels' noise
-        included; one frame shows nothing of it.
-        """
+        """Mean over the frames that show a square in K, with their scatter, shape (m, n)."""
         mean = frame_mean(self.estimate)
         if self.times.size == 1:
             return mean.with_unevaluated(FRAMES)

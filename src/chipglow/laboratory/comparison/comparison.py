@@ -49,10 +49,7 @@ _SAME_ANGLE: Final = radians(0.1)
 
 
 def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
-    """Return E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043), k = `COVERAGE`.
-
-    The two agree up to 1. Errors that both have in common cancel in their difference.
-    """
+    """Return E_n = abs(T_sim − T_meas) / U(T_sim − T_meas) (ISO/IEC 17043), k = `COVERAGE`."""
     away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.abs(away.values) / (COVERAGE * away.standard_uncertainty)
@@ -409,10 +406,7 @@ def _compare_band(
 def _laid_by_the_edge(
     measured: Measurement, profile: BandProfile, tool: Tool, uncertainty: ToolUncertainty
 ) -> BandProfile:
-    """Replace the effect of the tool's place by that of a given curve that is placed by the edge.
-
-    On the simulations the curve is off by as much as the edge is here, across itself too.
-    """
+    """Replace the effect of the tool's place by that on a given curve, placed by the edge."""
     moves = uncertainty.displacements(tool, tool.edge_point)
     found = np.full((len(moves), *profile.temperature.shape), np.nan)
     for frame, points in enumerate(profile.points):
@@ -512,10 +506,7 @@ def _fit(measured: Estimate, simulated: Estimate) -> dict[str, float]:
 
 
 def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[float]:
-    """Return the fraction of the draws of all uncertainties in which each set is the best.
-
-    NaN of one frame, which does not show how the frames vary.
-    """
+    """Return the fraction of draws in which each set is best; NaN with one measured frame."""
     if FRAMES in measured.unevaluated:
         return [nan] * len(simulated)
     generator = np.random.default_rng(_SEED)

@@ -343,10 +343,7 @@ def _design(temperatures: Sequence[float]) -> Array:
 
 
 def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
-    """Compute the emissivity from in-band radiance in W/(m² sr).
-
-    ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
-    """
+    """Compute the emissivity from W/(m² sr): Equation 2 of Heigel and Whitenton (2010), solved."""
     ends = band.radiance(np.array([heating.reference, heating.reflected]))
     return np.asarray(_emissivity(radiance, *ends), np.float64)
 
@@ -398,9 +395,8 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
 def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     """Fit a line to an area's emissivity at several temperatures by ordinary least squares.
 
-    The covariance of the means is propagated (JCGM 100:2008, Equation 13); the errors of `COMMON`
-    are the same at all temperatures. The random error is the error of the means, or the scatter
-    about the line if that is larger. At one temperature the line is a constant.
+    Covariances are propagated (JCGM 100:2008, Equation 13); the random error is that of the means,
+    or the scatter about the line if that is larger.
     """
     if len(areas) == 1:
         return areas[0]

@@ -298,10 +298,7 @@ def measured_text(file: str | os.PathLike[str]) -> str:
 
 
 def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
-    """Return measured areas by the features of a study: body, shear_band, workpiece, tool.
-
-    With several areas of a feature the one of the same name counts.
-    """
+    """Return areas by the features of a study; of several the one with the feature's name."""
     number = Counter(area.feature for area in areas.values())
     found = {
         _FIELDS[area.feature.lower()]: area

@@ -308,10 +308,7 @@ def _mean_radiance(
     drift: float | None,
     recordings: int,
 ) -> Estimate:
-    """Return the mean radiance in W/(m² sr) of observations of shape (observation, pixel).
-
-    `shared` is the correlation of the calibration errors of image and emissivity.
-    """
+    """Return the mean radiance; `shared`: correlation of calibration errors with emissivity."""
     mean = float(values.mean())
     random = area_estimate(mean, values, uuid4().hex)
     repeatability = float(random.contribution("repeatability"))
@@ -396,10 +393,7 @@ def _correlation(
     calibration: FittedCalibration | None,
     band: Band,
 ) -> float | None:
-    """Return the correlation of the calibration's errors at the emissivity's radiances and here.
-
-    It is the mean over the points of the line, with their weights in the emissivity.
-    """
+    """Return the correlation of the calibration's errors here and in the emissivity, weighted."""
     if calibration is None or not line.heatings:
         return None
     correlations = []

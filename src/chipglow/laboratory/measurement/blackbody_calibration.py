@@ -66,10 +66,7 @@ def calibrate_blackbodies(
     range_name: str | None = None,
     region: tuple[slice, slice] = WHOLE,
 ) -> BlackbodyCalibration:
-    """Fit calibrations of a camera's counts to blackbodies.
-
-    Recordings that the table names are read within `region`, where the blackbody is.
-    """
+    """Fit calibrations of a camera's counts to blackbodies, in recordings read within `region`."""
     points, settings = Path(points), list(settings)
     read, uneven = lru_cache(maxsize=1)(read_flat_fields), {}
 

@@ -116,11 +116,7 @@ def uniform_counts(
     region: tuple[slice, slice] = WHOLE,
     read: "FlatFieldReader | None" = None,
 ) -> tuple[float, float]:
-    """Return the mean counts of a recording of a blackbody, and by how many a part of it differs.
-
-    Its pixels are corrected as those of a measurement with the same description. The difference
-    is computed for the median of one of 4 x 4 blocks, 0 within four standard errors.
-    """
+    """Return the mean counts of a blackbody's recording, and by how many a block differs."""
     description = load_description(source, settings)
     recording = load_recording(description)
     try:

@@ -90,11 +90,7 @@ def calibrate_recording(
     lower_limit: float | None = None,
     position: ImagePosition | None = None,
 ) -> Measurement:
-    """Convert a camera's recording to a measurement.
-
-    Counts become radiance by the calibration. Temperatures become the radiance that the camera
-    received: its object parameters are taken back (`ObjectParameters.apparent_radiance`).
-    """
+    """Convert a recording to a measurement, with the object parameters taken back."""
     position = position or ImagePosition()
     _check_known(recording, calibration)
     calibration = _calibration(recording, calibration)

@@ -170,8 +170,8 @@ def _mean_image(
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     """Find the edge in an image, and the pixels that show it.
 
-    If pixels are saturated or below the range, all pixels further outward are left
-    out: to leave out only those whose noise goes over the limit would shift the mean of the others.
+    All pixels beyond saturated ones are left out: to leave out only those whose noise goes over the
+    limit would shift the mean of the others.
     """
     image = replace(image, saturated=image.saturated | _piled_up(image))
     x, y = image.x - image.x.mean(), image.y - image.y.mean()

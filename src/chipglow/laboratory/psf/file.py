@@ -31,11 +31,7 @@ from chipglow.uncertainty import to_xarray
 def load_edge(
     source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
 ) -> EdgeImage:
-    """Read an image of an edge: a measurement, or a camera file with or without a calibration.
-
-    Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
-    calibration holds beyond its range, as the edge needs no temperature.
-    """
+    """Read an image of an edge; counts serve without a calibration, as no temperature is needed."""
     settings, name = list(settings), Path(source).name
     if is_measurement(source) or is_scene(source):
         return edge_image(load_measurement(source, settings), name, region)

@@ -133,10 +133,7 @@ class KnifeEdge:
 
     @property
     def edge_uncertainty(self) -> float:
-        """Standard uncertainty of the width across the edges in m, with the spread of the models.
-
-        An oval that the edges do not show is not in it.
-        """
+        """Standard uncertainty across the edges in m, with the models' spread, without ovals."""
         pairs = zip(self.weights, self.fits, strict=True)
         spread = sum(weight * (fit.fwhm - self.fwhm) ** 2 for weight, fit in pairs)
         return sqrt(self.best.fwhm_uncertainty**2 + spread)
@@ -253,9 +250,7 @@ def _models(
 ) -> tuple[list[PSFModel], float]:
     """Return the models that the images can distinguish, and how uncertain an oval makes them.
 
-    A limit of a rectangular distribution: of two edges along rows and columns an oblique oval of
-    axes in the ratio r makes the mean width cosh(ln r)^(1/2) times too large, of one orientation
-    any oval makes it up to r^(1/2) times too large or too small.
+    The limits: two edges along rows and columns leave cosh(ln r)^(1/2), one edge r^(1/2).
     """
     models: list[PSFModel] = [
         GaussianModel(),
@@ -387,12 +382,7 @@ def _left(edge: EdgeResult) -> float:
 
 
 def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
-    """Return the kernel of the optics with the components of its uncertainty.
-
-    `FIT` has an error for each direction of the covariance of the model's parameters. `MODEL` has
-    one for each other model: its difference by the root of its weight. `OVAL` is a kernel of
-    another size. They are the parts of `KnifeEdge.fwhm_uncertainty`.
-    """
+    """Return the optics' kernel with the errors `FIT`, `MODEL` and `OVAL` of `fwhm_uncertainty`."""
     fit = knife.best if model is None else knife.fit(model)
     psf = fit.psf()
     spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH

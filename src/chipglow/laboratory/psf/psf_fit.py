@@ -173,11 +173,7 @@ def fit_model(
 
 
 class _Problem:
-    """Residuals of all pixels and apertures, and their derivatives.
-
-    Its vector holds the model's parameters; background, step, position and normal of each edge;
-    and, with apertures, their background and source.
-    """
+    """Residuals and their derivatives by the model's, the edges' and the apertures' parameters."""
 
     def __init__(
         self, model: PSFModel, edges: tuple[EdgePixels, ...], apertures: ApertureSignals | None
@@ -376,11 +372,7 @@ def _line(place: Array) -> EdgeLine:
 
 
 def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
-    """Return the pixels with the noise that the residuals show on either side.
-
-    The variance goes straight from that of the dark side to that of the bright one, as the noise
-    of the light does.
-    """
+    """Return the pixels with a noise whose variance is a line between those of the two sides."""
     low, high = float(predicted.min()), float(predicted.max())
     fraction = (predicted - low) / max(high - low, 1e-300)
     square = (edge.radiance - predicted) ** 2

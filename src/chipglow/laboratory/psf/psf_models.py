@@ -81,10 +81,7 @@ class PSFModel(ABC):
         raise NotImplementedError
 
     def fwhm(self, values: Array) -> float:
-        """Return the full width at half maximum of the optics' point spread function in m.
-
-        It is twice the largest radius with half of the largest density: a ring may be dark within.
-        """
+        """Return twice the largest radius with half the largest density in m."""
         radii = np.linspace(0.0, self.sampling(values)[0], _RADII)
         density = self.density(values, radii, np.zeros(()))
         half = float(density.max()) / 2
@@ -247,11 +244,7 @@ def _moffat_curve(order: float) -> CubicSpline:
 
 @dataclass(frozen=True)
 class DefocusedDiscModel(PSFModel):
-    """An even disc, as a lens out of focus makes it, blurred by a Gaussian.
-
-    Its transfer function is 2 J1(π d f) / (π d f) of the diameter d, times the Gaussian's
-    (P. A. Stokseth, Journal of the Optical Society of America 59 (1969) 1314).
-    """
+    """An even disc, as a lens out of focus makes it, blurred by a Gaussian (Stokseth 1969)."""
 
     name = "defocused disc"
     parameters = ("disc_diameter", "blur_fwhm")

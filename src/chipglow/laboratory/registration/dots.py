@@ -127,11 +127,8 @@ def fit_dots(
 def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     """Find the dots of a target, brighter or darker than their surroundings.
 
-    Extrema of the normalised Laplacian of Gaussians over place and size (Lindeberg, Int. J. Comput.
-    Vision 30 (1998) 79) that are round: of these the group of like size, contrast and sign that
-    stands out most. The centre is fitted by a disc with a soft edge, in light that falls off
-    to one side, by least squares, after the others are taken away; its uncertainty follows from
-    the residuals and their correlation.
+    Round extrema of the normalised Laplacian (Lindeberg, Int. J. Comput. Vision 30 (1998) 79) of
+    like size, contrast and sign; each is fitted by a disc with a soft edge.
     """
     known = np.isfinite(np.asarray(image, np.float64))
     values = np.asarray(image, np.float64)
@@ -330,10 +327,7 @@ def _disc(
 
 
 def _correlation(discs: list[_Disc]) -> float:
-    """Return the factor on the uncertainty due to correlated residuals of neighbours.
-
-    Newey and West's sum of their correlations up to eight pixels away, over all discs.
-    """
+    """Return the factor on the uncertainty by correlated residuals (Newey and West)."""
     weights = np.bartlett(2 * _ALIKE_PIXELS + 1)
     kernel = np.outer(weights, weights)
     sums = sum(

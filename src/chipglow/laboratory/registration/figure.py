@@ -58,10 +58,7 @@ def blink_pictures(
     visible: NDArray[Any],
     tool: Tool | None = None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the visible picture, and the infrared image as the visible camera would have it.
-
-    Parameters as for `draw_registration`.
-    """
+    """Return the visible picture, and the infrared image as the visible camera would have it."""
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - ZERO_CELSIUS, raster, shape)
     plain = _rendered(registration, tool, visible, "gray", scales.ends(visible, 0.5, 99.5))

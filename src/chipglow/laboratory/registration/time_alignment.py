@@ -94,10 +94,7 @@ def simultaneous_frames(
     visible_times: Array,
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
-    """Return the numbers of the visible frames that were exposed within each integration.
-
-    Times are when integrations and exposures began in s.
-    """
+    """Return the visible frames exposed within each integration; times in s are starts."""
     begins = infrared_times + alignment.offset
     return [
         np.flatnonzero(
