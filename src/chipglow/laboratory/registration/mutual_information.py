@@ -61,13 +61,9 @@ class ImageFit:
 
     registration: Registration
     placement: float
-    """Mutual information times common edges of the best of many placements, at a quarter of the
-    resolution.
-    """
+    """Mutual information times common edges of the best placement, at a quarter of the pixels."""
     by_chance: Array
-    """The same for infrared images that are turned over and moved round, so that they have
-    nothing to do with the visible picture, shape (n,).
-    """
+    """The same for infrared images that are turned over and moved round, shape (n,)."""
 
 
 def fit_images(
@@ -97,19 +93,15 @@ def fit_images(
     Notes
     -----
     Mutual information (Viola and Wells, Int. J. Comput. Vision 24 (1997) 137) times common edges
-    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements round that in
-    which both images have the same middle and the same width, not mirrored: shifts of up to a
-    quarter of the width, turns of up to 4 degrees, scales of 0.8 to 1.25. From there the sum of
-    (g_i . g_v)^2 climbs, from coarse to fine: the products of both images' gradients, each over the
-    contrast of its surroundings, so that it does not matter which side of an edge is the brighter
-    (after Haber and Modersitzki, Methods Inf. Med. 46 (2007) 292). Mutual information alone would
-    be off by several pixels where heat spreads beyond the visible edges. Radiance is taken as it
-    is: the logarithm, or the temperature, of a blurred edge lies beyond the edge.
+    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements that are not
+    mirrored: shifts of up to a quarter of the width, turns of up to 4 degrees, scales of 0.8 to
+    1.25. From there the sum of (g_i . g_v)^2 climbs, the products of both images' gradients, each
+    over the contrast of its surroundings (after Haber and Modersitzki, Methods Inf. Med. 46 (2007)
+    292): mutual information alone is off by pixels where heat spreads beyond the visible edges.
 
-    The covariance is computed for an estimate that maximises a sum over blocks of 16 x 16 pixels
-    (the sandwich of Huber, 1967), so that neighbours need not be independent. Half a pixel is added
-    for each parameter, at the image's corner, for systematic errors: an edge of heat beside the
-    edge that is seen.
+    The covariance is that of a sum over blocks of 16 x 16 pixels (the sandwich of Huber, 1967);
+    half a pixel is added for each parameter, at the image's corner: an edge of heat beside the edge
+    that is seen.
     """
     coarse, middle, fine = _levels(infrared, raster, visible)
     placements = _placements(coarse)
