@@ -82,15 +82,9 @@ def write_psf(
         The result of a fit.
     path : path-like
         The file to write, for ``psf: {kind: measured, file: ...}`` of a study's camera and for
-        `MeasuredPSF.from_file`; one that is there is replaced at the end.
+        `MeasuredPSF.from_file`.
     psf : MeasuredPSF, optional
-        The kernel to write, with the components of its uncertainty; by default of the best
-        model, as `psf_kernel` makes it.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+        The kernel to write; by default that of the best model (`psf_kernel`).
     """
     psf = psf_kernel(knife) if psf is None else psf
     data = to_xarray(psf.estimate, "kernel", ("y", "x"))

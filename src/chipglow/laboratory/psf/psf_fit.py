@@ -107,15 +107,11 @@ class ModelFit:
     """Their covariance; what the residuals show beyond the noise is in it."""
     fwhm: float
     fwhm_uncertainty: float
-    """Full width at half maximum of the optics' point spread function and its standard
-    uncertainty in m, the model taken for true.
-    """
+    """Full width at half maximum of the optics, and its uncertainty by this model, in m."""
     edges: tuple[FittedEdge, ...]
     source: float
     aperture_background: float
-    """Radiance of the source behind the apertures above the background, and the background, in
-    W/(m² sr); NaN without apertures.
-    """
+    """Radiance of the source above the background, and that in W/(m² sr); NaN without any."""
     vector: Array
     """All fitted parameters: those of the model, of the edges and of the apertures."""
     chi_square: float
@@ -123,9 +119,7 @@ class ModelFit:
     count: int
     """Number of pixels and apertures."""
     reduced_chi_squared: float
-    """Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
-    nothing but noise is left.
-    """
+    """Squared residuals of the means at a distance over their noise: 1 if only noise is left."""
 
     @property
     def free(self) -> int:
@@ -276,11 +270,8 @@ class _Problem:
             self.model.fwhm(values),
             sqrt(max(float(gradient @ inner @ gradient), 0.0)),
             tuple(
-                FittedEdge(
-                    _line(place), float(spread[3]), float(place[0]), float(place[1]),
-                    float(spread[1]),
-                )
-                for place, spread in zip(places, spreads, strict=True)
+                FittedEdge(_line(place), spread[3], place[0], place[1], spread[1])
+                for place, spread in zip(places.tolist(), spreads.tolist(), strict=True)
             ),
             float(source[1]) if source.size else np.nan,
             float(source[0]) if source.size else np.nan,
@@ -297,7 +288,6 @@ class _Problem:
         return vector[: self.shapes], edges, vector[last:]
 
     def _fwhm_gradient(self, values: Array) -> Array:
-        """Return the derivative of the full width at half maximum by the model's parameters."""
         gradient = np.empty(self.shapes)
         for k in range(self.shapes):
             shift = 1e-3 * self.scales[k]
@@ -367,14 +357,14 @@ class _Problem:
         return np.concatenate(parts)
 
 
-def _line(place: Array) -> EdgeLine:
+def _line(place: Sequence[float] | Array) -> EdgeLine:
     return EdgeLine(float(place[3]), float(place[2]))
 
 
 def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
     """Return the pixels with a noise whose variance is a line between those of the two sides."""
-    low, high = float(predicted.min()), float(predicted.max())
-    fraction = (predicted - low) / max(high - low, 1e-300)
+    span = float(np.ptp(predicted))
+    fraction = (predicted - predicted.min()) / max(span, 1e-300)
     square = (edge.radiance - predicted) ** 2
     sides = [fraction < 0.5, fraction >= 0.5]
     # The means of both sides, taken at the sides' own mean brightness.
@@ -384,9 +374,8 @@ def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
     slope = 0.0
     if len(means) == 2:
         slope = (means[1][1] - means[0][1]) / max(means[1][0] - means[0][0], 1e-3)
-    overall = float(square.mean())
     variance = means[0][1] + slope * (fraction - means[0][0])
-    least = max(0.02 * overall, (1e-7 * (high - low)) ** 2, 1e-300)
+    least = max(0.02 * float(square.mean()), (1e-7 * span) ** 2, 1e-300)
     return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
 
 
@@ -399,12 +388,11 @@ def _response_along(
     model: PSFModel, values: tuple[float, ...], normal: float, footprint: float, reach: float
 ) -> EdgeResponse:
     """Return the edge response of a model; residuals and their derivative need the same one."""
-    return edge_response(
-        lambda frequency: model.transfer(np.array(values), frequency, normal),
-        normal,
-        footprint,
-        reach,
-    )
+
+    def transfer(frequency: Array) -> Array:
+        return model.transfer(np.array(values), frequency, normal)
+
+    return edge_response(transfer, normal, footprint, reach)
 
 
 def orientations(edges: Sequence[EdgePixels]) -> list[float]:
