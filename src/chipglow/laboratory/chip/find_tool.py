@@ -62,17 +62,15 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
 
     Notes
     -----
-    Along each row the radiance has one smooth course in the chip and another in the tool, blurred
-    by the camera. Every straight line is scored by how much a break between two parabolas on it
-    explains beyond one polynomial. Of the lines that explain about as much as the best, the
-    rightmost is the rake face: the chip's back is further left. Then the line and the width of the
-    blur are fitted to all rows at once, with courses that fall with the distance from the face over
-    2 and 6 pixels and a constant, of any strength in each row and on either side.
+    Every straight line is scored by how much a break between two parabolas on it explains along the
+    rows; the rightmost of the best is the rake face, as the chip's back is further left. Then the
+    line and the width of the blur are fitted to all rows at once, with courses that fall with the
+    distance from the face over 2 and 6 pixels and a constant on either side.
 
     The uncertainties come from the jackknife over blocks of rows (type A) and of limits of a
     rectangular distribution (type B): half a pixel for the position as a whole, a pixel for either
     end of the face. The tip is where the radiance along the face has fallen to half of its largest
-    value; its uncertainty is set to 2 pixels and half the edge radius.
+    value, within 2 pixels and half the edge radius.
     """
     shape, raster, pitch = shape or ToolGeometry(), measurement.raster, measurement.raster.spacing
     received = measurement.radiance

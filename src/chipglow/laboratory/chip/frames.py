@@ -1,6 +1,6 @@
 """Readings of several frames: which frames, their mean and scatter, and columns of their tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Final
 from uuid import uuid4
@@ -8,7 +8,7 @@ from uuid import uuid4
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Cause, Component, Estimate
@@ -31,23 +31,34 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
     return numbers
 
 
-def frame_mean(estimate: Estimate) -> Estimate:
-    """Return the mean of known values over the first axis; NaN without one."""
-    known = np.isfinite(estimate.values)
+def ratio(part: Array, whole: ArrayLike) -> Array:
+    """Return the quotient; NaN where the divisor is not positive."""
+    divisor = np.asarray(whole, np.float64)
+    unknown = np.full(np.broadcast_shapes(part.shape, divisor.shape), np.nan)
+    return np.asarray(np.divide(part, divisor, out=unknown, where=divisor > 0))
 
-    def mean(values: Array) -> Array:
-        count = known.sum(axis=0)
-        total = np.where(known, values, 0.0).sum(axis=0)
-        return np.asarray(np.divide(total, count, np.full(total.shape, np.nan), where=count > 0))
 
+def changed(estimate: Estimate, change: Callable[[Array], Array]) -> Estimate:
+    """Return an estimate of which a linear change is made to the values and to every effect."""
     components = tuple(
         Component(
             one.cause,
-            np.stack([mean(part.reshape(known.shape)).ravel() for part in one.effects.T], axis=1),
+            np.stack([change(part.reshape(estimate.shape)).ravel() for part in one.effects.T], -1),
         )
         for one in estimate.components
     )
-    return Estimate(mean(estimate.values), components, estimate.unevaluated)
+    return Estimate(change(estimate.values), components, estimate.unevaluated)
+
+
+def frame_mean(estimate: Estimate) -> Estimate:
+    """Return the mean of known values over the first axis; NaN without one."""
+    known = np.isfinite(estimate.values)
+    count = known.sum(axis=0)
+
+    def mean(values: Array) -> Array:
+        return ratio(np.where(known, values, 0.0).sum(axis=0), count)
+
+    return changed(estimate, mean)
 
 
 def frame_scatter(frames: Array) -> Component:
@@ -58,8 +69,7 @@ def frame_scatter(frames: Array) -> Component:
     """
     known = np.isfinite(frames)
     count = known.sum(axis=0)
-    total = np.where(known, frames, 0.0).sum(axis=0)
-    mean = np.divide(total, count, out=np.zeros(total.shape), where=count > 0)
+    mean = ratio(np.where(known, frames, 0.0).sum(axis=0), count)
     away = np.where(known, frames - mean, 0.0)
     longer = _longer(away)
     patterns = away * np.sqrt(longer / np.maximum(count * (count - 1), 1))

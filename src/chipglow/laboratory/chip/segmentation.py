@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from chipglow.cutting import unresolved
+from chipglow.laboratory.chip.frames import ratio
 from chipglow.quantities import Array
 from chipglow.scene import Scene
 from chipglow.scene.scene import FORCE_UNITS
@@ -177,17 +178,11 @@ def inertia(scene: Scene) -> Inertia | None:
     kinetic_fraction = nan
     if "drive_work" in scene.data:
         kinetic, work = (_values(scene, n)[first:] for n in ("kinetic_energy", "drive_work"))
-        kinetic_fraction = np.fmax.reduce(_ratio(np.abs(kinetic), work))
+        kinetic_fraction = np.fmax.reduce(ratio(np.abs(kinetic), work))
     flow = float(scene.data.attrs.get("momentum_flow", nan))
     scaling = float(scene.data.attrs.get("mass_scaling", nan))
-    force_fraction = _ratio(np.array(flow), cutting[first:].mean())
+    force_fraction = ratio(np.array(flow), cutting[first:].mean())
     return Inertia(float(kinetic_fraction), float(force_fraction), scaling)
-
-
-def _ratio(part: Array, whole: Array) -> Array:
-    """Return the quotient; NaN where the divisor is 0, as before the tool touches."""
-    unknown = np.full(np.shape(whole), nan)
-    return np.asarray(np.divide(part, whole, out=unknown, where=whole > 0.0))
 
 
 def _values(scene: Scene, name: str) -> Array:

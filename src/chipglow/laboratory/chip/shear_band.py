@@ -38,9 +38,7 @@ class ShearBand:
     """A shear band as a curve, away from the cutting edge."""
 
     ridge: Line
-    """Points of largest strain rate, at even steps. The distance in m counts from the cutting
-    edge: straight to the first point, where the band begins, then along the curve.
-    """
+    """Points of largest strain rate; distances in m as in `BandProfile`."""
     normals: Array
     """Unit normals of the curve on the chip's side (upward), shape (n, 2)."""
     rate: Array
