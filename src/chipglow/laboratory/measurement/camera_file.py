@@ -1,6 +1,6 @@
 """Measurements as the laboratory's commands take them."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -67,15 +67,12 @@ def load_recording(description: MeasurementDescription) -> Recording:
     try:
         return description.applied_to(_read(description, description.file))
     except MissingError as error:
-        raise DescriptionError("; ".join([str(error), *_further(description)])) from None
-
-
-def _further(description: MeasurementDescription) -> Iterator[str]:
-    """Yield what the description of a file of numbers lacks for a measurement."""
-    if description.pitch is None:
-        yield "pitch: is missing, expected the distance between pixels such as 6 um"
-    if description.calibration is None and description.band is None:
-        yield "calibration (of counts) or band: is missing"
+        missing = [str(error)]
+        if description.pitch is None:
+            missing.append("pitch: is missing, expected the distance between pixels such as 6 um")
+        if description.calibration is None and description.band is None:
+            missing.append("calibration (of counts) or band: is missing")
+        raise DescriptionError("; ".join(missing)) from None
 
 
 def _read(description: MeasurementDescription, file: str, every: bool = False) -> Recording:
