@@ -86,8 +86,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
         partly = grid.frame_count[m] < grid.times.size
         hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
         axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
-    axes.set_xlabel("distance along the rake face / µm")
-    axes.set_ylabel("radiance temperature / °C")
+    axes.set(xlabel="distance along the rake face / µm", ylabel="radiance temperature / °C")
     over = f"between {grid.times.size} frames" if several else "in a square"
     bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
     axes.set_title(f"b) profiles\nbars: standard deviation {over}{bands}")

@@ -50,10 +50,8 @@ def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
         "lsf_uncertainty": ("line", np.hypot(uncertainty[1:], uncertainty[:-1]) / apart, "m-1"),
     }
     transfer = _transfer(fit, index, pixels, distance, residual, uncertainty)
-    columns |= {
-        name: ("frequency", values, "m-1" if name == "frequency" else "1")
-        for name, values in transfer.items()
-    }
+    columns |= {name: ("frequency", values, "1") for name, values in transfer.items()}
+    columns["frequency"] = ("frequency", transfer["frequency"], "m-1")
     return xr.Dataset(
         {
             name: ((f"{dimension}_index",), values, {"units": unit})

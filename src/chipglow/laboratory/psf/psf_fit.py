@@ -178,8 +178,21 @@ class _Problem:
             slice(last - edge.x.size, last)
             for last, edge in zip(np.cumsum([edge.x.size for edge in edges]), edges, strict=True)
         ]
-        self.low, self.high = self._bounds()
-        self.scales = self._scales()
+        pitch = min(edge.pitch for edge in edges)
+        low, high = model.bounds(pitch, max(edge.reach for edge in edges))
+        scales = [pitch if is_length(name) else 1.0 for name in model.parameters]
+        for edge in edges:
+            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
+            scales += [contrast, contrast, edge.pitch, edge.pitch / edge.reach]
+            low, high = low + [-inf] * _EDGE_PARAMETERS, high + [inf] * _EDGE_PARAMETERS
+        if apertures is not None:
+            outside = apertures.outside
+            contrast = float(apertures.radiance.max()) - outside
+            # Else a small change between large apertures could be that of a huge source.
+            low += [outside - 0.5 * contrast, 0.5 * contrast]
+            high += [outside + 0.1 * contrast, 2.0 * contrast]
+            scales += [max(float(np.ptp(apertures.radiance)), 1e-30)] * 2
+        self.low, self.high, self.scales = np.array(low), np.array(high), np.array(scales)
 
     def least(self, vector: Array, tolerance: float) -> Array:
         """Return the parameters with the least squares near some others."""
@@ -329,31 +342,6 @@ class _Problem:
             signals = self.apertures
             line = np.polyfit(self._fractions(values), signals.radiance, 1, w=1 / signals.sigma)
             parts.append(np.clip(line[::-1], self.low[-2:], self.high[-2:]))
-        return np.concatenate(parts)
-
-    def _bounds(self) -> tuple[Array, Array]:
-        """Return the smallest and largest parameters."""
-        low, high = self.model.bounds(
-            min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
-        )
-        free = [inf] * (_EDGE_PARAMETERS * len(self.edges))
-        low, high = low + [-end for end in free], high + free
-        if self.apertures is not None:
-            outside = self.apertures.outside
-            contrast = float(self.apertures.radiance.max()) - outside
-            # Else a small change between large apertures could be that of a huge source.
-            low += [outside - 0.5 * contrast, 0.5 * contrast]
-            high += [outside + 0.1 * contrast, 2.0 * contrast]
-        return np.array(low), np.array(high)
-
-    def _scales(self) -> Array:
-        pitch = min(edge.pitch for edge in self.edges)
-        parts = [np.array([pitch if is_length(name) else 1.0 for name in self.model.parameters])]
-        for edge in self.edges:
-            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
-            parts.append(np.array([contrast, contrast, edge.pitch, edge.pitch / edge.reach]))
-        if self.apertures is not None:
-            parts.append(np.full(2, max(np.ptp(self.apertures.radiance), 1e-30)))
         return np.concatenate(parts)
 
 
