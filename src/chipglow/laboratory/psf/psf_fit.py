@@ -7,7 +7,7 @@ fitted with the rest, broaden nothing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import cos, inf, log, pi, sin, sqrt
 from typing import Final
 
@@ -368,19 +368,7 @@ def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
 
 
 def _response(model: PSFModel, values: Array, line: EdgeLine, edge: EdgePixels) -> EdgeResponse:
-    return _response_along(model, tuple(values), line.normal, edge.footprint, edge.reach)
-
-
-@lru_cache(maxsize=16)
-def _response_along(
-    model: PSFModel, values: tuple[float, ...], normal: float, footprint: float, reach: float
-) -> EdgeResponse:
-    """Return the edge response of a model; residuals and their derivative need the same one."""
-
-    def transfer(frequency: Array) -> Array:
-        return model.transfer(np.array(values), frequency, normal)
-
-    return edge_response(transfer, normal, footprint, reach)
+    return edge_response(model, tuple(values), line.normal, edge.footprint, edge.reach)
 
 
 def orientations(edges: Sequence[EdgePixels]) -> list[float]:

@@ -348,17 +348,15 @@ class EdgeResponse:
         return np.interp(distance, self.edge.x, self.line)
 
 
+@lru_cache(maxsize=16)
 def edge_response(
-    transfer: Callable[[Array], Array],
-    angle: float,
-    footprint: float,
-    reach: float,
+    model: PSFModel, values: tuple[float, ...], angle: float, footprint: float, reach: float
 ) -> EdgeResponse:
-    """Return the edge-spread function of optics and pixel."""
+    """Return the edge-spread function of optics and pixel; kept, as a residual's slopes need it."""
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
     frequency, square = _footprint_along(count, step, angle, footprint)
-    response = transfer(frequency) * square
+    response = model.transfer(np.array(values), frequency, angle) * square
     integral = np.zeros(frequency.size, dtype=np.complex128)
     integral[1:] = response[1:] / (2j * pi * frequency[1:])
     line, edge = fft.irfft(np.stack([response, integral]), count) / step
