@@ -202,7 +202,9 @@ def _level(
     scale = min(visible.shape[0] / raster.rows, visible.shape[1] / raster.columns) * step
     picture = gaussian_filter(visible, _BLUR * scale)
     lines = _edges(picture, scale, _FAINT_VISIBLE * float(visible.std()))
-    faint = hypot(_NOISES * _noise(infrared), _FAINT_INFRARED * float(infrared.std()))
+    # The noise is that of pixels from the median around them.
+    noise = 1.4826 * float(np.median(np.abs(infrared - median_filter(infrared, 3))))
+    faint = hypot(_NOISES * noise, _FAINT_INFRARED * float(infrared.std()))
     weight = gaussian_filter(known.astype(float), _BLUR * step)
     smooth = gaussian_filter(infrared * known, _BLUR * step) / np.maximum(weight, 1e-9)
     part = (slice(step // 2, None, step),) * 2
@@ -230,11 +232,6 @@ def _edges(image: Array, scale: float, faint: float) -> Array:
     variance = gaussian_filter((image - image.mean()) ** 2, _WINDOW * scale)
     variance = np.maximum(variance - (mean - image.mean()) ** 2, 0.0)
     return np.asarray(np.stack([right, down]) * scale / np.sqrt(variance + faint**2))
-
-
-def _noise(image: Array) -> float:
-    """Return the standard deviation of the noise: of pixels from the median around them."""
-    return 1.4826 * float(np.median(np.abs(image - median_filter(image, 3))))
 
 
 def _binned(image: Array) -> NDArray[np.int64]:
