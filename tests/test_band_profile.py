@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
-from chipglow.io import write_measurement
+from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import (
     NoShearBandError,
     Stage,
@@ -307,14 +307,7 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
     assert "fully developed" in result.output
     with (tmp_path / "band.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
-    profile = band_profile(
-        measured(
-            [BandImage(shift=shift, bend=1e-3).temperature() for shift in (-18e-6, 0.0)],
-            relative_uncertainty=0.01,
-        ),
-        TOOL,
-        reference=1,
-    )
+    profile = band_profile(read_measurement(file), TOOL, reference=1)
     values = [float(row["radiance_temperature_degC"] or "nan") for row in rows]
     there = np.isfinite(profile.points[..., 0])
     np.testing.assert_allclose(values, profile.temperature[there] - 273.15, atol=1e-3)

@@ -115,10 +115,6 @@ def test_diffraction_beside_a_dead_pixel_is_drawn_and_doubts_are_printed(folder)
     assert (folder / "psf.pdf").stat().st_size > 1000
 
 
-def test_a_region_is_cut_out(folder):
-    assert psf("edge.nc", "--region", "5:35,:")[0] == 0
-
-
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

@@ -214,7 +214,7 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     def _amplitude(self, v: Array) -> Array:
         inner = self.obscuration**2
-        return np.asarray((_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner))
+        return np.asarray((jinc(v) - inner * jinc(self.obscuration * v)) / (1 - inner))
 
 
 @PSFS.part
@@ -427,7 +427,7 @@ class MeasuredPSFFile(PSFChoice):
         return self.psf
 
 
-def _jinc(v: Array) -> Array:
+def jinc(v: Array) -> Array:
     """Return 2 J1(v) / v."""
     safe = np.where(v == 0.0, 1.0, v)
     return np.where(v == 0.0, 1.0, 2 * j1(safe) / safe)

@@ -84,20 +84,15 @@ class BandProfile:
     reference: Line
     """The curve of the fully developed band, with distances as below."""
     distance: Array
-    """Distances in m, common to all frames, shape (n,): from the cutting edge straight to the
-    curve's first point, then along the curve.
-    """
+    """Distances in m, shape (n,): straight to the curve's first point, then along the curve."""
     points: Array
     """Points of each frame's band at these distances in m, shape (frames, n, 2), or NaN."""
     estimate: Estimate
-    """Mean radiance temperature in K over the width, shape (frames, n); NaN where not usable.
-    Components: ``calibration``; ``position`` of the curve, of every point by itself; and, with the
-    parts `TOOL_BUDGET`, ``tool``, which moves the edge from which the distance counts.
+    """Mean radiance temperature in K over the width, shape (frames, n), by the lines `BAND_BUDGET`;
+    NaN where not usable.
     """
     offset: Array
-    """Median distance in m of each frame's band from the reference, shape (frames,), positive
-    toward the chip; NaN without a band.
-    """
+    """Median distance of each frame's band from the reference in m, positive toward the chip."""
     stage: tuple[Stage, ...]
     """Development of each frame's band."""
     times: Array
@@ -200,7 +195,7 @@ def band_profile(
     Raises
     ------
     NoShearBandError
-        If no frame has a band; of a single frame with the reason.
+        If no frame has a band.
 
     Notes
     -----
@@ -398,19 +393,14 @@ def _read(
     position: float,
     nearer: Array,
 ) -> Array:
-    """Return the temperature at points of a frame and its changes, NaN beyond the curve's ends.
-
-    Rows: temperature; change by the place of the curve; by an edge that is nearer to the curve by
-    each of `nearer` in m; by each error of the calibration.
-    """
+    """Return temperature and its changes by the curve's place, `nearer` and the calibration."""
     effects, pitch = measurement.calibration_effects(number), measurement.raster.spacing
     rows = np.full((2 + nearer.size + len(effects), len(points)), nan)
     there = np.isfinite(points[:, 0])
     if there.sum() < 2:
         return rows
     curve = points[there]
-    normal = normals_of(curve)
-    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    tangent = normals_of(curve)[:, ::-1] * [-1.0, 1.0]
     count = max(round(width / pitch * _FINE), 1)
     places = across_curve(curve, width * ((np.arange(count) + 0.5) / count - 0.5))
     frame = measurement.data["radiance_temperature"][number].values
@@ -441,8 +431,8 @@ def _offset(line: Line | None, reference: Line) -> float:
     beside = (nearest > 0) & (nearest < reference.distance.size - 1)
     if not beside.any():
         beside[:] = True
-    index = np.arange(nearest.size)
-    distance = (away[index, nearest] * normals_of(reference.points)[nearest]).sum(axis=1)
+    shortest = line.points - reference.points[nearest]
+    distance = (shortest * normals_of(reference.points)[nearest]).sum(axis=1)
     return float(np.median(distance[beside]))
 
 

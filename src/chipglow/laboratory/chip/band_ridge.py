@@ -20,6 +20,7 @@ from chipglow.laboratory.chip.ridge import (
 )
 from chipglow.quantities import Array
 from chipglow.scene import Line, Raster, Tool
+from chipglow.scene.lines import nearest
 
 LEAST_PROMINENCE: Final = 10.0
 """Smallest height in K of a band's ridge above the higher of its two sides."""
@@ -46,9 +47,7 @@ class ThermalImage:
     """A frame in which every pixel has a temperature, so that slopes and bends exist."""
 
     temperature: Array
-    """Radiance temperature in K, shape (y, x): below the camera's range its lower limit, else the
-    lowest of the frame; at saturated and dead pixels that of the nearest usable one.
-    """
+    """Radiance temperature in K, shape (y, x), filled by the lower limit or the nearest pixel."""
     usable: NDArray[np.bool_]
     raster: Raster
 
@@ -61,8 +60,8 @@ class ThermalImage:
         if not usable.any():
             raise NoShearBandError("shear band: no pixel of the frame has a radiance temperature")
         lower_limit = float(measurement.data.attrs.get("lower_limit", known[usable].min()))
-        nearest = distance_transform_edt(~usable, return_distances=False, return_indices=True)
-        filled = np.where(usable, known, known[tuple(nearest)])
+        index = distance_transform_edt(~usable, return_distances=False, return_indices=True)
+        filled = np.where(usable, known, known[tuple(index)])
         filled[flags & Flag.UNDER_RANGE > 0] = lower_limit
         return cls(filled, usable, measurement.raster)
 
@@ -84,15 +83,11 @@ class ThermalImage:
 
 
 def find_band(image: ThermalImage, tool: Tool) -> Line:
-    """Find the shear band in a measured image.
+    """Find the shear band in a measured image: the best path along ridges off the rake face.
 
-    A ridge is where the second derivative across it is negative (Lindeberg 1998: eigenvalues of
-    the Hessian after Gaussians of several widths, times the square of the width). Ridges along the
-    rake face, where friction heats the chip, are left out. The band is the path, with one angle at
-    every radius about the edge, of the largest sum of log(1 + response / 5 K): one that begins at
-    the edge, else the best anywhere. It is moved to the maximum across it and smoothed. Where that
-    leads to no band, the border of a cold strip below the edge may have drawn the path: the search
-    is repeated without what lies below the edge.
+    A ridge is where the second derivative across it is negative (Lindeberg 1998). Where the path
+    leads to no band, the border of a cold strip below the edge may have drawn it: the search is
+    repeated without what lies below the edge.
     """
     _check_edge(image.raster, tool)
     try:
@@ -194,13 +189,9 @@ def _profiles(
 
 def _within(points: Array, image: ThermalImage) -> Array:
     """Return the points from the first to the last whose pixel is usable."""
-    row, column = np.rint(image.raster.index(points)).astype(np.int64)
-    rows, columns = image.usable.shape
-    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    inside[inside] = image.usable[row[inside], column[inside]]
-    if inside.sum() < 5:
+    kept = np.flatnonzero(nearest(image.usable, image.raster, points) == 1)
+    if kept.size < 5:
         raise NoShearBandError(_NO_RIDGE)
-    kept = np.flatnonzero(inside)
     return points[kept[0] : kept[-1] + 1]
 
 

@@ -60,10 +60,7 @@ def read_curve(path: str | os.PathLike[str]) -> Array:
 def chosen_tool(
     measurement: Measurement, tool: str | None, position: float | None = None
 ) -> tuple[Tool, ToolUncertainty | None, Notes]:
-    """Return the tool that an option ``--tool`` chooses.
-
-    With the uncertainty of its place, if it was found and no option gives one.
-    """
+    """Return the tool of an option ``--tool``, and the uncertainty of its place if it was found."""
     if tool is None:
         return tool_of(measurement, None), None, Notes()
     if tool != "found":

@@ -47,23 +47,15 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
 
 
 def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeGrid) -> None:
-    image = _mean_image(measurement, grid) - ZERO_CELSIUS
+    frames = np.isin(measurement.times, grid.times)
+    known = np.ma.masked_invalid(measurement.radiance_temperature()[frames])
+    image = known.mean(axis=0).filled(np.nan) - ZERO_CELSIUS
     _panel("a) analysis grid", image).draw(figure, axes, measurement.raster, grid.tool)
     corners = 1e6 * grid.corners()
     for line in (*corners, *corners.transpose(1, 0, 2)):
         axes.plot(*line.T, color="black", linewidth=1.1, alpha=0.6)
         axes.plot(*line.T, color="white", linewidth=0.6)
     drawing.crop(axes, grid.corners(), measurement.raster, _AROUND)
-
-
-def _mean_image(measurement: Measurement, grid: RakeGrid) -> Array:
-    """Return the mean of usable values over the grid's frames in K, or NaN."""
-    frames = np.isin(measurement.times, grid.times)
-    values = measurement.radiance_temperature()[frames]
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1)
-    return np.asarray(np.where(count > 0, mean, np.nan), dtype=np.float64)
 
 
 def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
@@ -94,8 +86,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
         partly = grid.frame_count[m] < grid.times.size
         hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
         axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
-    axes.set_xlabel("distance along the rake face / µm")
-    axes.set_ylabel("radiance temperature / °C")
+    axes.set(xlabel="distance along the rake face / µm", ylabel="radiance temperature / °C")
     over = f"between {grid.times.size} frames" if several else "in a square"
     bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
     axes.set_title(f"b) profiles\nbars: standard deviation {over}{bands}")
@@ -120,18 +111,14 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
                 for s in Stage
                 if s in profile.stage and s is not Stage.NONE
             ]
-            _draw_times(figure, right, profile.times)
+            # Too many curves to name each: a colour bar shows their times.
+            span = matplotlib.colors.Normalize(1e6 * first, 1e6 * last)
+            key = matplotlib.cm.ScalarMappable(span, _COLOURS)
+            figure.colorbar(key, ax=right, label="time / µs", aspect=25)
         else:
             handles = right.get_legend_handles_labels()[0]
         figure.legend(handles=handles, loc="outside lower center", ncols=_LEGEND_COLUMNS)
     return figure
-
-
-def _draw_times(figure: Figure, axes: Axes, times: Array) -> None:
-    """Draw a colour bar of the times, where there are too many curves to name each."""
-    span = matplotlib.colors.Normalize(1e6 * times[0], 1e6 * times[-1])
-    key = matplotlib.cm.ScalarMappable(span, _COLOURS)
-    figure.colorbar(key, ax=axes, label="time / µs", aspect=25)
 
 
 def _draw_curves(

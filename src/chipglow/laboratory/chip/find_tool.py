@@ -62,17 +62,15 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
 
     Notes
     -----
-    Along each row the radiance has one smooth course in the chip and another in the tool, blurred
-    by the camera. Every straight line is scored by how much a break between two parabolas on it
-    explains beyond one polynomial. Of the lines that explain about as much as the best, the
-    rightmost is the rake face: the chip's back is further left. Then the line and the width of the
-    blur are fitted to all rows at once, with courses that fall with the distance from the face over
-    2 and 6 pixels and a constant, of any strength in each row and on either side.
+    Every straight line is scored by how much a break between two parabolas on it explains along the
+    rows; the rightmost of the best is the rake face, as the chip's back is further left. Then the
+    line and the width of the blur are fitted to all rows at once, with courses that fall with the
+    distance from the face over 2 and 6 pixels and a constant on either side.
 
     The uncertainties come from the jackknife over blocks of rows (type A) and of limits of a
     rectangular distribution (type B): half a pixel for the position as a whole, a pixel for either
     end of the face. The tip is where the radiance along the face has fallen to half of its largest
-    value; its uncertainty is set to 2 pixels and half the edge radius.
+    value, within 2 pixels and half the edge radius.
     """
     shape, raster, pitch = shape or ToolGeometry(), measurement.raster, measurement.raster.spacing
     received = measurement.radiance
@@ -141,8 +139,7 @@ def _best_line(image: Array, angles: Array) -> tuple[Array, float]:
 
 def _scores(image: Array, slope: float) -> Array:
     """Score lines of one slope, by the column in the middle row."""
-    indices = np.indices(image.shape, dtype=np.float64)
-    rows, columns = indices[0], indices[1]
+    rows, columns = np.indices(image.shape, dtype=np.float64)
     shift = _up(image, rows) * slope
     turned = map_coordinates(image, [rows, columns + shift], order=1, mode="nearest")
     windows = np.lib.stride_tricks.sliding_window_view(turned, 2 * _REACH + 1, axis=1)
@@ -152,7 +149,7 @@ def _scores(image: Array, slope: float) -> Array:
     return np.asarray(np.where(there, np.minimum(gain, _CONTRAST_LIMIT), 0.0).mean(axis=0))
 
 
-def _up(image: Array, rows: NDArray[Any]) -> Array:
+def _up(image: Array, rows: Any) -> Array:
     """Count rows up from the middle one."""
     return np.asarray((image.shape[0] - 1) / 2 - rows, dtype=np.float64)
 
@@ -251,10 +248,9 @@ def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
     strip = _Strip(start, image, rows)
     room = np.array([3.0, _ROOM])
     lower, upper = start[:2] - room, start[:2] + room
-    middle = float(np.clip(start[2], 0.5, 2.9))
     found = scipy.optimize.least_squares(
         lambda line: strip.residuals(line).ravel(),
-        [start[0], start[1], middle],
+        [start[0], start[1], np.clip(start[2], 0.5, 2.9)],
         bounds=([*lower, 0.4], [*upper, 3.0]),
         x_scale=[1.0, 0.05, 1.0],
         loss="soft_l1",
@@ -266,17 +262,11 @@ def _fit(image: Array, rows: NDArray[np.int64], start: Array) -> Array:
 def _jackknife(image: Array, rows: NDArray[np.int64], fit: Array) -> tuple[float, float]:
     """Return standard uncertainties of the angle in rad, and of the place in pixels."""
     middle = float(_up(image, rows).mean())
-    fits = np.array(
-        [
-            _fit(image, np.setdiff1d(rows, block), fit)
-            for block in np.array_split(rows, min(_BLOCKS, rows.size))
-        ]
-    )
+    blocks = np.array_split(rows, min(_BLOCKS, rows.size))
+    fits = np.array([_fit(image, np.setdiff1d(rows, block), fit) for block in blocks])
     place = (fits[:, 0] + middle * fits[:, 1]) * cos(atan(fit[1]))
-    spread = np.stack([np.arctan(fits[:, 1]), place])
-    left = len(fits) - 1
-    angle_error, place_error = np.sqrt(left * spread.var(axis=1)).tolist()
-    return angle_error, place_error
+    errors = np.sqrt((len(fits) - 1) * np.stack([np.arctan(fits[:, 1]), place]).var(axis=1))
+    return float(errors[0]), float(errors[1])
 
 
 def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float, bool]:

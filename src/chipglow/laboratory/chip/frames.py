@@ -1,6 +1,6 @@
 """Readings of several frames: which frames, their mean and scatter, and columns of their tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Final
 from uuid import uuid4
@@ -8,7 +8,7 @@ from uuid import uuid4
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Cause, Component, Estimate
@@ -31,37 +31,45 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
     return numbers
 
 
-def frame_mean(estimate: Estimate) -> Estimate:
-    """Return the mean of known values over the first axis; NaN without one."""
-    known = np.isfinite(estimate.values)
+def ratio(part: Array, whole: ArrayLike) -> Array:
+    """Return the quotient; NaN where the divisor is not positive."""
+    divisor = np.asarray(whole, np.float64)
+    unknown = np.full(np.broadcast_shapes(part.shape, divisor.shape), np.nan)
+    return np.asarray(np.divide(part, divisor, out=unknown, where=divisor > 0))
 
-    def mean(values: Array) -> Array:
-        count = known.sum(axis=0)
-        total = np.where(known, values, 0.0).sum(axis=0)
-        return np.asarray(np.divide(total, count, np.full(total.shape, np.nan), where=count > 0))
 
+def changed(estimate: Estimate, change: Callable[[Array], Array]) -> Estimate:
+    """Return an estimate of which a linear change is made to the values and to every effect."""
     components = tuple(
         Component(
             one.cause,
-            np.stack([mean(part.reshape(known.shape)).ravel() for part in one.effects.T], axis=1),
+            np.stack([change(part.reshape(estimate.shape)).ravel() for part in one.effects.T], -1),
         )
         for one in estimate.components
     )
-    return Estimate(mean(estimate.values), components, estimate.unevaluated)
+    return Estimate(change(estimate.values), components, estimate.unevaluated)
+
+
+def frame_mean(estimate: Estimate) -> Estimate:
+    """Return the mean of known values over the first axis; NaN without one."""
+    known = np.isfinite(estimate.values)
+    count = known.sum(axis=0)
+
+    def mean(values: Array) -> Array:
+        return ratio(np.where(known, values, 0.0).sum(axis=0), count)
+
+    return changed(estimate, mean)
 
 
 def frame_scatter(frames: Array) -> Component:
     """Return the errors of a mean over frames of shape (frames, ...), as the frames show them.
 
-    Correlated successive frames count as fewer: the variance of the mean grows by
-    1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that is
-    not positive (C. J. Geyer, Statistical Science 7 (1992) 473). Fewer than 8 frames do not show
-    their correlation: all of them count as one, with one degree of freedom.
+    Correlated successive frames count as fewer (C. J. Geyer, Statistical Science 7 (1992) 473);
+    fewer than 8 frames do not show their correlation and count as one.
     """
     known = np.isfinite(frames)
     count = known.sum(axis=0)
-    total = np.where(known, frames, 0.0).sum(axis=0)
-    mean = np.divide(total, count, out=np.zeros(total.shape), where=count > 0)
+    mean = ratio(np.where(known, frames, 0.0).sum(axis=0), count)
     away = np.where(known, frames - mean, 0.0)
     longer = _longer(away)
     patterns = away * np.sqrt(longer / np.maximum(count * (count - 1), 1))
@@ -90,10 +98,7 @@ def _longer(away: Array) -> float:
 
 
 def unit_table(data: xr.Dataset, names: Mapping[str, str]) -> pd.DataFrame:
-    """Return variables in SI units as columns, in the units at the end of the columns' names.
-
-    A row for each element of the last variable, in the order of its dimensions.
-    """
+    """Return variables in SI units as columns, in the units at the end of the columns' names."""
     order = list(data[[*names][-1]].dims)
     table = data[[*names]].to_dataframe(dim_order=order).reset_index().rename(columns=names)
     for name in names.values():
@@ -107,10 +112,7 @@ def unit_table(data: xr.Dataset, names: Mapping[str, str]) -> pd.DataFrame:
 def budget_table(
     data: xr.Dataset, names: Mapping[str, str], estimate: Estimate, causes: Sequence[str]
 ) -> pd.DataFrame:
-    """Return `unit_table` with the standard uncertainty of temperatures in K and its parts.
-
-    NaN of a cause that is not in the budget, or of which nothing is known.
-    """
+    """Return `unit_table` with the standard uncertainty in K and its parts; NaN if unknown."""
     known, dims = np.isfinite(estimate.values), data[[*names][-1]].dims
     budget = {"standard_uncertainty_K": known_uncertainty(estimate)}
     for cause in causes:

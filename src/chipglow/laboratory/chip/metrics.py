@@ -37,9 +37,7 @@ class ChipScan:
     """The chip as it passes one rake-normal line."""
 
     height: float
-    """Height of the line in m up the rake face from the end of the edge; NaN if at no height the
-    chip's free surface is in the view all the time.
-    """
+    """Height of the line in m up the rake face; NaN if no height always shows the free surface."""
     time: Array
     """Times of the frames that were looked at in s, shape (n,)."""
     thickness: Array
@@ -76,38 +74,28 @@ class ChipMetrics(Segmentation):
     """Length of contact on the rake face, over the frames; NaN if it leaves the view."""
     shear_angle: float
     shear_angle_standard_deviation: float
-    """Angle in rad from the direction of cutting to the line through the middle half of the shear
-    band, over the frames in which it reaches the free surface at half the largest rate or more.
-    """
+    """Angle in rad from the cutting direction to the band's middle half, where it is developed."""
     band_width: float
     band_width_standard_deviation: float
     """Full width at half maximum of the strain rate across the band, over the same frames."""
     band_rate: float
     """Greatest median strain rate in 1/s on the band's middle half in a frame."""
     band_strain: float
-    """Greatest plastic strain that passes `scan`: median over the middle half of `valley`, mean
-    over the segments.
-    """
+    """Greatest plastic strain in the middle half of `valley` that passes `scan`, per segment."""
     cutting_mean: float
     cutting_swing: float
     thrust_mean: float
     thrust_swing: float
     """Forces as in `CutHistory`; NaN without a force history."""
     scan: ChipScan
-    """Position and times of the thickness. The thickness is NaN if the chip is cut by the
-    border of the view at every height at some time, or the scene is shorter than a period.
-    """
+    """Position and times of the thickness."""
 
 
 def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     """Measure a chip: thickness, segmentation, contact, speed and shear band.
 
-    A camera's view seldom holds two whole segments at once. So the chip is measured as it passes
-    one line at right angles to the rake face, the lowest on which its free surface is in the view
-    and over 1.2 times the feed all the time: higher up it has lifted off and curls. The means are
-    over whole periods, each moment weighted by the chip's speed, which makes them means over the
-    chip's length. At most 64 frames are looked at, of the scene's longest part without a gap.
-    Segments are found in the thickness that the scene states over the cut, or else on the line.
+    A camera's view seldom holds two whole segments at once: the chip is measured as it passes one
+    line at right angles to the rake face. Means are over the chip's length, in whole periods.
     """
     tool = scene.tool
     if tool is None:
@@ -212,16 +200,13 @@ def _heights(raster: Raster, tool: Tool) -> Array:
 def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
     """Return which points are in the view, a sample or more from its border."""
     left, right, bottom, top = raster.extent
-    x, y, rim = points[..., 0], points[..., 1], raster.spacing
-    across = (x > left + rim) & (x < right - rim)
-    return across & (y > bottom + rim) & (y < top - rim)
+    low, high = (np.array([left, bottom]), np.array([right, top]))
+    inside = (points > low + raster.spacing) & (points < high - raster.spacing)
+    return np.asarray(inside.all(axis=-1))
 
 
 def _profile(solid: NDArray[np.bool_], raster: Raster, tool: Tool, heights: Array) -> Array:
-    """Return the distance from the rake face to the chip's free surface; NaN outside the view.
-
-    The chip is the longest stretch of material on the line: it may have lifted off the face.
-    """
+    """Return the distance to the end of the longest stretch of material; NaN outside the view."""
     step = raster.spacing / 2
     distance = step * (np.arange(2 * (raster.rows + raster.columns)) + 0.5)
     places = tool.rake_point(heights)[:, None] + distance[:, None] * np.array(tool.rake_normal)

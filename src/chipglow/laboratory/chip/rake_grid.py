@@ -21,6 +21,7 @@ from chipglow.laboratory.chip.frames import (
     frame_numbers,
     frame_scatter,
     known_uncertainty,
+    ratio,
 )
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
@@ -56,9 +57,7 @@ class RakeGrid:
     depth: Array
     """Middles of the squares from the rake face into the chip in m, shape (m,)."""
     estimate: Estimate
-    """Mean radiance temperature in K of each square's pixels, shape (frames, m, n); NaN where
-    left out. Components: ``calibration`` and, with the parts `TOOL_BUDGET`, ``tool``.
-    """
+    """Mean radiance temperature in K of each square's pixels, (frames, m, n); NaN if left out."""
     standard_deviation: Array
     """Standard deviation over the square's pixels in K, of the same shape; NaN for one pixel."""
     count: NDArray[np.int64]
@@ -87,11 +86,7 @@ class RakeGrid:
 
     @cached_property
     def frame_estimate(self) -> Estimate:
-        """Mean over the frames in which a square is usable in K, shape (m, n).
-
-        The component ``frames`` is the scatter between them (`frame_scatter`), the pixels' noise
-        included; one frame shows nothing of it.
-        """
+        """Mean over the frames that show a square in K, with their scatter, shape (m, n)."""
         mean = frame_mean(self.estimate)
         if self.times.size == 1:
             return mean.with_unevaluated(FRAMES)
@@ -106,7 +101,7 @@ class RakeGrid:
     def frame_standard_deviation(self) -> Array:
         """Standard deviation of `mean` between those frames in K, shape (m, n); NaN for one."""
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
-        return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
+        return np.sqrt(ratio((away**2).sum(axis=0), self.frame_count - 1))
 
     @property
     def bars(self) -> Array:
@@ -197,10 +192,9 @@ def rake_grid(
     out in a frame if any of its pixels is `UNUSABLE` there, as in the paper, or if it is not whole
     inside the image.
 
-    In a turned square the pixels' middles are not spread evenly about the square's own. The mean
-    weights them, as little unequally as possible, so that their weighted middle is the square's: a
-    field that is linear in x and y comes out exactly. The noise of a mean of 9 pixels rises by 6 %
-    on average at a rake angle of -7 degrees, by 18 % at most.
+    The mean weights pixels, as little unequally as possible, so that their weighted middle is the
+    square's: a field that is linear in x and y comes out exactly. The noise of a mean of 9 pixels
+    rises by 6 % on average at a rake angle of -7 degrees, by 18 % at most.
 
     Each uncertainty of the tool's place displaces the squares to either side by one standard
     uncertainty; half the difference of the temperatures there is its contribution
@@ -296,9 +290,9 @@ class _Squares:
         kept = self._sum(good)
         left_out = (kept < number) | (number == 0) | ~self.whole
         mean = np.where(left_out, np.nan, self._sum(self.weight * value))
-        plain = _ratio(self._sum(value), number)
+        plain = ratio(self._sum(value), number)
         away = value - plain.ravel()[self.square]
-        deviation = np.sqrt(_ratio(self._sum(away**2), number - 1))
+        deviation = np.sqrt(ratio(self._sum(away**2), number - 1))
         return mean, np.where(left_out, np.nan, deviation), kept.astype(np.int64)
 
     def mean(self, values: Array) -> Array:
@@ -350,11 +344,3 @@ def _centred_weights(off: Array, square: NDArray[np.int64], squares: int) -> Arr
     # Pixels in one row can only be centred along it: the pseudo-inverse leaves the rest.
     slope = np.einsum("sij,sj->si", np.linalg.pinv(moments, rcond=1e-9, hermitian=True), -middle)
     return np.asarray(1 / number[square] + (spread * slope[square]).sum(axis=-1))
-
-
-def _ratio(total: Array, count: NDArray[np.generic]) -> Array:
-    """Return the quotient; NaN where the divisor is not positive."""
-    divisor = np.asarray(count, dtype=np.float64)
-    quotient = np.full(total.shape, np.nan)
-    np.divide(total, divisor, out=quotient, where=divisor > 0)
-    return quotient

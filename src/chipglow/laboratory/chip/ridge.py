@@ -88,11 +88,7 @@ class PolarGrid:
         toll: float,
         anywhere: bool = False,
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Find the path, with one angle at every radius, of the largest sum (dynamic programming).
-
-        The second time what is well under the strength of the first path costs: else the path would
-        gain by running on where the band has ended.
-        """
+        """Find the path of the largest sum, one angle at every radius (dynamic programming)."""
         first = self._best(score, allowed, ends, anywhere)
         after = score - toll * float(np.median(score[first]))
         return self._best(after, allowed, ends, anywhere)

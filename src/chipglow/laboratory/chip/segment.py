@@ -134,10 +134,9 @@ class Segment:
 
 
 def _mean(scene: Scene, field_name: str, indices: range, weights: Array) -> Array:
-    total = np.zeros(scene.raster.shape)
-    for index, weight in zip(indices, weights, strict=True):
-        total += weight * scene.field(field_name, index)
-    return total
+    parts = zip(indices, weights, strict=True)
+    fields = (weight * scene.field(field_name, index) for index, weight in parts)
+    return sum(fields, np.zeros(scene.raster.shape))
 
 
 def shear_band(

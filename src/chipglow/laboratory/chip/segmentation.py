@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from chipglow.cutting import unresolved
+from chipglow.laboratory.chip.frames import ratio
 from chipglow.quantities import Array
 from chipglow.scene import Scene
 from chipglow.scene.scene import FORCE_UNITS
@@ -53,18 +54,7 @@ class Segmentation:
 
 
 def segmentation(time: ArrayLike, thickness: ArrayLike, resolution: float) -> Segmentation:
-    """Find the segments in the thickness of a chip.
-
-    Parameters
-    ----------
-    time : array_like
-        Times in s, ascending in even steps, shape (n,).
-    thickness : array_like
-        Thickness in m at these times, shape (n,); NaN where it is unknown.
-    resolution : float
-        Least rise of a peak over the valleys beside it in m, such as a cell of the simulation; a
-        peak rises by a quarter of the range from 5 % to 95 % of the thickness as well.
-    """
+    """Find segments in a thickness in m at even times in s; peaks rise by `resolution` or more."""
     known = np.isfinite(np.asarray(thickness, np.float64))
     times, values = np.asarray(time, np.float64)[known], np.asarray(thickness, np.float64)[known]
     if times.size < 2:
@@ -100,10 +90,7 @@ def _mean_and_uncertainty(values: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class CutHistory:
-    """Forces per width of cut in N/m and thickness of the chip in m over time in s, shape (n,).
-
-    Means, swings and segments are those after the first build-up of the chip.
-    """
+    """Forces per width in N/m and thickness in m over time in s; segments after the build-up."""
 
     time: Array
     cutting: Array
@@ -150,10 +137,7 @@ def _mean_and_swing(force: Array, first: int, ends: NDArray[np.int_]) -> tuple[f
 
 
 def end_of_build_up(cutting_force: Array) -> int:
-    """Return the index at which the cutting force reaches the median of its second half.
-
-    It is at least a fifth of the history.
-    """
+    """Return where the force reaches the median of its second half, at a fifth or later."""
     later = cutting_force[cutting_force.size // 2 :]
     return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
 
@@ -194,17 +178,11 @@ def inertia(scene: Scene) -> Inertia | None:
     kinetic_fraction = nan
     if "drive_work" in scene.data:
         kinetic, work = (_values(scene, n)[first:] for n in ("kinetic_energy", "drive_work"))
-        kinetic_fraction = np.fmax.reduce(_ratio(np.abs(kinetic), work))
+        kinetic_fraction = np.fmax.reduce(ratio(np.abs(kinetic), work))
     flow = float(scene.data.attrs.get("momentum_flow", nan))
     scaling = float(scene.data.attrs.get("mass_scaling", nan))
-    force_fraction = _ratio(np.array(flow), cutting[first:].mean())
+    force_fraction = ratio(np.array(flow), cutting[first:].mean())
     return Inertia(float(kinetic_fraction), float(force_fraction), scaling)
-
-
-def _ratio(part: Array, whole: Array) -> Array:
-    """Return the quotient; NaN where the divisor is 0, as before the tool touches."""
-    unknown = np.full(np.shape(whole), nan)
-    return np.asarray(np.divide(part, whole, out=unknown, where=whole > 0.0))
 
 
 def _values(scene: Scene, name: str) -> Array:

@@ -38,9 +38,7 @@ class ShearBand:
     """A shear band as a curve, away from the cutting edge."""
 
     ridge: Line
-    """Points of largest strain rate, at even steps. The distance in m counts from the cutting
-    edge: straight to the first point, where the band begins, then along the curve.
-    """
+    """Points of largest strain rate; distances in m as in `BandProfile`."""
     normals: Array
     """Unit normals of the curve on the chip's side (upward), shape (n, 2)."""
     rate: Array
@@ -97,11 +95,8 @@ def find_shear_band(
 ) -> ShearBand:
     """Find the shear band as the ridge of the strain rate that leads to the free surface.
 
-    In polar coordinates about the edge the band is the path, with one angle at every radius, of
-    the largest sum of log(1 + rate / 6000 s⁻¹). A layer along the rake face, which friction shears
-    too, is left out, and so is what leads over more than 15 µm without a ridge, such as from the
-    next band to one that has left the edge. The path is then moved to the maximum across it and
-    smoothed by local parabolas.
+    It is the path, with one angle at every radius about the edge, of the largest sum of
+    log(1 + rate / 6000 s⁻¹) off the rake face, moved to the maximum across it and smoothed.
     """
     rate = np.where(workpiece, strain_rate, 0.0).astype(np.float64)
     path, reaches_surface = _best_path(raster, rate, workpiece, tool)

@@ -68,11 +68,7 @@ class ToolUncertainty(Part):
 
 
 def contribution(image: ThermalImage, points: Array, displacement: Array) -> Array:
-    """Return the change of the temperature by a displacement of one standard uncertainty.
-
-    It is half the difference between the temperatures on either side (JCGM 100, 5.1.3, note 2);
-    where one side is outside the image, the difference to the other.
-    """
+    """Return the change of the temperature by a displacement (JCGM 100, 5.1.3, note 2)."""
     places = [points + side * displacement for side in (-1, 0, 1)]
     behind, here, ahead = map(image.read, places)
     no_behind, _, no_ahead = (~image.raster.covers(image.raster.index(one)) for one in places)

@@ -21,7 +21,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import FRAMES, frame_mean, frame_scatter
+from chipglow.laboratory.chip.frames import FRAMES, changed, frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
@@ -49,10 +49,7 @@ _SAME_ANGLE: Final = radians(0.1)
 
 
 def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
-    """Return E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043), k = `COVERAGE`.
-
-    The two agree up to 1. Errors that both have in common cancel in their difference.
-    """
+    """Return E_n = abs(T_sim − T_meas) / U(T_sim − T_meas) (ISO/IEC 17043), k = `COVERAGE`."""
     away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.abs(away.values) / (COVERAGE * away.standard_uncertainty)
@@ -231,12 +228,8 @@ def compare(
     -----
     Squares of 3 measured pixels on the rake face are compared, and along the shear band values at
     the same distance from the cutting edge, as means over the frames in which the band is
-    developing or fully developed, as in the paper.
-
-    The measured values have the uncertainty of the calibration (or a stated one), of the position,
-    of the tool's place and of the mean over the frames; the simulated ones that of the emissivity
-    and of the mean over the frames. The best set has the least root mean square of the differences;
-    its confidence is found by drawing all values from their uncertainties.
+    developing or fully developed, as in the paper. The best set has the least root mean square of
+    the differences; its confidence is found by drawing all values from their uncertainties.
     """
     if not simulated:
         raise ValueError("comparison: no simulation, expected 1 or more")
@@ -292,16 +285,10 @@ def _compare_grid(
     """Read the squares of the measurement, which comes first, and of the simulations."""
     size = PIXELS * files[0].item.raster.spacing
     try:
-        grids = [
-            rake_grid(
-                one.item,
-                one.tool,
-                size / one.item.raster.spacing,
-                max(DEPTH, size),
-                uncertainty=one.uncertainty,
-            )
-            for one in files
-        ]
+        grids = []
+        for one in files:
+            pixels, depth = size / one.item.raster.spacing, max(DEPTH, size)
+            grids.append(rake_grid(one.item, one.tool, pixels, depth, uncertainty=one.uncertainty))
     except ValueError as error:
         notes.warnings.append(f"The rake face is left out: {error}.")
         return None
@@ -320,7 +307,7 @@ def _compare_grid(
 def _measured_squares(
     measured: Measurement, grid: RakeGrid, stated: StatedUncertainties
 ) -> Estimate:
-    found = _stated(grid.frame_estimate, stated)
+    found = grid.frame_estimate.with_component("stated", stated.temperature)
     if stated.tool is not None and stated.position is None:
         return found
     corners = grid.corners()
@@ -332,11 +319,6 @@ def _measured_squares(
     off = np.where(np.isfinite(found.values), np.hypot(*slopes), np.nan)
     off = off * _position(measured, stated)
     return found.with_component(POSITION, off, per_element=True)
-
-
-def _stated(found: Estimate, stated: StatedUncertainties) -> Estimate:
-    """Add the stated uncertainty that all measured values have in common."""
-    return found.with_component("stated", stated.temperature)
 
 
 def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertainties) -> Estimate:
@@ -361,11 +343,8 @@ def _position(measured: Measurement, stated: StatedUncertainties) -> float:
 
 
 def _few_frames(name: str, count: int) -> str:
-    frames = "frame" if count == 1 else "frames"
-    return (
-        f"{name}: Only {count} {frames}, which do not show how the temperature varies between "
-        "frames."
-    )
+    frames = f"{count} frame{'s' * (count != 1)}"
+    return f"{name}: Only {frames}, which do not show how the temperature varies between frames."
 
 
 def _compare_band(
@@ -403,16 +382,14 @@ def _compare_band(
         _assumed(one.item, found.without(POSITION), stated)
         for one, found in zip(files[1:], others, strict=True)
     ]
-    return Readings("shear band", distance, _stated(own, stated), tuple(readings))
+    own = own.with_component("stated", stated.temperature)
+    return Readings("shear band", distance, own, tuple(readings))
 
 
 def _laid_by_the_edge(
     measured: Measurement, profile: BandProfile, tool: Tool, uncertainty: ToolUncertainty
 ) -> BandProfile:
-    """Replace the effect of the tool's place by that of a given curve that is placed by the edge.
-
-    On the simulations the curve is off by as much as the edge is here, across itself too.
-    """
+    """Replace the effect of the tool's place by that on a given curve, placed by the edge."""
     moves = uncertainty.displacements(tool, tool.edge_point)
     found = np.full((len(moves), *profile.temperature.shape), np.nan)
     for frame, points in enumerate(profile.points):
@@ -439,24 +416,18 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
         notes.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
 
     def read(field: Array) -> Array:
-        rows = field.reshape(profile.temperature.shape)[used]
         # NaN next to a NaN and beyond the ends.
         ends = {"left": np.nan, "right": np.nan}
-        return np.stack([np.interp(distance, profile.distance, row, **ends) for row in rows])
+        return np.stack([np.interp(distance, profile.distance, row, **ends) for row in field[used]])
 
-    frames = read(profile.temperature)
-    systematic = profile.estimate.without(POSITION)
-    components = tuple(
-        Component(one.cause, np.stack([read(part).ravel() for part in one.effects.T], axis=1))
-        for one in systematic.components
-    )
+    frames = changed(profile.estimate.without(POSITION), read)
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
     position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
-    mean = frame_mean(Estimate(frames, components, systematic.unevaluated))
+    mean = frame_mean(frames)
     mean = mean.with_component(POSITION, position.values, per_element=True)
-    if len(frames) == 1:
+    if len(frames.values) == 1:
         return mean.with_unevaluated(FRAMES)
-    return replace(mean, components=(*mean.components, _scatter(frames)))
+    return replace(mean, components=(*mean.components, _scatter(frames.values)))
 
 
 def _scatter(frames: Array) -> Component:
@@ -512,10 +483,7 @@ def _fit(measured: Estimate, simulated: Estimate) -> dict[str, float]:
 
 
 def _confidences(measured: Estimate, simulated: Sequence[Estimate]) -> list[float]:
-    """Return the fraction of the draws of all uncertainties in which each set is the best.
-
-    NaN of one frame, which does not show how the frames vary.
-    """
+    """Return the fraction of draws in which each set is best; NaN with one measured frame."""
     if FRAMES in measured.unevaluated:
         return [nan] * len(simulated)
     generator = np.random.default_rng(_SEED)

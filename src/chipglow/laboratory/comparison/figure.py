@@ -1,6 +1,7 @@
 """Figure of measured and simulated temperatures and their difference (the paper's 7 and 9)."""
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Final
 
 import numpy as np
@@ -48,10 +49,6 @@ def draw_comparison(comparison: Comparison) -> Figure:
     return figure
 
 
-def _colour(number: int) -> str:
-    return COLOURS[number % len(COLOURS)]
-
-
 def _draw_values(
     axes: Axes, place: Array, readings: Sequence[Estimate], labels: Sequence[str]
 ) -> None:
@@ -60,10 +57,10 @@ def _draw_values(
     axes.plot(x, values, "k.", markersize=4, label="measured")
     expanded = COVERAGE * measured.standard_uncertainty
     drawing.shade(axes, x, values, expanded, GREY, 0.3, "expanded uncertainty, k = 2")
-    for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
+    for reading, label, colour in zip(simulated, labels, cycle(COLOURS), strict=False):
         values = reading.values - ZERO_CELSIUS
-        axes.plot(x, values, color=_colour(i), label=label)
-        drawing.shade(axes, x, values, COVERAGE * reading.standard_uncertainty, _colour(i))
+        axes.plot(x, values, color=colour, label=label)
+        drawing.shade(axes, x, values, COVERAGE * reading.standard_uncertainty, colour)
 
 
 def _draw_differences(axes: Axes, place: Array, readings: Sequence[Estimate]) -> None:
@@ -77,7 +74,7 @@ def _draw_differences(axes: Axes, place: Array, readings: Sequence[Estimate]) ->
             1e6 * place + aside,
             reading.values - measured.values,
             COVERAGE * (reading - measured).standard_uncertainty,
-            color=_colour(i),
+            color=COLOURS[i % len(COLOURS)],
             marker=".",
             markersize=4,
             linewidth=0.8,

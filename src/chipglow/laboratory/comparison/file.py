@@ -27,24 +27,22 @@ def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
 def write_comparison(comparison: Comparison, folder: Path) -> None:
     """Write a comparison into an existing folder."""
     write_frame(comparison.to_frame(), folder / "comparison.csv")
-    fits = comparison.fits.astype(object).where(comparison.fits.notna(), None).set_index("place")
+    fits = comparison.fits.astype(object).where(comparison.fits.notna(), None)
+    best = zip(fits.loc[comparison.best.index].iloc, comparison.sentences, strict=True)
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
         "places": [
             {
-                "place": place,
+                "place": row["place"],
                 "sentence": sentence,
-                "best": best,
-                "confidence": fits.loc[[place]].query("simulation == @best")["confidence"].iloc[0],
-                "fits": fits.loc[[place]].to_dict("records"),
+                "best": row["simulation"],
+                "confidence": row["confidence"],
+                "fits": fits[fits["place"] == row["place"]]
+                .drop(columns="place")
+                .to_dict("records"),
             }
-            for place, best, sentence in zip(
-                comparison.best["place"],
-                comparison.best["simulation"],
-                comparison.sentences,
-                strict=True,
-            )
+            for row, sentence in best
         ],
         "assumed": comparison.notes.assumed,
         "warnings": comparison.notes.warnings,

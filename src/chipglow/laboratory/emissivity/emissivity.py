@@ -101,9 +101,7 @@ class EmissivityMap:
     band: Band
     raster: Raster
     radiance: Array
-    """Radiance in W/(m² sr) of the frames of one image, or the means of several images, shape
-    (observation, y, x); NaN where flagged.
-    """
+    """Radiance in W/(m² sr) of every observation, (observation, y, x); NaN where flagged."""
     flags: NDArray[np.uint8]
     """All `Flag` that a pixel has in any frame, uint8, shape (y, x)."""
     calibration: Array | None
@@ -206,19 +204,17 @@ class EmissivityMap:
         """Return emissivities with the components of `COMMON`."""
 
         def found(reference: Any, reflected: Any) -> Any:
-            ends = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
-            return _emissivity(radiance, *ends)
+            hot, cold = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
+            return (radiance - cold) / (hot - cold)
 
         heating = self.heating
-        known = propagate(
-            found,
-            Estimate(np.array(heating.reference)).with_component(
-                "reference", heating.reference_uncertainty, identity=ALL_IMAGES
-            ),
-            Estimate(np.array(heating.reflected)).with_component(
-                "reflected", heating.reflected_uncertainty, identity=ALL_IMAGES
-            ),
-        )
+        ends = [
+            Estimate(np.array(getattr(heating, name))).with_component(
+                name, getattr(heating, f"{name}_uncertainty"), identity=ALL_IMAGES
+            )
+            for name in ("reference", "reflected")
+        ]
+        known = propagate(found, *ends)
         effect = 0.0 if calibration is None else calibration / self._contrast
         known = known.with_component("calibration", effect, identity=ALL_IMAGES)
         return replace(known, values=values)
@@ -247,9 +243,7 @@ class RegionEmissivity:
     observed: Array
     """Mean emissivity of each observation, shape (observation,)."""
     estimate: Estimate
-    """Mean emissivity, with the components of `COMMON`; ``drift`` over the repeatability, the same
-    in all areas of a map; and ``random`` with the parts ``repeatability`` and ``noise``.
-    """
+    """Mean emissivity, with the components of `COMMON`, ``drift``, and ``random`` by its parts."""
 
     @property
     def mean(self) -> float:
@@ -343,12 +337,9 @@ def _design(temperatures: Sequence[float]) -> Array:
 
 
 def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
-    """Compute the emissivity from in-band radiance in W/(m² sr).
-
-    ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
-    """
-    ends = band.radiance(np.array([heating.reference, heating.reflected]))
-    return np.asarray(_emissivity(radiance, *ends), np.float64)
+    """Compute the emissivity from W/(m² sr): Equation 2 of Heigel and Whitenton (2010), solved."""
+    hot, cold = band.radiance(np.array([heating.reference, heating.reflected]))
+    return np.asarray((radiance - cold) / (hot - cold), np.float64)
 
 
 def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) -> EmissivityMap:
@@ -398,9 +389,8 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
 def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     """Fit a line to an area's emissivity at several temperatures by ordinary least squares.
 
-    The covariance of the means is propagated (JCGM 100:2008, Equation 13); the errors of `COMMON`
-    are the same at all temperatures. The random error is the error of the means, or the scatter
-    about the line if that is larger. At one temperature the line is a constant.
+    Covariances are propagated (JCGM 100:2008, Equation 13); the random error is that of the means,
+    or the scatter about the line if that is larger.
     """
     if len(areas) == 1:
         return areas[0]
@@ -415,7 +405,7 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     line = solve @ means
     freedom = means.size - 2
     residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
-    random = np.array([_of_one_image(one) for one in estimates])
+    random = np.array([_without_common(one).standard_uncertainty for one in estimates])
     if isfinite(residual):
         random = np.maximum(random, residual)
     identity = " ".join(
@@ -443,15 +433,9 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     )
 
 
-def _of_one_image(estimate: Estimate) -> float:
-    """Return the standard uncertainty without the causes of `COMMON`."""
-    for cause in COMMON:
-        estimate = estimate.without(cause)
-    return float(estimate.standard_uncertainty)
-
-
-def _emissivity(radiance: Any, reference: Any, reflected: Any) -> Any:
-    return (radiance - reflected) / (reference - reflected)
+def _without_common(estimate: Estimate) -> Estimate:
+    own = tuple(one for one in estimate.components if one.cause.name not in COMMON)
+    return replace(estimate, components=own)
 
 
 def _floor(measurement: Measurement) -> float:

@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Raster, Region
 
 _PANEL_WIDTH: Final = 2.7
@@ -54,24 +54,14 @@ def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: 
         colour = colours[region.feature]
         drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour)
         if named:
-            _draw_name(axes, region.name, outline * 1e6, colour)
-
-
-def _draw_name(axes: Axes, name: str, outline: Array, colour: str) -> None:
-    """Write a region's name at its centre, upright where the region is slender."""
-    width, height = np.ptp(outline, axis=0)
-    x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2
-    axes.text(
-        x,
-        y,
-        name,
-        rotation=90 if height > _SLENDER * width else 0,
-        ha="center",
-        va="center",
-        fontsize=8,
-        color=colour,
-        path_effects=[withStroke(linewidth=2.5, foreground="white")],
-    )
+            # At its centre, upright where the region is slender.
+            width, height = np.ptp(outline, axis=0)
+            x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2 * 1e6
+            turn = 90 if height > _SLENDER * width else 0
+            axes.text(
+                x, y, region.name, rotation=turn, ha="center", va="center", fontsize=8,
+                color=colour, path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            )  # fmt: skip
 
 
 def _colours(regions: Sequence[Region]) -> dict[str, str]:

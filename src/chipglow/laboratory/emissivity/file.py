@@ -188,11 +188,10 @@ def read_origin(path: str | os.PathLike[str]) -> Origin:
 
 
 def _origin(data: xr.Dataset) -> Origin:
-    limits = [
-        float(data.attrs[name]) for name in ("band_lower", "band_upper") if name in data.attrs
-    ]
-    band = (limits[0], limits[1]) if len(limits) == 2 else None
-    return Origin(band, str(data.attrs.get("metal", "")))
+    attrs, band = data.attrs, None
+    if {"band_lower", "band_upper"} <= set(attrs):
+        band = float(attrs["band_lower"]), float(attrs["band_upper"])
+    return Origin(band, str(attrs.get("metal", "")))
 
 
 def emissivity_trend(line: EmissivityLine) -> EmissivityTrend:
@@ -237,7 +236,6 @@ class EmissivityMapFile(SurfaceFile):
     file: Annotated[FileBeside, Parameter("Output file of chipglow emissivity.")]
 
     def surface(self) -> MapSurface:
-        """See `SurfaceFile.surface`."""
         return read_emissivity_map(self.file)
 
 
@@ -252,7 +250,6 @@ class MeasuredEmissivity(SurfaceFile):
     region: Annotated[str, Parameter("Name of a region in it.")]
 
     def surface(self) -> TrendSurface:
-        """See `SurfaceFile.surface`."""
         areas = read_emissivity_lines(self.file)
         if self.region not in areas:
             raise ValueError(
@@ -298,10 +295,7 @@ def measured_text(file: str | os.PathLike[str]) -> str:
 
 
 def measured_features(areas: Mapping[str, EmissivityLine]) -> dict[str, EmissivityLine]:
-    """Return measured areas by the features of a study: body, shear_band, workpiece, tool.
-
-    With several areas of a feature the one of the same name counts.
-    """
+    """Return areas by the features of a study; of several the one with the feature's name."""
     number = Counter(area.feature for area in areas.values())
     found = {
         _FIELDS[area.feature.lower()]: area

@@ -103,10 +103,7 @@ def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPi
 def drift_effect(
     drift: float | None, effect: float, recordings: int, repeatability: float
 ) -> float | None:
-    """Return the uncertainty by drift between recordings beyond the repeatability, if known.
-
-    `effect` is the change of the result for a relative change of 1 of the radiance.
-    """
+    """Return the uncertainty by drift beyond the repeatability, by the effect of a drift of 1."""
     if recordings == 1:
         return None if drift is None else drift * effect
     stated = (drift or 0.0) * effect / sqrt(recordings)
@@ -137,10 +134,7 @@ def check_same_pixels(
 
 
 def observed_radiance(measurements: Sequence[Measurement]) -> Array:
-    """Return the radiance of every observation in W/(m² sr), shape (observation, y, x).
-
-    These are the frames of one image, or the means of several; NaN where a frame is flagged.
-    """
+    """Return the frames of one image, or the means of several, in W/(m² sr); NaN where flagged."""
     frames = [np.where(one.usable.all(axis=0), one.radiance, np.nan) for one in measurements]
     return np.stack([image.mean(axis=0) for image in frames]) if len(frames) > 1 else frames[0]
 
@@ -154,10 +148,7 @@ def observed_flags(measurements: Sequence[Measurement]) -> NDArray[np.uint8]:
 def calibration_uncertainty(
     measurements: Sequence[Measurement], radiance: Array, kelvins: float | None
 ) -> Array | None:
-    """Return the standard uncertainty of the mean radiance by the calibration, shape (y, x).
-
-    `kelvins` is that of the radiance temperature; None: as all measurements state it, if they do.
-    """
+    """Return the uncertainty of the mean radiance by `kelvins`, or as stated if all images do."""
     if kelvins is not None:
         band = measurements[0].band
         temperature = np.asarray(band.temperature(radiance), np.float64)

@@ -99,11 +99,5 @@ def _numbers(*coordinates: float | str) -> tuple[list[float], Literal["pixel", "
 
 
 def load_regions(path: str | Path) -> tuple[Region, ...]:
-    """Read named regions of an image from a YAML file.
-
-    Parameters
-    ----------
-    path : str or Path
-        YAML file of polygons, rectangles and circles.
-    """
+    """Read named polygons, rectangles and circles of an image from a YAML file."""
     return load_described(RegionsDescription, path).build()

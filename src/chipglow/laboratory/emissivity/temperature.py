@@ -76,10 +76,7 @@ class TrueTemperature:
     """Mean of these temperatures in K: under the estimate where the area is uneven."""
     emissivity: float
     estimate: Estimate
-    """True temperature in K, with the components ``reference`` (of the heating in which the
-    emissivity was determined), ``reflected``, ``calibration``, ``emissivity``, ``drift`` between
-    recordings, and ``random`` with the parts ``repeatability`` and ``noise``.
-    """
+    """True temperature in K, with the lines `TEMPERATURE_BUDGET`."""
     correlation: float | None
     """Correlation of the calibration's errors at the radiances of area and emissivity, if known."""
 
@@ -103,8 +100,7 @@ def true_temperature(
         Pixels of uniform temperature.
     emissivity : EmissivityLine
         The area's emissivity, determined with the same camera, or known from elsewhere
-        (`EmissivityLine.constant`). A line of several temperatures is taken at the resulting
-        temperature.
+        (`EmissivityLine.constant`).
     surroundings : Estimate, optional
         Temperature in K of the surroundings (`reflected_temperature`). By default as in the
         determination of the emissivity, with the same error, or the paper's 293 K.
@@ -122,10 +118,8 @@ def true_temperature(
     -----
     L(T) = (L_app − (1 − ε) L_env) / ε: Equation 2 of Heigel and Whitenton (2010), solved. The
     uncertainty is propagated to first order (JCGM 100:2008, Equation 13). Emissivity and area have
-    errors in common, which partly cancel: a camera that shows too little radiance makes the
-    emissivity too small. Without `calibration` its errors are taken as uncorrelated.
-    With a line ε(T) the equation is solved for T, and all sensitivities equal those of a constant
-    emissivity over 1 + (dε/dT) (L − L_env) / (ε dL/dT).
+    errors in common, which partly cancel; without `calibration` its are taken as uncorrelated. With
+    a line ε(T) sensitivities are divided by 1 + (dε/dT) (L − L_env) / (ε dL/dT).
     """
     check_same_pixels(measurements, "temperature")
     band, radiance = measurements[0].band, observed_radiance(measurements)
@@ -308,21 +302,13 @@ def _mean_radiance(
     drift: float | None,
     recordings: int,
 ) -> Estimate:
-    """Return the mean radiance in W/(m² sr) of observations of shape (observation, pixel).
-
-    `shared` is the correlation of the calibration errors of image and emissivity.
-    """
+    """Return the mean radiance; `shared`: correlation of calibration errors with emissivity."""
     mean = float(values.mean())
     random = area_estimate(mean, values, uuid4().hex)
     repeatability = float(random.contribution("repeatability"))
-    found = Estimate(np.array(mean)).with_component(
-        "calibration", shared * calibration, identity=ALL_IMAGES
-    )
-    found = found.with_component(
-        "calibration",
-        sqrt(max(1 - shared**2, 0.0)) * calibration,
-        identity="measurement",
-    )
+    found, own = Estimate(np.array(mean)), sqrt(max(1 - shared**2, 0.0))
+    for identity, part in ((ALL_IMAGES, shared), ("measurement", own)):
+        found = found.with_component("calibration", part * calibration, identity=identity)
     found = with_drift(found, drift_effect(drift, mean, recordings, repeatability))
     return found + (random - mean)
 
@@ -338,14 +324,11 @@ def _derivatives(
     name: str, line: EmissivityLine, emissivity: float, at: float, reflected: float, band: Band
 ) -> tuple[float, float, float]:
     """Derive the temperature by emissivity, radiance and temperature of the surroundings."""
-
-    def rise(temperature: float) -> float:
-        """Return dL/dT in W/(m² sr K) at any temperature: `Band.slope` ends with its table."""
-        ends = band.radiance(np.array([temperature - _STEP, temperature + _STEP]))
-        return float(ends[1] - ends[0]) / (2 * _STEP)
-
-    room, own = band.radiance(np.array([reflected, at])).tolist()
-    whole = emissivity * rise(at)
+    # `Band.slope` ends with its table.
+    kelvins = np.array([reflected, at])
+    low, high = (band.radiance(kelvins + step) for step in (-_STEP, _STEP))
+    (room, own), (room_rise, rise) = band.radiance(kelvins), (high - low) / (2 * _STEP)
+    whole = emissivity * rise
     if len(line.heatings) > 1:
         whole += line.slope * (own - room)
     if not whole > 0:
@@ -353,7 +336,7 @@ def _derivatives(
             f"region {name}: by the line of its emissivity the radiance does not rise with the "
             f"temperature at {at - ZERO_CELSIUS:.6g} °C, expected an emissivity that falls less"
         )
-    return -(own - room) / whole, 1 / whole, -(1 - emissivity) * rise(reflected) / whole
+    return -(own - room) / whole, 1 / whole, -(1 - emissivity) * room_rise / whole
 
 
 def _emissivity_of_area(
@@ -396,10 +379,7 @@ def _correlation(
     calibration: FittedCalibration | None,
     band: Band,
 ) -> float | None:
-    """Return the correlation of the calibration's errors at the emissivity's radiances and here.
-
-    It is the mean over the points of the line, with their weights in the emissivity.
-    """
+    """Return the correlation of the calibration's errors here and in the emissivity, weighted."""
     if calibration is None or not line.heatings:
         return None
     correlations = []

@@ -66,10 +66,7 @@ def calibrate_blackbodies(
     range_name: str | None = None,
     region: tuple[slice, slice] = WHOLE,
 ) -> BlackbodyCalibration:
-    """Fit calibrations of a camera's counts to blackbodies.
-
-    Recordings that the table names are read within `region`, where the blackbody is.
-    """
+    """Fit calibrations of a camera's counts to blackbodies, in recordings read within `region`."""
     points, settings = Path(points), list(settings)
     read, uneven = lru_cache(maxsize=1)(read_flat_fields), {}
 
@@ -82,7 +79,14 @@ def calibrate_blackbodies(
         raise ValueError(
             f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
         )
-    _check_uniform(uneven, float(np.ptp(table["counts"])))
+    span = float(np.ptp(table["counts"]))
+    for file, difference in uneven.items():
+        if difference > _MOST_UNEVEN * span:
+            raise ValueError(
+                f"{file}: is not uniform, a part of it differs by {difference:.4g} counts, "
+                f"{difference / span:.0%} of the range of the blackbodies, expected up to "
+                f"{_MOST_UNEVEN:.0%}; take the part that shows the blackbody with --region"
+            )
     given = {"emissivity": emissivity, "surroundings": surroundings}
     known = {name: value for name, value in given.items() if value is not None}
     blackbody = Blackbody(emissivity_uncertainty=emissivity_uncertainty, **known)
@@ -108,25 +112,9 @@ def calibrate_blackbodies(
     except ValueError as error:
         raise ValueError(f"{points}: {error}") from None
     best = min(fits, key=lambda name: fits[name].information_criterion)
-    return BlackbodyCalibration(
-        fits,
-        Notes(
-            list(_assumptions(emissivity, surroundings, table["temperature"])),
-            list(_warnings(best, fits[best], common_uncertainty is not None)),
-        ),
-        best,
-    )
-
-
-def _check_uniform(uneven: Mapping[str, float], span: float) -> None:
-    """Raise ValueError if a part of a recording differs from the rest of the blackbody."""
-    for file, difference in uneven.items():
-        if difference > _MOST_UNEVEN * span:
-            raise ValueError(
-                f"{file}: is not uniform, a part of it differs by {difference:.4g} counts, "
-                f"{difference / span:.0%} of the range of the blackbodies, expected up to "
-                f"{_MOST_UNEVEN:.0%}; take the part that shows the blackbody with --region"
-            )
+    assumed = _assumptions(emissivity, surroundings, table["temperature"])
+    warnings = _warnings(best, fits[best], common_uncertainty is not None)
+    return BlackbodyCalibration(fits, Notes([*assumed], [*warnings]), best)
 
 
 def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:

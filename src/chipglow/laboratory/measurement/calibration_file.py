@@ -78,9 +78,9 @@ class CalibrationDescription(Part):
         calibration = fit.calibration
         band, response = calibration.band, calibration.band.response
         values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
-        points: Any = (
-            fit.temperatures - ZERO_CELSIUS, fit.counts, fit.residuals, fit.residuals_temperature
-        )  # fmt: skip
+        kelvins, residuals = fit.temperatures, fit.residuals_temperature
+        points = np.stack([kelvins - ZERO_CELSIUS, fit.counts, fit.residuals, residuals], axis=1)
+        rounded: Any = [[float(f"{one:.9g}") for one in row] for row in points.tolist()]
         model: Any = calibration.kind
         return cls(
             model=model,
@@ -93,9 +93,7 @@ class CalibrationDescription(Part):
             parameters=dict(values),
             covariance=tuple(map(tuple, calibration.covariance.tolist())),
             warnings=calibration.warnings,
-            points=tuple(
-                zip(*([float(f"{one:.9g}") for one in row] for row in points), strict=True)
-            ),
+            points=tuple(map(tuple, rounded)),
         )
 
     def __post_init__(self) -> None:

@@ -1,6 +1,6 @@
 """Measurements as the laboratory's commands take them."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -67,15 +67,12 @@ def load_recording(description: MeasurementDescription) -> Recording:
     try:
         return description.applied_to(_read(description, description.file))
     except MissingError as error:
-        raise DescriptionError("; ".join([str(error), *_further(description)])) from None
-
-
-def _further(description: MeasurementDescription) -> Iterator[str]:
-    """Yield what the description of a file of numbers lacks for a measurement."""
-    if description.pitch is None:
-        yield "pitch: is missing, expected the distance between pixels such as 6 um"
-    if description.calibration is None and description.band is None:
-        yield "calibration (of counts) or band: is missing"
+        missing = [str(error)]
+        if description.pitch is None:
+            missing.append("pitch: is missing, expected the distance between pixels such as 6 um")
+        if description.calibration is None and description.band is None:
+            missing.append("calibration (of counts) or band: is missing")
+        raise DescriptionError("; ".join(missing)) from None
 
 
 def _read(description: MeasurementDescription, file: str, every: bool = False) -> Recording:
@@ -116,11 +113,7 @@ def uniform_counts(
     region: tuple[slice, slice] = WHOLE,
     read: "FlatFieldReader | None" = None,
 ) -> tuple[float, float]:
-    """Return the mean counts of a recording of a blackbody, and by how many a part of it differs.
-
-    Its pixels are corrected as those of a measurement with the same description. The difference
-    is computed for the median of one of 4 x 4 blocks, 0 within four standard errors.
-    """
+    """Return the mean counts of a blackbody's recording, and by how many a block differs."""
     description = load_description(source, settings)
     recording = load_recording(description)
     try:

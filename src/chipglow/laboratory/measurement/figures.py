@@ -64,8 +64,7 @@ def _draw_flags(axes: Axes, flags: NDArray[np.uint8], measurement: Measurement) 
 
 def _draw_histogram(axes: Axes, celsius: Array) -> None:
     known = celsius[np.isfinite(celsius)]
-    axes.set_xlabel("radiance temperature / °C")
-    axes.set_ylabel("pixels")
+    axes.set(xlabel="radiance temperature / °C", ylabel="pixels")
     if known.size:
         low, high = scales.ends(known)
         axes.hist(known, np.linspace(low, high, _BINS).tolist(), color=BLUE)
@@ -85,8 +84,7 @@ def draw_calibrations(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> 
         upper.set_ylabel("counts")
         upper.legend()
         lower.axhline(0.0, color=GREY, linewidth=0.6)
-        lower.set_ylabel("residual / K")
-        lower.set_xlabel("temperature of the blackbody / °C")
+        lower.set(ylabel="residual / K", xlabel="temperature of the blackbody / °C")
     return figure
 
 

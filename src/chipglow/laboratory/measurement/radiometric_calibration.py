@@ -90,11 +90,7 @@ def calibrate_recording(
     lower_limit: float | None = None,
     position: ImagePosition | None = None,
 ) -> Measurement:
-    """Convert a camera's recording to a measurement.
-
-    Counts become radiance by the calibration. Temperatures become the radiance that the camera
-    received: its object parameters are taken back (`ObjectParameters.apparent_radiance`).
-    """
+    """Convert a recording to a measurement, with the object parameters taken back."""
     position = position or ImagePosition()
     _check_known(recording, calibration)
     calibration = _calibration(recording, calibration)
@@ -161,23 +157,19 @@ def _calibration(recording: Recording, given: Calibration | None) -> Calibration
 
 def _check_same(recording: Recording, calibration: Calibration) -> None:
     """Raise ValueError if a calibration is for something else than the recording."""
+    apart = []
     ours, theirs = recording.integration_time, calibration.integration_time
     if ours is not None and theirs is not None and abs(ours - theirs) > _SAME * theirs:
-        raise ValueError(
-            f"calibration: is for an integration time of {1e6 * theirs:g} us, the recording has "
-            f"{1e6 * ours:g} us, they must be the same"
-        )
-    ranges = recording.range_name, calibration.range_name
+        apart.append((f"an integration time of {1e6 * theirs:g} us", f"{1e6 * ours:g} us"))
+    ranges = calibration.range_name, recording.range_name
     if None not in ranges and ranges[0] != ranges[1]:
-        raise ValueError(
-            f"calibration: is for the range {ranges[1]!r}, the recording has {ranges[0]!r}, "
-            "they must be the same"
-        )
+        apart.append((f"the range {ranges[0]!r}", repr(ranges[1])))
     band = recording.band
     if band is not None and not _same_band(band, calibration.band):
+        apart.append((f"the band {_band_text(calibration.band)}", _band_text(band)))
+    for its, has in apart:
         raise ValueError(
-            f"calibration: is for the band {_band_text(calibration.band)}, the recording has "
-            f"{_band_text(band)}, they must be the same"
+            f"calibration: is for {its}, the recording has {has}, they must be the same"
         )
 
 
@@ -226,9 +218,7 @@ def repaired_signal(
     """Return a recording's signal with its pixels corrected, and flags."""
     raw = recording.signal
     signal = raw.astype(np.float64)
-    over = np.zeros(raw.shape, np.bool_)
-    if recording.saturation is not None:
-        over = raw > recording.saturation
+    over = raw > (np.inf if recording.saturation is None else recording.saturation)
     bad = np.zeros(raw.shape[1:], np.bool_) if bad_pixels is None else bad_pixels
     if non_uniformity is not None:
         signal = non_uniformity.apply(signal)
@@ -261,16 +251,13 @@ def _attributes(
     calibration: Calibration | None,
     position: ImagePosition,
 ) -> dict[str, float | str]:
-    def known(name: str) -> Any:
-        value = getattr(recording, name)
-        return getattr(calibration, name, None) if value is None else value
-
+    time = recording.integration_time or getattr(calibration, "integration_time", None)
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
         "quantity": recording.quantity,
         "fill_factor": recording.fill_factor,
-        "integration_time": known("integration_time"),
-        "range": known("range_name"),
+        "integration_time": time,
+        "range": recording.range_name or getattr(calibration, "range_name", None),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
         **_notes(recording, calibration, position).attrs(),

@@ -1,6 +1,7 @@
 """Images of edges, and which of their pixels can be used."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import sqrt
 from typing import Final
 
@@ -60,6 +61,12 @@ class EdgeImage:
         """Which pixels can be trusted, shape (y, x)."""
         return ~(self.dead | self.saturated | self.below)
 
+    @cached_property
+    def places(self) -> tuple[Array, Array]:
+        """Places x and y of all pixels in m from the image's centre, each of shape (y, x)."""
+        across, down = np.meshgrid(self.x - self.x.mean(), self.y - self.y.mean())
+        return across, down
+
 
 def edge_image(
     measurement: Measurement, name: str, region: tuple[slice, slice] | None = None
@@ -74,11 +81,6 @@ def edge_image(
         Its name in messages.
     region : tuple of slice, optional
         Rows and columns that show the edge; all by default.
-
-    Raises
-    ------
-    ValueError
-        If the region is not within the image.
     """
     attributes = measurement.data.attrs
     image = _mean_image(
@@ -170,18 +172,18 @@ def _mean_image(
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     """Find the edge in an image, and the pixels that show it.
 
-    If pixels are saturated or below the range, all pixels further outward are left
-    out: to leave out only those whose noise goes over the limit would shift the mean of the others.
+    All pixels beyond saturated ones are left out: to leave out only those whose noise goes over the
+    limit would shift the mean of the others.
     """
     image = replace(image, saturated=image.saturated | _piled_up(image))
-    x, y = image.x - image.x.mean(), image.y - image.y.mean()
     try:
         # Clipped pixels show the position of an edge too.
-        line, bend = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
-        pixels = _pixels_of(image, x, y, line)
+        seen = np.where(image.dead, np.nan, image.radiance)
+        line, bend = find_edge(seen, image.x - image.x.mean(), image.y - image.y.mean())
+        pixels = _pixels_of(image, line)
         quick = _quick_fit(pixels)
         warnings = _bent(bend, image)
-        limits, clipped = _limits(image, x, y, line)
+        limits, clipped = _limits(image, line.distance(*image.places))
         warnings += clipped
         if clipped:
             distance = line.distance(pixels.x, pixels.y)
@@ -201,16 +203,12 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), notes
 
 
-def _pixels_of(image: EdgeImage, x: Array, y: Array, line: EdgeLine) -> EdgePixels:
-    across, down = np.meshgrid(x, y)
-    usable = image.usable
-    if np.count_nonzero(usable) < 40:
-        raise NoEdgeError(f"{np.count_nonzero(usable)} usable pixels, expected 40 or more")
-    radiance = image.radiance[usable]
+def _pixels_of(image: EdgeImage, line: EdgeLine) -> EdgePixels:
+    x, y, radiance = (values[image.usable] for values in (*image.places, image.radiance))
+    if radiance.size < 40:
+        raise NoEdgeError(f"{radiance.size} usable pixels, expected 40 or more")
     sigma = np.full(radiance.size, max(float(radiance.std()), 1e-300))
-    return EdgePixels(
-        across[usable], down[usable], radiance, sigma, image.pitch, image.footprint, line
-    )
+    return EdgePixels(x, y, radiance, sigma, image.pitch, image.footprint, line)
 
 
 def _quick_fit(pixels: EdgePixels) -> ModelFit:
@@ -245,22 +243,19 @@ def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
     return np.asarray((image.radiance == values[-1]) & piled)
 
 
-def _limits(
-    image: EdgeImage, x: Array, y: Array, line: EdgeLine
-) -> tuple[tuple[float, float], list[str]]:
+def _limits(image: EdgeImage, distance: Array) -> tuple[tuple[float, float], list[str]]:
     """Return the distances between which nothing is clipped, and warnings."""
-    across, down = np.meshgrid(x, y)
-    distance = line.distance(across, down)
-    low, high, said = -np.inf, np.inf, []
-    if image.saturated.any():
-        high = _first_clipped(distance, image.saturated & ~image.dead, image.pitch)
-        said.append(_clipped_text(image.saturated, "saturated", "bright", high))
-    if image.below.any():
-        low = -_first_clipped(-distance, image.below & ~image.dead, image.pitch)
-        said.append(
-            _clipped_text(image.below, "below the camera's lower range limit", "dark", -low)
-        )
-    return (low, high), said
+    limits, said = [], []
+    for sign, clipped, how, side in (
+        (1.0, image.saturated, "saturated", "bright"),
+        (-1.0, image.below, "below the camera's lower range limit", "dark"),
+    ):
+        limit = np.inf
+        if clipped.any():
+            limit = _first_clipped(sign * distance, clipped & ~image.dead, image.pitch)
+            said.append(_clipped_text(clipped, how, side, limit))
+        limits.append(sign * limit)
+    return (limits[1], limits[0]), said
 
 
 def _first_clipped(distance: Array, clipped: NDArray[np.bool_], pitch: float) -> float:

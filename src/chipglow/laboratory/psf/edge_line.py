@@ -41,12 +41,7 @@ class EdgeLine:
 
 
 def find_edge(image: Array, x: Array, y: Array) -> tuple[EdgeLine, tuple[float, float] | None]:
-    """Find the edge in an image, and its sagitta with its standard uncertainty in m, if it can.
-
-    The step that explains most of the image's variance is looked for at all orientations; the line
-    is then fitted to the centroids of the derivative in each row or column near it, without those
-    that lie far off, until it stays (ISO 12233).
-    """
+    """Find the edge in an image, and its sagitta with its standard uncertainty in m (ISO 12233)."""
     across, down = np.meshgrid(x, y)
     usable = np.isfinite(image)
     if np.count_nonzero(usable) < 4 * _LEAST_PIXELS:

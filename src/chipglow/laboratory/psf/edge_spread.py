@@ -18,13 +18,8 @@ _FREQUENCIES: Final = 65
 def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
     """Return edge-spread, line-spread and modulation transfer function of an edge, in SI units.
 
-    The edge-spread function ``esf``, 0 on the dark and 1 on the bright side, is the mean of the
-    pixels in bins of a quarter of the pitch, at their mean ``distance``; ``esf_residual`` is what
-    the model leaves. The line-spread function ``lsf`` is the difference of neighbouring bins over
-    their distance. The ``mtf`` of optics and pixel is the transfer of the fitted model plus the
-    transform of the residuals within a window: a transform of the bins alone would lack, at low
-    frequencies, what the tails hold beyond. It goes up to twice the Nyquist frequency; the mean
-    over a bin is corrected by its sinc.
+    Bins are a quarter of the pitch. The MTF is that of the fitted model plus the transform of the
+    residuals: a transform of the bins alone would lack what the tails hold beyond the window.
     """
     edge = fit.edges[index]
     every = edge.line.distance(pixels.x, pixels.y)
@@ -55,10 +50,8 @@ def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
         "lsf_uncertainty": ("line", np.hypot(uncertainty[1:], uncertainty[:-1]) / apart, "m-1"),
     }
     transfer = _transfer(fit, index, pixels, distance, residual, uncertainty)
-    columns |= {
-        name: ("frequency", values, "m-1" if name == "frequency" else "1")
-        for name, values in transfer.items()
-    }
+    columns |= {name: ("frequency", values, "1") for name, values in transfer.items()}
+    columns["frequency"] = ("frequency", transfer["frequency"], "m-1")
     return xr.Dataset(
         {
             name: ((f"{dimension}_index",), values, {"units": unit})

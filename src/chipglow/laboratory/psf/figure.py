@@ -81,8 +81,7 @@ def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model
     residual, deviation = 100 * spread["esf_residual"], 100 * spread["esf_uncertainty"]
     below.errorbar(where, residual, deviation, **bars)
     below.axhline(0.0, color=VERMILLION, linewidth=1.0)
-    below.set_ylabel("residual / %")
-    below.set_xlabel("distance from the edge / µm")
+    below.set(ylabel="residual / %", xlabel="distance from the edge / µm")
 
 
 def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
@@ -94,9 +93,7 @@ def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
         fmt=".", color=GREY, markersize=3, elinewidth=0.7,
     )  # fmt: skip
     axes.plot(distance * 1e6, model * 1e-6, color=VERMILLION)
-    axes.set_title("line-spread function")
-    axes.set_xlabel("distance from the edge / µm")
-    axes.set_ylabel("1/µm")
+    axes.set(title="line-spread function", xlabel="distance from the edge / µm", ylabel="1/µm")
 
 
 def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
@@ -112,8 +109,7 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     nyquist = 0.5e-3 / edge.image.pitch
     axes.axvline(nyquist, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
     axes.set_ylim(-0.05, 1.05)
-    axes.set_title("modulation transfer function")
-    axes.set_xlabel("frequency / (1/mm)")
+    axes.set(title="modulation transfer function", xlabel="frequency / (1/mm)")
     # The curves go from one corner to the other: beside them there is no place for it.
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
 

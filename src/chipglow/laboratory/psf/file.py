@@ -31,11 +31,7 @@ from chipglow.uncertainty import to_xarray
 def load_edge(
     source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
 ) -> EdgeImage:
-    """Read an image of an edge: a measurement, or a camera file with or without a calibration.
-
-    Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
-    calibration holds beyond its range, as the edge needs no temperature.
-    """
+    """Read an image of an edge; counts serve without a calibration, as no temperature is needed."""
     settings, name = list(settings), Path(source).name
     if is_measurement(source) or is_scene(source):
         return edge_image(load_measurement(source, settings), name, region)
@@ -86,15 +82,9 @@ def write_psf(
         The result of a fit.
     path : path-like
         The file to write, for ``psf: {kind: measured, file: ...}`` of a study's camera and for
-        `MeasuredPSF.from_file`; one that is there is replaced at the end.
+        `MeasuredPSF.from_file`.
     psf : MeasuredPSF, optional
-        The kernel to write, with the components of its uncertainty; by default of the best
-        model, as `psf_kernel` makes it.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
+        The kernel to write; by default that of the best model (`psf_kernel`).
     """
     psf = psf_kernel(knife) if psf is None else psf
     data = to_xarray(psf.estimate, "kernel", ("y", "x"))

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtri
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
-from chipglow.camera.optics.kernel import normalised
+from chipglow.camera.optics.kernel import normalised, resized
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
 from chipglow.laboratory.psf.edge_line import EdgeLine
 from chipglow.laboratory.psf.edge_spread import BINS_PER_PITCH, edge_curves
@@ -97,15 +97,11 @@ class KnifeEdge:
 
     edges: tuple[EdgeResult, ...]
     fits: tuple[ModelFit, ...]
-    """Models of the optics fitted to all images at once, the best by the Bayesian information
-    criterion first.
-    """
+    """Models of the optics fitted to all images at once, the best by its criterion first."""
     apertures: ApertureSignals | None
     """Signals of apertures that were fitted with the edges."""
     oval: float
-    """Relative standard uncertainty of the width by an oval of up to 2:1 that the edges do not
-    show; 0 from three orientations on.
-    """
+    """Relative standard uncertainty of the width by an oval that the edges do not show."""
     notes: Notes
 
     @property
@@ -133,10 +129,7 @@ class KnifeEdge:
 
     @property
     def edge_uncertainty(self) -> float:
-        """Standard uncertainty of the width across the edges in m, with the spread of the models.
-
-        An oval that the edges do not show is not in it.
-        """
+        """Standard uncertainty across the edges in m, with the models' spread, without ovals."""
         pairs = zip(self.weights, self.fits, strict=True)
         spread = sum(weight * (fit.fwhm - self.fwhm) ** 2 for weight, fit in pairs)
         return sqrt(self.best.fwhm_uncertainty**2 + spread)
@@ -210,8 +203,6 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     ------
     NoEdgeError
         If an image shows no straight edge, or more than one.
-    ValueError
-        If nothing is given, or the apertures do not match their diameters.
 
     Notes
     -----
@@ -253,17 +244,10 @@ def _models(
 ) -> tuple[list[PSFModel], float]:
     """Return the models that the images can distinguish, and how uncertain an oval makes them.
 
-    A limit of a rectangular distribution: of two edges along rows and columns an oblique oval of
-    axes in the ratio r makes the mean width cosh(ln r)^(1/2) times too large, of one orientation
-    any oval makes it up to r^(1/2) times too large or too small.
+    The limits: two edges along rows and columns leave cosh(ln r)^(1/2), one edge r^(1/2).
     """
-    models: list[PSFModel] = [
-        GaussianModel(),
-        GaussianTailModel(),
-        MoffatModel(),
-        DefocusedDiscModel(),
-        DefocusedRingModel(),
-    ]
+    round_models = GaussianTailModel, MoffatModel, DefocusedDiscModel, DefocusedRingModel
+    models: list[PSFModel] = [GaussianModel(), *(model() for model in round_models)]
     wavelength = images[0].wavelength
     if wavelength is None:
         notes.assumed.append(
@@ -302,25 +286,13 @@ def _result(
     if not alone:
         round_model = isinstance(best.model, EllipticalModel)
         own = fit_model(GaussianModel() if round_model else best.model, [pixels])
-    found = best.edges[k]
-    dark = found.line.distance(pixels.x, pixels.y) < 0
-    return EdgeResult(
-        image,
-        pixels,
-        edge_curves(best, k, pixels),
-        float(np.median(pixels.sigma[dark])),
-        own.fwhm,
-        own.fwhm_uncertainty,
-        _line_fwhm(best, k, pixels),
-    )
-
-
-def _line_fwhm(best: ModelFit, k: int, pixels: EdgePixels) -> float:
-    """Return the width of the fitted line-spread function in m."""
-    response = best.response(k, pixels)
-    half = float(response.slope(np.array(0.0))) / 2
-    found = brentq(lambda u: float(response.slope(np.array(u))) - half, 0.0, pixels.reach)
-    return 2 * float(found)
+    dark = best.edges[k].line.distance(pixels.x, pixels.y) < 0
+    noise = float(np.median(pixels.sigma[dark]))
+    line = best.response(k, pixels).slope
+    half = float(line(np.array(0.0))) / 2
+    line_fwhm = 2 * float(brentq(lambda u: float(line(np.array(u))) - half, 0.0, pixels.reach))
+    curves = edge_curves(best, k, pixels)
+    return EdgeResult(image, pixels, curves, noise, own.fwhm, own.fwhm_uncertainty, line_fwhm)
 
 
 def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
@@ -387,21 +359,22 @@ def _left(edge: EdgeResult) -> float:
 
 
 def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
-    """Return the kernel of the optics with the components of its uncertainty.
-
-    `FIT` has an error for each direction of the covariance of the model's parameters. `MODEL` has
-    one for each other model: its difference by the root of its weight. `OVAL` is a kernel of
-    another size. They are the parts of `KnifeEdge.fwhm_uncertainty`.
-    """
+    """Return the optics' kernel with the errors `FIT`, `MODEL` and `OVAL` of `fwhm_uncertainty`."""
     fit = knife.best if model is None else knife.fit(model)
     psf = fit.psf()
     spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
     middle = normalised(psf.kernel(spacing))
+    half = len(middle) // 2
 
     def kernel(other: PointSpreadFunction, wider: float = 1.0) -> Array:
-        return _of_side(normalised(other.kernel(spacing / wider)), len(middle))
+        return resized(normalised(other.kernel(spacing / wider)), half, half)
 
-    parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: _of_the_model(knife, fit, kernel)}
+    by_model = [
+        np.sqrt(weight) * (kernel(other.psf()) - middle)
+        for other, weight in zip(knife.fits, knife.weights, strict=True)
+        if other is not fit and weight > _NO_WEIGHT
+    ]
+    parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: by_model}
     if knife.oval:
         parts[OVAL] = [(kernel(psf, 1 + knife.oval) - kernel(psf, 1 - knife.oval)) / 2]
     components = [_component(name, effects) for name, effects in parts.items() if effects]
@@ -430,21 +403,3 @@ def _of_the_fit(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]
         errors = np.linalg.norm((ends[1] - ends[0]) / unit) / np.linalg.norm(error / unit)
         effects.append((ahead - behind) / errors)
     return effects
-
-
-def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[Array]:
-    """Return the changes of the kernel by each other model, by the root of its weight."""
-    here = kernel(fit.psf())
-    return [
-        np.sqrt(weight) * (kernel(other.psf()) - here)
-        for other, weight in zip(knife.fits, knife.weights, strict=True)
-        if other is not fit and weight > _NO_WEIGHT
-    ]
-
-
-def _of_side(kernel: Array, side: int) -> Array:
-    """Return the middle of a kernel, or the kernel amid zeros."""
-    more = (side - len(kernel)) // 2
-    if more >= 0:
-        return np.pad(kernel, more)
-    return kernel[-more:more, -more:more]

@@ -7,7 +7,7 @@ fitted with the rest, broaden nothing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import cos, inf, log, pi, sin, sqrt
 from typing import Final
 
@@ -107,15 +107,11 @@ class ModelFit:
     """Their covariance; what the residuals show beyond the noise is in it."""
     fwhm: float
     fwhm_uncertainty: float
-    """Full width at half maximum of the optics' point spread function and its standard
-    uncertainty in m, the model taken for true.
-    """
+    """Full width at half maximum of the optics, and its uncertainty by this model, in m."""
     edges: tuple[FittedEdge, ...]
     source: float
     aperture_background: float
-    """Radiance of the source behind the apertures above the background, and the background, in
-    W/(m² sr); NaN without apertures.
-    """
+    """Radiance of the source above the background, and that in W/(m² sr); NaN without any."""
     vector: Array
     """All fitted parameters: those of the model, of the edges and of the apertures."""
     chi_square: float
@@ -123,9 +119,7 @@ class ModelFit:
     count: int
     """Number of pixels and apertures."""
     reduced_chi_squared: float
-    """Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
-    nothing but noise is left.
-    """
+    """Squared residuals of the means at a distance over their noise: 1 if only noise is left."""
 
     @property
     def free(self) -> int:
@@ -173,11 +167,7 @@ def fit_model(
 
 
 class _Problem:
-    """Residuals of all pixels and apertures, and their derivatives.
-
-    Its vector holds the model's parameters; background, step, position and normal of each edge;
-    and, with apertures, their background and source.
-    """
+    """Residuals and their derivatives by the model's, the edges' and the apertures' parameters."""
 
     def __init__(
         self, model: PSFModel, edges: tuple[EdgePixels, ...], apertures: ApertureSignals | None
@@ -188,8 +178,21 @@ class _Problem:
             slice(last - edge.x.size, last)
             for last, edge in zip(np.cumsum([edge.x.size for edge in edges]), edges, strict=True)
         ]
-        self.low, self.high = self._bounds()
-        self.scales = self._scales()
+        pitch = min(edge.pitch for edge in edges)
+        low, high = model.bounds(pitch, max(edge.reach for edge in edges))
+        scales = [pitch if is_length(name) else 1.0 for name in model.parameters]
+        for edge in edges:
+            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
+            scales += [contrast, contrast, edge.pitch, edge.pitch / edge.reach]
+            low, high = low + [-inf] * _EDGE_PARAMETERS, high + [inf] * _EDGE_PARAMETERS
+        if apertures is not None:
+            outside = apertures.outside
+            contrast = float(apertures.radiance.max()) - outside
+            # Else a small change between large apertures could be that of a huge source.
+            low += [outside - 0.5 * contrast, 0.5 * contrast]
+            high += [outside + 0.1 * contrast, 2.0 * contrast]
+            scales += [max(float(np.ptp(apertures.radiance)), 1e-30)] * 2
+        self.low, self.high, self.scales = np.array(low), np.array(high), np.array(scales)
 
     def least(self, vector: Array, tolerance: float) -> Array:
         """Return the parameters with the least squares near some others."""
@@ -280,11 +283,8 @@ class _Problem:
             self.model.fwhm(values),
             sqrt(max(float(gradient @ inner @ gradient), 0.0)),
             tuple(
-                FittedEdge(
-                    _line(place), float(spread[3]), float(place[0]), float(place[1]),
-                    float(spread[1]),
-                )
-                for place, spread in zip(places, spreads, strict=True)
+                FittedEdge(_line(place), spread[3], place[0], place[1], spread[1])
+                for place, spread in zip(places.tolist(), spreads.tolist(), strict=True)
             ),
             float(source[1]) if source.size else np.nan,
             float(source[0]) if source.size else np.nan,
@@ -301,7 +301,6 @@ class _Problem:
         return vector[: self.shapes], edges, vector[last:]
 
     def _fwhm_gradient(self, values: Array) -> Array:
-        """Return the derivative of the full width at half maximum by the model's parameters."""
         gradient = np.empty(self.shapes)
         for k in range(self.shapes):
             shift = 1e-3 * self.scales[k]
@@ -345,44 +344,15 @@ class _Problem:
             parts.append(np.clip(line[::-1], self.low[-2:], self.high[-2:]))
         return np.concatenate(parts)
 
-    def _bounds(self) -> tuple[Array, Array]:
-        """Return the smallest and largest parameters."""
-        low, high = self.model.bounds(
-            min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
-        )
-        free = [inf] * (_EDGE_PARAMETERS * len(self.edges))
-        low, high = low + [-end for end in free], high + free
-        if self.apertures is not None:
-            outside = self.apertures.outside
-            contrast = float(self.apertures.radiance.max()) - outside
-            # Else a small change between large apertures could be that of a huge source.
-            low += [outside - 0.5 * contrast, 0.5 * contrast]
-            high += [outside + 0.1 * contrast, 2.0 * contrast]
-        return np.array(low), np.array(high)
 
-    def _scales(self) -> Array:
-        pitch = min(edge.pitch for edge in self.edges)
-        parts = [np.array([pitch if is_length(name) else 1.0 for name in self.model.parameters])]
-        for edge in self.edges:
-            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
-            parts.append(np.array([contrast, contrast, edge.pitch, edge.pitch / edge.reach]))
-        if self.apertures is not None:
-            parts.append(np.full(2, max(np.ptp(self.apertures.radiance), 1e-30)))
-        return np.concatenate(parts)
-
-
-def _line(place: Array) -> EdgeLine:
+def _line(place: Sequence[float] | Array) -> EdgeLine:
     return EdgeLine(float(place[3]), float(place[2]))
 
 
 def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
-    """Return the pixels with the noise that the residuals show on either side.
-
-    The variance goes straight from that of the dark side to that of the bright one, as the noise
-    of the light does.
-    """
-    low, high = float(predicted.min()), float(predicted.max())
-    fraction = (predicted - low) / max(high - low, 1e-300)
+    """Return the pixels with a noise whose variance is a line between those of the two sides."""
+    span = float(np.ptp(predicted))
+    fraction = (predicted - predicted.min()) / max(span, 1e-300)
     square = (edge.radiance - predicted) ** 2
     sides = [fraction < 0.5, fraction >= 0.5]
     # The means of both sides, taken at the sides' own mean brightness.
@@ -392,27 +362,13 @@ def with_noise(edge: EdgePixels, predicted: Array) -> EdgePixels:
     slope = 0.0
     if len(means) == 2:
         slope = (means[1][1] - means[0][1]) / max(means[1][0] - means[0][0], 1e-3)
-    overall = float(square.mean())
     variance = means[0][1] + slope * (fraction - means[0][0])
-    least = max(0.02 * overall, (1e-7 * (high - low)) ** 2, 1e-300)
+    least = max(0.02 * float(square.mean()), (1e-7 * span) ** 2, 1e-300)
     return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
 
 
 def _response(model: PSFModel, values: Array, line: EdgeLine, edge: EdgePixels) -> EdgeResponse:
-    return _response_along(model, tuple(values), line.normal, edge.footprint, edge.reach)
-
-
-@lru_cache(maxsize=16)
-def _response_along(
-    model: PSFModel, values: tuple[float, ...], normal: float, footprint: float, reach: float
-) -> EdgeResponse:
-    """Return the edge response of a model; residuals and their derivative need the same one."""
-    return edge_response(
-        lambda frequency: model.transfer(np.array(values), frequency, normal),
-        normal,
-        footprint,
-        reach,
-    )
+    return edge_response(model, tuple(values), line.normal, edge.footprint, edge.reach)
 
 
 def orientations(edges: Sequence[EdgePixels]) -> list[float]:

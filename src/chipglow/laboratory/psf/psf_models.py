@@ -14,16 +14,13 @@ from scipy.optimize import brentq
 from scipy.special import chndtr, gamma, j0, j1, kve, ndtr
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
-from chipglow.camera.optics.psf import FWHM_PER_SIGMA
+from chipglow.camera.optics.psf import FWHM_PER_SIGMA, jinc
+from chipglow.camera.optics.pupil import annular_transfer
 from chipglow.quantities import Array
 
 _SAMPLES_PER_FOOTPRINT: Final = 8
 _PERIODS: Final = 64
-"""Length of the table of an edge, in its largest distance.
-
-The tails of diffraction that wrap around are then 3e-6 of the step. With 16 it would be 4e-5,
-which moves the width by a third of its standard uncertainty where noise is 1/2000 of the step.
-"""
+"""Length of the table of an edge, in its largest distance: diffraction wraps around by 3e-6."""
 _TAIL_ENERGY: Final = 0.9999
 _KERNEL_NODES: Final = 3
 _MOST_SIDE: Final = 1025
@@ -81,10 +78,7 @@ class PSFModel(ABC):
         raise NotImplementedError
 
     def fwhm(self, values: Array) -> float:
-        """Return the full width at half maximum of the optics' point spread function in m.
-
-        It is twice the largest radius with half of the largest density: a ring may be dark within.
-        """
+        """Return twice the largest radius with half the largest density in m."""
         radii = np.linspace(0.0, self.sampling(values)[0], _RADII)
         density = self.density(values, radii, np.zeros(()))
         half = float(density.max()) / 2
@@ -185,11 +179,8 @@ class AnnularModel(PSFModel):
         return [max(1e-4, 0.4 * self.wavelength / extent), 0.0], [1.0, 0.81]
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        """Return the area that the pupil shares with itself when shifted (O'Neill, 1956)."""
-        inner = sqrt(max(values[1], 0.0))
-        shift = frequency * self.wavelength / values[0]
-        shared = _lens(1.0, 1.0, shift) - 2 * _lens(1.0, inner, shift) + _lens(inner, inner, shift)
-        return shared / (pi * (1 - inner**2))
+        relative = frequency * self.wavelength / (2 * values[0])
+        return annular_transfer(relative, sqrt(max(values[1], 0.0)))
 
     def fwhm(self, values: Array) -> float:
         return self.psf(values).fwhm
@@ -247,11 +238,7 @@ def _moffat_curve(order: float) -> CubicSpline:
 
 @dataclass(frozen=True)
 class DefocusedDiscModel(PSFModel):
-    """An even disc, as a lens out of focus makes it, blurred by a Gaussian.
-
-    Its transfer function is 2 J1(π d f) / (π d f) of the diameter d, times the Gaussian's
-    (P. A. Stokseth, Journal of the Optical Society of America 59 (1969) 1314).
-    """
+    """An even disc, as a lens out of focus makes it, blurred by a Gaussian (Stokseth 1969)."""
 
     name = "defocused disc"
     parameters = ("disc_diameter", "blur_fwhm")
@@ -305,9 +292,7 @@ class EllipticalModel(PSFModel):
     """A Gaussian of another width in each direction."""
 
     tilted: bool
-    """Whether its axes may be tilted, for which edges of three orientations are needed; else they
-    belong to the image.
-    """
+    """Whether its axes may be tilted against the image's; that needs three orientations."""
     name = "elliptical gaussian"
     shapes = ((1.0, 1.0, 0.0),)
     lowest, highest = (0.02, 0.02, -0.99), (inf, inf, 0.99)
@@ -323,9 +308,8 @@ class EllipticalModel(PSFModel):
 
     def mean_transfer(self, values: Array, frequency: Array) -> Array:
         angles = np.arange(8) * pi / 8
-        return np.asarray(
-            np.mean([self.transfer(values, frequency, angle) for angle in angles], axis=0)
-        )
+        every = np.array([self.transfer(values, frequency, angle) for angle in angles])
+        return np.asarray(every.mean(axis=0))
 
     def fwhm(self, values: Array) -> float:
         """Return the geometric mean of the two widths along the ellipse's axes in m."""
@@ -364,17 +348,15 @@ class EdgeResponse:
         return np.interp(distance, self.edge.x, self.line)
 
 
+@lru_cache(maxsize=16)
 def edge_response(
-    transfer: Callable[[Array], Array],
-    angle: float,
-    footprint: float,
-    reach: float,
+    model: PSFModel, values: tuple[float, ...], angle: float, footprint: float, reach: float
 ) -> EdgeResponse:
-    """Return the edge-spread function of optics and pixel."""
+    """Return the edge-spread function of optics and pixel; kept, as a residual's slopes need it."""
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
     frequency, square = _footprint_along(count, step, angle, footprint)
-    response = transfer(frequency) * square
+    response = model.transfer(np.array(values), frequency, angle) * square
     integral = np.zeros(frequency.size, dtype=np.complex128)
     integral[1:] = response[1:] / (2j * pi * frequency[1:])
     line, edge = fft.irfft(np.stack([response, integral]), count) / step
@@ -435,26 +417,9 @@ def sampled_kernel(
 
 def disc_transfer(cycles: Array) -> Array:
     """Return the transfer function of an even disc over frequency times radius."""
-    argument = 2 * pi * cycles
-    safe = np.where(argument == 0.0, 1.0, argument)
-    return np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
+    return jinc(2 * pi * cycles)
 
 
 def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
     sigma = fwhm / FWHM_PER_SIGMA
     return np.exp(-2 * (pi * sigma * frequency) ** 2)
-
-
-def _lens(large: float, small: float, distance: Array) -> Array:
-    """Return the area that two discs of these radii share, their middles at a distance."""
-    if small == 0.0:
-        return np.zeros_like(distance)
-    apart = np.clip(distance, large - small, large + small)
-    safe = np.maximum(apart, 1e-12)
-    first = np.arccos(np.clip((safe**2 + large**2 - small**2) / (2 * safe * large), -1, 1))
-    second = np.arccos(np.clip((safe**2 + small**2 - large**2) / (2 * safe * small), -1, 1))
-    product = (small + large - apart) * (apart + small - large)
-    product = product * (apart - small + large) * (apart + small + large)
-    triangle = np.sqrt(np.maximum(product, 0.0)) / 2
-    area = large**2 * first + small**2 * second - triangle
-    return np.where(apart <= large - small, pi * small**2, area)

@@ -43,11 +43,7 @@ def aperture_image(measurement: Measurement, diameter: float, name: str) -> Aper
 
 
 def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
-    """Read the middle pixels of apertures.
-
-    The centre is the centroid of pixels brighter than half; the signal is the mean of the pixels
-    within a pitch of it, whose distances from the middle are kept.
-    """
+    """Read the pixels within a pitch of the centroid of what is bright in each aperture."""
     if len({image.diameter for image in images}) < _LEAST_APERTURES:
         raise ValueError(
             f"apertures: {len(images)} images of {len({i.diameter for i in images})} diameters, "
@@ -76,14 +72,12 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     weight = np.where(bright, image.radiance - low, 0.0)
     if weight.sum() <= 0:
         raise ValueError(f"{image.name}: all pixels are as bright, expected an aperture")
-    middle = float((weight * x).sum() / weight.sum()), float((weight * y).sum() / weight.sum())
-    away = np.hypot(x - middle[0], y - middle[1])
+    across, up = ((weight * place).sum() / weight.sum() for place in (x, y))
+    away = np.hypot(x - across, y - up)
     radius = image.diameter / 2
     room = min(
-        middle[0] - image.x[0],
-        image.x[-1] - middle[0],
-        middle[1] - image.y[-1],
-        image.y[0] - middle[1],
+        np.abs(across - image.x[[0, -1]]).min(),
+        np.abs(up - image.y[[0, -1]]).min(),
     )
     seen = pitch * (np.count_nonzero(bright) / np.pi) ** 0.5
     if not 0.6 * radius - pitch < seen < 1.5 * radius + 3 * pitch or room < radius:

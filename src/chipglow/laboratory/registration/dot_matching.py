@@ -44,12 +44,8 @@ def match_dots(
 ) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Return the numbers of dots that are the same, shape (2, n), and why that may be wrong.
 
-    Each pair of neighbours in the one is put on each in the other, not mirrored, turned by up to
-    30 degrees, the image's width half to twice as wide; the best of these placements are fitted by
-    an affine map. A dot that the other image should show, and does not, speaks against a placement
-    as three that match speak for it. A regular grid matches itself one column further as well
-    where nothing beyond its border is seen: then there is another placement that is contradicted
-    by no more than one dot more, and that is a warning.
+    Pairs of neighbours give similarities, which are refined to affine maps. A dot that the other
+    image should show, and does not, speaks against a placement as three that match speak for it.
     """
     tree = KDTree(second.pixels)
     spacing = float(np.median(tree.query(second.pixels, 2)[0][:, 1]))

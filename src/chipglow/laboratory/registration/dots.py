@@ -46,8 +46,7 @@ class Dots:
     """Dots of one size in an image."""
 
     pixels: Array
-    """Column and row of their middles, from 0 in the middle of the upper left pixel, shape (n, 2).
-    """
+    """Column and row of their middles, 0 in the middle of the upper left pixel, shape (n, 2)."""
     uncertainty: Array
     """Standard uncertainty of a column or a row in pixels, shape (n,)."""
     radius: float
@@ -97,11 +96,10 @@ def fit_dots(
 
     Notes
     -----
-    The dots of both images are put to each other by their arrangement (`match_dots`), their middles
-    are the points of `fit_points`. It is a warning if they scatter more than three times what the
-    uncertainty of the middles explains: then the map is of another kind than the model. A fiftieth
-    of a pixel is added for the shift, and for each slope at the image's corner, for what all dots
-    have in common: light and blurred skirts that are not quite as the fit takes them.
+    The middles of the dots that match by their arrangement are the points of `fit_points`. It is a
+    warning if they scatter more than three times what their uncertainty explains. A fiftieth of a
+    pixel is added for the shift, and for each slope at the image's corner, for what all dots have
+    in common.
     """
     dots = find_dots(infrared, "infrared image"), find_dots(visible, "visible picture")
     (first, second), warnings = match_dots(
@@ -117,7 +115,11 @@ def fit_dots(
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[second] ** 2).mean()))
-    warnings += _scattered(fit.scatter, expected)
+    if fit.scatter >= _SCATTER * expected:
+        warnings += (
+            f"The dots scatter by {fit.scatter:.2g} visible pixels where their own uncertainty "
+            f"explains {expected:.2g}: the map is of another kind than the model.",
+        )
     notes = fit.registration.notes + Notes([_NOT_MIRRORED], list(warnings))
     covariance = fit.registration.covariance + _systematic(fit.registration, raster)
     found = replace(fit.registration, covariance=covariance, method="dots", notes=notes)
@@ -127,18 +129,17 @@ def fit_dots(
 def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     """Find the dots of a target, brighter or darker than their surroundings.
 
-    Extrema of the normalised Laplacian of Gaussians over place and size (Lindeberg, Int. J. Comput.
-    Vision 30 (1998) 79) that are round: of these the group of like size, contrast and sign that
-    stands out most. The centre is fitted by a disc with a soft edge, in light that falls off
-    to one side, by least squares, after the others are taken away; its uncertainty follows from
-    the residuals and their correlation.
+    Round extrema of the normalised Laplacian (Lindeberg, Int. J. Comput. Vision 30 (1998) 79) of
+    like size, contrast and sign; each is fitted by a disc with a soft edge.
     """
     known = np.isfinite(np.asarray(image, np.float64))
     values = np.asarray(image, np.float64)
     if not known.any() or not np.ptp(values[known]) > 0:
         raise ValueError(f"{name}: has no contrast, expected a target with dots")
     filled = np.where(known, values, np.median(values[known]))
-    sizes, strength = _strengths(filled)
+    count = int(np.log(min(filled.shape) * _GREATEST_SIZE / _LEAST_SIZE) / np.log(_NEXT_SIZE))
+    sizes = np.asarray(_LEAST_SIZE * _NEXT_SIZE ** np.arange(max(count, 1) + 1))
+    strength = np.stack([size**2 * gaussian_laplace(filled, size) for size in sizes])
     groups = [_alike(_blobs(filled, sizes, sign * strength)) for sign in (-1.0, 1.0)]
     bright = _weight(groups[0]) >= _weight(groups[1])
     discs = _discs(filled, known, groups[0 if bright else 1], bool(bright))
@@ -152,14 +153,6 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
         float(np.median([disc.radius for disc in discs])),
         bool(bright),
     )
-
-
-def _strengths(image: Array) -> tuple[Array, Array]:
-    """Return the sizes in pixels, and the normalised Laplacian of each, shape (size, y, x)."""
-    count = int(np.log(min(image.shape) * _GREATEST_SIZE / _LEAST_SIZE) / np.log(_NEXT_SIZE))
-    sizes = _LEAST_SIZE * _NEXT_SIZE ** np.arange(max(count, 1) + 1)
-    found = [size**2 * gaussian_laplace(image, size) for size in sizes]
-    return np.asarray(sizes), np.stack(found)
 
 
 def _blobs(image: Array, sizes: Array, strength: Array) -> Array:
@@ -237,7 +230,11 @@ def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -
     first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
     discs = _like(first, bright)
     for _ in range(_AGAIN):
-        rest = _without(image, discs)
+        rest = image.copy()
+        for disc in discs:
+            reach = disc.radius + 3 * disc.softness
+            part, columns, rows = _window(image.shape, disc.column, disc.row, reach)
+            rest[part] -= disc.brightness(columns, rows)
         again = [_disc(rest, known, d.column, d.row, d.size, d) for d in discs]
         before, discs = discs, _like(again, bright)
         if _settled(before, discs):
@@ -252,16 +249,6 @@ def _settled(before: list[_Disc], discs: list[_Disc]) -> bool:
         for old, new in zip(before, discs, strict=False)
     ]
     return len(before) == len(discs) and max(moves, default=0.0) < _SETTLED
-
-
-def _without(image: Array, discs: list[_Disc]) -> Array:
-    """Return an image without the discs."""
-    rest = image.copy()
-    for disc in discs:
-        reach = disc.radius + 3 * disc.softness
-        part, columns, rows = _window(image.shape, disc.column, disc.row, reach)
-        rest[part] -= disc.brightness(columns, rows)
-    return rest
 
 
 def _window(
@@ -330,10 +317,7 @@ def _disc(
 
 
 def _correlation(discs: list[_Disc]) -> float:
-    """Return the factor on the uncertainty due to correlated residuals of neighbours.
-
-    Newey and West's sum of their correlations up to eight pixels away, over all discs.
-    """
+    """Return the factor on the uncertainty by correlated residuals (Newey and West)."""
     weights = np.bartlett(2 * _ALIKE_PIXELS + 1)
     kernel = np.outer(weights, weights)
     sums = sum(
@@ -355,12 +339,3 @@ def _systematic(found: Registration, raster: Raster) -> Array:
     for row in (slice(0, 3), slice(3, 6)):
         covariance[row, row] = pixels**2 * elements @ elements.T
     return covariance
-
-
-def _scattered(scatter: float, expected: float) -> tuple[str, ...]:
-    if scatter < _SCATTER * expected:
-        return ()
-    return (
-        f"The dots scatter by {scatter:.2g} visible pixels where their own uncertainty explains "
-        f"{expected:.2g}: the map is of another kind than the model.",
-    )

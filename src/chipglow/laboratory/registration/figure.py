@@ -40,9 +40,7 @@ def draw_registration(
         _show(right, visible, "gray", scales.ends(visible, 0.5, 99.5))
         _show(right, warped, HEAT, limits, _OPACITY)
         _draw_tool(right, registration, tool, visible.shape)
-        right.set_title("visible, infrared over it")
-        right.set_xlabel("column")
-        right.set_ylabel("row")
+        right.set(title="visible, infrared over it", xlabel="column", ylabel="row")
         if points is not None:
             left.plot(*(1e6 * points[0]).T, "+", color=VERMILLION)
             right.plot(*points[1].T, "+", color=VERMILLION)
@@ -58,10 +56,7 @@ def blink_pictures(
     visible: NDArray[Any],
     tool: Tool | None = None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the visible picture, and the infrared image as the visible camera would have it.
-
-    Parameters as for `draw_registration`.
-    """
+    """Return the visible picture, and the infrared image as the visible camera would have it."""
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - ZERO_CELSIUS, raster, shape)
     plain = _rendered(registration, tool, visible, "gray", scales.ends(visible, 0.5, 99.5))

@@ -71,15 +71,7 @@ def write_registration(registration: Registration, path: str | Path) -> None:
 
 
 def load_registration(path: str | Path) -> Registration:
-    """Read a registration from a YAML file.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is not YAML or not a registration; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """Read a registration from a YAML file."""
     path = Path(path)
     given = read_yaml(path)
     try:
@@ -159,27 +151,6 @@ def read_points(
     if rows[0] == _BY_PIXEL:
         corner = np.array([raster.left, raster.top])
         positions = corner + (points[:, :2] + _HALF) * raster.spacing * [1.0, -1.0]
-    _check_inside(path, points, positions, raster, shape)
-    return positions, points[:, 2:]
-
-
-def _point(path: Path, line: int, row: list[str]) -> list[float]:
-    try:
-        values = [float(cell) for cell in row]
-    except ValueError:
-        values = []
-    if len(values) != len(_BY_LENGTH) or not np.isfinite(values).all():
-        raise ValueError(f"{path}, line {line}: {','.join(row)!r}, expected four numbers")
-    return values
-
-
-def _check_inside(
-    path: Path,
-    points: Array,
-    positions: Array,
-    raster: Raster,
-    shape: tuple[int, int],
-) -> None:
     left, right, bottom, top = raster.extent
     for line, (point, place) in enumerate(zip(points, positions, strict=True), 2):
         if not (left <= place[0] <= right and bottom <= place[1] <= top):
@@ -194,3 +165,14 @@ def _check_inside(
                 f"{path}, line {line}: {point[2]:g}, {point[3]:g} is outside the visible picture, "
                 f"expected columns 0 to {shape[1] - 1} and rows 0 to {shape[0] - 1}"
             )
+    return positions, points[:, 2:]
+
+
+def _point(path: Path, line: int, row: list[str]) -> list[float]:
+    try:
+        values = [float(cell) for cell in row]
+    except ValueError:
+        values = []
+    if len(values) != len(_BY_LENGTH) or not np.isfinite(values).all():
+        raise ValueError(f"{path}, line {line}: {','.join(row)!r}, expected four numbers")
+    return values

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import cos, hypot, radians, sin
+from math import cos, hypot, sin
 from operator import itemgetter
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,13 +61,9 @@ class ImageFit:
 
     registration: Registration
     placement: float
-    """Mutual information times common edges of the best of many placements, at a quarter of the
-    resolution.
-    """
+    """Mutual information times common edges of the best placement, at a quarter of the pixels."""
     by_chance: Array
-    """The same for infrared images that are turned over and moved round, so that they have
-    nothing to do with the visible picture, shape (n,).
-    """
+    """The same for infrared images that are turned over and moved round, shape (n,)."""
 
 
 def fit_images(
@@ -97,44 +93,35 @@ def fit_images(
     Notes
     -----
     Mutual information (Viola and Wells, Int. J. Comput. Vision 24 (1997) 137) times common edges
-    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements round that in
-    which both images have the same middle and the same width, not mirrored: shifts of up to a
-    quarter of the width, turns of up to 4 degrees, scales of 0.8 to 1.25. From there the sum of
-    (g_i . g_v)^2 climbs, from coarse to fine: the products of both images' gradients, each over the
-    contrast of its surroundings, so that it does not matter which side of an edge is the brighter
-    (after Haber and Modersitzki, Methods Inf. Med. 46 (2007) 292). Mutual information alone would
-    be off by several pixels where heat spreads beyond the visible edges. Radiance is taken as it
-    is: the logarithm, or the temperature, of a blurred edge lies beyond the edge.
+    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements that are not
+    mirrored: shifts of up to a quarter of the width, turns of up to 4 degrees, scales of 0.8 to
+    1.25. From there the sum of (g_i . g_v)^2 climbs, the products of both images' gradients, each
+    over the contrast of its surroundings (after Haber and Modersitzki, Methods Inf. Med. 46 (2007)
+    292): mutual information alone is off by pixels where heat spreads beyond the visible edges.
 
-    The covariance is computed for an estimate that maximises a sum over blocks of 16 x 16 pixels
-    (the sandwich of Huber, 1967), so that neighbours need not be independent. Half a pixel is added
-    for each parameter, at the image's corner, for systematic errors: an edge of heat beside the
-    edge that is seen.
+    The covariance is that of a sum over blocks of 16 x 16 pixels (the sandwich of Huber, 1967);
+    half a pixel is added for each parameter, at the image's corner: an edge of heat beside the edge
+    that is seen.
     """
-    levels = _levels(infrared, raster, visible)
-    coarse, middle, fine = levels
-    frame = _frame(raster, visible.shape)
-    placements = _placements(coarse, frame)
-    score, chance = _against_chance(coarse, frame, placements[0])
-    candidates = _narrowed(coarse, middle, frame, placements)
-    starts = _surveyed(fine, frame, candidates[0])
-    starts += [other for other in candidates[1:] if _apart(other, starts[0], fine, frame) > _FAR]
-    fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=itemgetter(1))
-    matrix = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity"), model)
-    basis = _scaled_basis(fine, frame, matrix, model)
-    spread, flat = _sandwich(fine, frame, matrix, basis)
-    full, covariance = frame.undone(matrix, basis @ spread @ basis.T)
+    coarse, middle, fine = _levels(infrared, raster, visible)
+    placements = _placements(coarse)
+    score, chance = _against_chance(coarse, placements[0])
+    settled = [_settled(coarse, matrix)[0] for matrix in placements]
+    candidates = [matrix for matrix, _ in _best_first(middle, settled)]
+    starts = _surveyed(fine, candidates[0])
+    starts += [other for other in candidates[1:] if fine.apart(other, starts[0]) > _FAR]
+    fits = _best_first(fine, starts)
+    matrix = _climb(fine, _climb(fine, fits[0][0], "similarity"), model)
+    basis = fine.basis(matrix, model)
+    spread, flat = _sandwich(fine, matrix, basis)
+    full, covariance = fine.frame.undone(matrix, basis @ spread @ basis.T)
     found = Registration(full, covariance, model, "mutual-information")
     warnings = [
         *(() if score > chance.max() else (_BY_CHANCE,)),
-        *_rivals(fits[::-1], fine, frame),
+        *_rivals(fits, fine),
         *((_NO_OPTIMUM,) if flat else _unsure(found, raster)),
     ]
-    return ImageFit(
-        replace(found, notes=Notes([_NOT_MIRRORED], warnings)),
-        score,
-        chance,
-    )
+    return ImageFit(replace(found, notes=Notes([_NOT_MIRRORED], warnings)), score, chance)
 
 
 _NOT_MIRRORED: Final = (
@@ -147,30 +134,55 @@ _NO_OPTIMUM: Final = "No placement is better than its neighbours in every direct
 
 @dataclass(frozen=True)
 class _Level:
-    """Samples of the infrared image, and the visible picture, at one resolution.
+    """Infrared image and visible picture at one resolution, in bins, and their edges."""
 
-    `places` in m, shape (n, 2), with their `bins` and their `edges` along columns and rows.
-    The `sharp` ones have nearly all the edges there are. `lines` are the edges of the visible
-    picture, and their slopes along columns and rows, shape (rows, columns, 6); `codes` its bins.
-    `scale` is the number of visible pixels a sample.
-    """
-
-    places: Array
-    bins: NDArray[np.int64]
-    edges: Array
-    sharp: NDArray[np.bool_]
-    blocks: NDArray[np.int64]
-    codes: NDArray[np.int64]
-    lines: Array
+    frame: NormalisedFrame
+    step: float
+    """Distance of samples of the infrared image in units of the frame."""
+    scale: float
+    """Visible pixels a sample."""
+    known: NDArray[np.bool_]
     bin_image: NDArray[np.int64]
     edge_image: Array
-    known: NDArray[np.bool_]
-    pitch: float
-    scale: float
+    """Of samples, with their edges along columns and rows."""
+    places: Array
+    """Places of the known ones in units of the frame, shape (n, 2)."""
+    blocks: NDArray[np.int64]
+    codes: NDArray[np.int64]
+    """Bins of the visible picture."""
+    lines: Array
+    """Its edges, and their slopes along columns and rows, shape (rows, columns, 6)."""
+
+    @cached_property
+    def bins(self) -> NDArray[np.int64]:
+        return self.bin_image[self.known]
+
+    @cached_property
+    def edges(self) -> Array:
+        return self.edge_image[self.known]
 
     @cached_property
     def directions(self) -> Array:
         return np.ascontiguousarray(self.lines[..., :2])
+
+    @cached_property
+    def sharp(self) -> NDArray[np.bool_]:
+        """Whether a sample is one of the fewest that have nearly all squares of the edges."""
+        squares = (self.edges**2).sum(axis=-1)
+        ordered = np.sort(squares)[::-1]
+        least = ordered[np.searchsorted(ordered.cumsum(), _NEARLY_ALL * squares.sum())]
+        return np.asarray(squares >= least)
+
+    def apart(self, one: Array, other: Array) -> float:
+        """Return the distance of two maps of the image in samples, at the worse of two corners."""
+        corners = self.places[[0, -1]]
+        apart = mapped_places(one, corners) - mapped_places(other, corners)
+        return float(np.hypot(apart[:, 0], apart[:, 1]).max()) / self.step
+
+    def basis(self, matrix: Array, model: Model) -> Array:
+        """Return the basis by which a parameter of 1 moves the image's corner by one sample."""
+        mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
+        return parameter_basis(model, mirrored) * self.step
 
 
 def _levels(
@@ -181,42 +193,35 @@ def _levels(
         if values.size == 0 or not np.ptp(values) > 0:
             raise ValueError(f"{name}: has no contrast")
     filled = np.where(known, infrared, np.median(infrared[known]))
-    scale = min(seen.shape[0] / raster.rows, seen.shape[1] / raster.columns)
-    return [_level(filled, known, raster, seen, step, scale * step) for step in _STEPS]
+    return [_level(filled, known, raster, seen, step) for step in _STEPS]
 
 
 def _level(
-    infrared: Array,
-    known: NDArray[np.bool_],
-    raster: Raster,
-    visible: Array,
-    step: int,
-    scale: float,
+    infrared: Array, known: NDArray[np.bool_], raster: Raster, visible: Array, step: int
 ) -> _Level:
+    scale = min(visible.shape[0] / raster.rows, visible.shape[1] / raster.columns) * step
     picture = gaussian_filter(visible, _BLUR * scale)
     lines = _edges(picture, scale, _FAINT_VISIBLE * float(visible.std()))
-    faint = hypot(_NOISES * _noise(infrared), _FAINT_INFRARED * float(infrared.std()))
+    # The noise is that of pixels from the median around them.
+    noise = 1.4826 * float(np.median(np.abs(infrared - median_filter(infrared, 3))))
+    faint = hypot(_NOISES * noise, _FAINT_INFRARED * float(infrared.std()))
     weight = gaussian_filter(known.astype(float), _BLUR * step)
     smooth = gaussian_filter(infrared * known, _BLUR * step) / np.maximum(weight, 1e-9)
     part = (slice(step // 2, None, step),) * 2
-    there = known[part]
-    edges = np.moveaxis(_edges(smooth, step, faint), 0, -1)[part]
-    bins = _binned(smooth)[part]
+    frame = _frame(raster, visible.shape)
     rows, columns = np.indices(raster.shape)
-    across = -(-raster.columns // _BLOCK)
+    blocks = rows // _BLOCK * -(-raster.columns // _BLOCK) + columns // _BLOCK
     return _Level(
-        np.stack(np.meshgrid(raster.x, raster.y), axis=-1)[part][there],
-        bins[there],
-        edges[there],
-        _sharp(edges[there]),
-        (rows // _BLOCK * across + columns // _BLOCK)[part][there],
-        _binned(picture),
-        np.concatenate([lines, *np.gradient(lines, axis=(2, 1))]).transpose(1, 2, 0).copy(),
-        bins,
-        edges,
-        there,
-        raster.spacing * step,
-        scale,
+        frame=frame,
+        step=raster.spacing * step / frame.scale,
+        scale=scale,
+        known=known[part],
+        bin_image=_binned(smooth)[part],
+        edge_image=np.moveaxis(_edges(smooth, step, faint), 0, -1)[part],
+        places=frame.unit(np.stack(np.meshgrid(raster.x, raster.y), axis=-1)[part][known[part]]),
+        blocks=blocks[part][known[part]],
+        codes=_binned(picture),
+        lines=np.concatenate([lines, *np.gradient(lines, axis=(2, 1))]).transpose(1, 2, 0).copy(),
     )
 
 
@@ -227,19 +232,6 @@ def _edges(image: Array, scale: float, faint: float) -> Array:
     variance = gaussian_filter((image - image.mean()) ** 2, _WINDOW * scale)
     variance = np.maximum(variance - (mean - image.mean()) ** 2, 0.0)
     return np.asarray(np.stack([right, down]) * scale / np.sqrt(variance + faint**2))
-
-
-def _sharp(edges: Array) -> NDArray[np.bool_]:
-    """Return the fewest samples that have nearly all of the squares of the edges."""
-    squares = (edges**2).sum(axis=-1)
-    order = np.argsort(squares)[::-1]
-    least = squares[order][np.searchsorted(squares[order].cumsum(), _NEARLY_ALL * squares.sum())]
-    return np.asarray(squares >= least)
-
-
-def _noise(image: Array) -> float:
-    """Return the standard deviation of the noise: of pixels from the median around them."""
-    return 1.4826 * float(np.median(np.abs(image - median_filter(image, 3))))
 
 
 def _binned(image: Array) -> NDArray[np.int64]:
@@ -257,71 +249,52 @@ def _frame(raster: Raster, shape: tuple[int, ...]) -> NormalisedFrame:
     return NormalisedFrame(centre, radius, middle, radius * shape[1] / (right - left))
 
 
-def _pixels(level: _Level, frame: NormalisedFrame, matrix: Array) -> Array:
-    unit = mapped_places(matrix, frame.unit(level.places))
-    return unit * frame.pixel_scale + frame.pixel_centre
-
-
-def _sample(level: _Level, frame: NormalisedFrame) -> float:
-    """Return the distance of the level's samples in the frame's units."""
-    return level.pitch / frame.scale
-
-
 # The choice among placements
 
 
-def _placements(level: _Level, frame: NormalisedFrame) -> list[Array]:
+def _placements(level: _Level) -> list[Array]:
     """Return the best placements on a grid that are apart from each other, the best first."""
     found: list[tuple[float, Array]] = []
-    for scale, turn in product(_SCALES, _TURNS):
+    for scale, turn in product(_SCALES, np.radians(_TURNS).tolist()):
         matrix = np.eye(3)
-        angle = radians(turn)
-        matrix[:2, :2] = scale * np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
-        scores = _shifted_scores(level, frame, matrix, level.bins, level.edges)
-        found += [(score, _shifted(matrix, shift)) for score, shift in scores]
+        matrix[:2, :2] = scale * np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
+        found.extend(_shifted(level, matrix, level.bins, level.edges))
     found.sort(key=itemgetter(0), reverse=True)
     if found[0][0] == 0.0:
         raise ValueError("images: they do not lie on each other, expected views of one thing")
     kept: list[Array] = []
     for _, matrix in found:
-        if all(_apart(matrix, other, level, frame) > _APART for other in kept):
+        if all(level.apart(matrix, other) > _APART for other in kept):
             kept.append(matrix)
         if len(kept) == _CANDIDATES:
             break
     return kept
 
 
-def _shifted_scores(
-    level: _Level,
-    frame: NormalisedFrame,
-    matrix: Array,
-    bins: NDArray[np.int64],
-    edges: Array,
-) -> Iterator[tuple[float, tuple[float, float]]]:
-    """Return the mutual information times common edges for each shift on the grid."""
-    pixels = _pixels(level, frame, matrix)
+def _shifted(
+    level: _Level, matrix: Array, bins: NDArray[np.int64], edges: Array
+) -> Iterator[tuple[float, Array]]:
+    """Return the mutual information times common edges, and the matrix, of each shift on a grid."""
+    pixels = level.frame.pixels(matrix, level.places)
     reach = int(_REACH * level.bin_image.shape[1])
-    for across, down in product(range(-reach, reach + 1), repeat=2):
-        shift = across * _sample(level, frame), down * _sample(level, frame)
-        yield _score(level, pixels + np.array(shift) * frame.pixel_scale, bins, edges), shift
+    for steps in product(range(-reach, reach + 1), repeat=2):
+        shift = level.step * np.array(steps)
+        moved = matrix.copy()
+        moved[:2, 2] += shift
+        yield _score(level, pixels + shift * level.frame.pixel_scale, bins, edges), moved
 
 
 def _score(level: _Level, pixels: Array, bins: NDArray[np.int64], edges: Array) -> float:
     """Return mutual information times common edges at pixels; 0 if too few overlap."""
-    here, place = _seen(level, pixels)
-    if here.mean() < _LEAST_OVERLAP:
-        return 0.0
-    joint = np.bincount(bins[here] * _BINS + level.codes[place], None, _BINS**2) / here.size
-    along = (edges[here] * level.directions[place]).sum(axis=1)
-    return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
-
-
-def _seen(level: _Level, pixels: Array) -> tuple[NDArray[np.bool_], tuple[Array, Array]]:
-    """Return which samples lie in the picture, and the rows and columns of these."""
     column, row = np.rint(pixels).astype(np.int64).T
     rows, columns = level.codes.shape
     here = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-    return here, (row[here], column[here])
+    if here.mean() < _LEAST_OVERLAP:
+        return 0.0
+    place = row[here], column[here]
+    joint = np.bincount(bins[here] * _BINS + level.codes[place], None, _BINS**2) / here.size
+    along = (edges[here] * level.directions[place]).sum(axis=1)
+    return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
 
 
 def _shared(joint: Array) -> float:
@@ -331,13 +304,13 @@ def _shared(joint: Array) -> float:
     return float((joint[filled] * np.log(joint[filled] * joint.sum() / apart[filled])).sum())
 
 
-def _against_chance(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[float, Array]:
+def _against_chance(level: _Level, matrix: Array) -> tuple[float, Array]:
     """Return the best score over all shifts: of the image, and of unrelated images."""
     linear = matrix.copy()
     linear[:2, 2] = 0.0
 
     def best(bins: NDArray[np.int64], edges: Array) -> float:
-        return max(score for score, _ in _shifted_scores(level, frame, linear, bins, edges))
+        return max(score for score, _ in _shifted(level, linear, bins, edges))
 
     generator = np.random.default_rng(2010)
     chance = []
@@ -351,83 +324,61 @@ def _against_chance(level: _Level, frame: NormalisedFrame, matrix: Array) -> tup
     return best(level.bins, level.edges), np.array(chance)
 
 
-def _shifted(matrix: Array, shift: tuple[float, float]) -> Array:
-    moved = matrix.copy()
-    moved[:2, 2] += shift
-    return moved
-
-
-def _apart(one: Array, other: Array, level: _Level, frame: NormalisedFrame) -> float:
-    """Return the distance of two maps of the image in samples, at the worse of two corners."""
-    corners = frame.unit(level.places[[0, -1]])
-    apart = mapped_places(one, corners) - mapped_places(other, corners)
-    return float(np.hypot(apart[:, 0], apart[:, 1]).max()) / _sample(level, frame)
-
-
 # The climb
 
 
-def _settled(level: _Level, frame: NormalisedFrame, matrix: Array) -> tuple[Array, float]:
-    """Return the similarity near a matrix with the best score, and that."""
-    basis = _scaled_basis(level, frame, matrix, "similarity")
+def _moved(matrix: Array, basis: Array, parameters: Any) -> Array:
+    return np.asarray(matrix + (basis @ parameters).reshape(3, 3))
 
-    def moved(parameters: Array) -> Array:
-        return matrix + (basis @ parameters).reshape(3, 3)
+
+def _settled(level: _Level, matrix: Array) -> tuple[Array, float]:
+    """Return the similarity near a matrix with the best score, and that."""
+    basis = level.basis(matrix, "similarity")
 
     def loss(parameters: Array) -> float:
-        return -_score(level, _pixels(level, frame, moved(parameters)), level.bins, level.edges)
+        pixels = level.frame.pixels(_moved(matrix, basis, parameters), level.places)
+        return -_score(level, pixels, level.bins, level.edges)
 
     found = minimize(loss, np.zeros(4), method="Powell", options=_SETTLE)
-    return moved(found.x), -float(found.fun)
+    return _moved(matrix, basis, found.x), -float(found.fun)
 
 
-def _narrowed(
-    coarse: _Level, middle: _Level, frame: NormalisedFrame, candidates: list[Array]
-) -> list[Array]:
-    """Settle candidates at a quarter and at half of the resolution; the best first."""
-    found = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
-    fits = sorted((_settled(middle, frame, matrix) for matrix in found), key=itemgetter(1))
-    return [matrix for matrix, _ in fits[::-1]]
+def _best_first(level: _Level, matrices: list[Array]) -> list[tuple[Array, float]]:
+    """Return the settled matrices and their scores, the best first."""
+    return sorted((_settled(level, matrix) for matrix in matrices), key=itemgetter(1))[::-1]
 
 
-def _surveyed(level: _Level, frame: NormalisedFrame, matrix: Array) -> list[Array]:
+def _surveyed(level: _Level, matrix: Array) -> list[Array]:
     """Return the best similarities on a grid of shifts, turns and scales around a matrix."""
-    basis = _scaled_basis(level, frame, matrix, "similarity")
-    unit, thin = frame.unit(level.places[::_THINNED]), slice(None, None, _THINNED)
+    basis = level.basis(matrix, "similarity")
+    thin = slice(None, None, _THINNED)
+    places, bins, edges = level.places[thin], level.bins[thin], level.edges[thin]
     found = []
     for parameters in product(_SURVEY, repeat=4):
-        moved = matrix + (basis @ parameters).reshape(3, 3)
-        pixels = mapped_places(moved, unit) * frame.pixel_scale + frame.pixel_centre
-        found.append((_score(level, pixels, level.bins[thin], level.edges[thin]), parameters))
+        pixels = level.frame.pixels(_moved(matrix, basis, parameters), places)
+        found.append((_score(level, pixels, bins, edges), parameters))
     found.sort(reverse=True)
-    return [matrix + (basis @ best).reshape(3, 3) for _, best in found[:_FINALS]]
+    return [_moved(matrix, basis, best) for _, best in found[:_FINALS]]
 
 
-def _climb(level: _Level, frame: NormalisedFrame, matrix: Array, model: Model) -> Array:
+def _climb(level: _Level, matrix: Array, model: Model) -> Array:
     """Return the matrix of the most common edges near a matrix."""
-    basis = _scaled_basis(level, frame, matrix, model)
+    basis = level.basis(matrix, model)
 
     def loss(parameters: Array) -> tuple[float, Array]:
-        moved = matrix + (basis @ parameters).reshape(3, 3)
-        common, slopes, _ = _common_edges(level, frame, moved, basis)
+        common, slopes, _ = _common_edges(level, _moved(matrix, basis, parameters), basis)
         return -common, -slopes.sum(axis=0)
 
     found = minimize(loss, np.zeros(basis.shape[1]), jac=True, method="BFGS", options=_CLIMB)
-    return np.asarray(matrix + (basis @ found.x).reshape(3, 3))
-
-
-def _scaled_basis(level: _Level, frame: NormalisedFrame, matrix: Array, model: Model) -> Array:
-    """Return the basis by which a parameter of 1 moves the image's corner by one sample."""
-    mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
-    return parameter_basis(model, mirrored) * _sample(level, frame)
+    return _moved(matrix, basis, found.x)
 
 
 def _common_edges(
-    level: _Level, frame: NormalisedFrame, matrix: Array, basis: Array
+    level: _Level, matrix: Array, basis: Array
 ) -> tuple[float, Array, NDArray[np.bool_]]:
     """Return the mean of (g_i . g_v)², what each sharp sample adds to its slope, and which do."""
-    places, edges = frame.unit(level.places[level.sharp]), level.edges[level.sharp]
-    pixels = mapped_places(matrix, places) * frame.pixel_scale + frame.pixel_centre
+    places, edges = level.places[level.sharp], level.edges[level.sharp]
+    pixels = level.frame.pixels(matrix, places)
     weight, fading = _window(pixels, level.codes.shape, _FADE * level.scale)
     here = weight > 0
     if weight.mean() < _LEAST_OVERLAP:
@@ -437,7 +388,9 @@ def _common_edges(
     along, right, down = (lines * edges[:, None]).sum(axis=2).T
     pull = 2 * (weight * along)[:, None] * np.stack([right, down], axis=1)
     pull += (along**2)[:, None] * fading
-    slopes = element_slopes(matrix, places[here]) @ basis * (frame.pixel_scale / len(level.places))
+    slopes = (
+        element_slopes(matrix, places[here]) @ basis * (level.frame.pixel_scale / len(level.places))
+    )
     common = float((weight * along**2).sum() / len(level.places))
     return common, np.einsum("ni,nik->nk", pull, slopes), here
 
@@ -463,13 +416,11 @@ def _window(pixels: Array, shape: tuple[int, ...], fade: float) -> tuple[Array, 
 # The verdict
 
 
-def _rivals(
-    fits: list[tuple[Array, float]], level: _Level, frame: NormalisedFrame
-) -> tuple[str, ...]:
+def _rivals(fits: list[tuple[Array, float]], level: _Level) -> tuple[str, ...]:
     """Return a warning for the best other placement that is nearly as good."""
     best, most = fits[0]
     for matrix, common in fits[1:]:
-        distance = _apart(best, matrix, level, frame)
+        distance = level.apart(best, matrix)
         if distance > _FAR and common > _RIVAL * most:
             return (
                 f"Another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
@@ -488,21 +439,19 @@ def _unsure(found: Registration, raster: Raster) -> tuple[str, ...]:
     )
 
 
-def _sandwich(
-    level: _Level, frame: NormalisedFrame, matrix: Array, basis: Array
-) -> tuple[Array, bool]:
+def _sandwich(level: _Level, matrix: Array, basis: Array) -> tuple[Array, bool]:
     """Return the covariance of the parameters, and whether there is no optimum."""
     count, step = basis.shape[1], 0.25
 
     def slope(parameters: Array) -> Array:
-        moved = matrix + (basis @ parameters).reshape(3, 3)
-        return np.asarray(_common_edges(level, frame, moved, basis)[1].sum(axis=0))
+        moved = _moved(matrix, basis, parameters)
+        return np.asarray(_common_edges(level, moved, basis)[1].sum(axis=0))
 
     curve = np.array([(slope(step * e) - slope(-step * e)) / (2 * step) for e in np.eye(count)])
     values, vectors = np.linalg.eigh(-(curve + curve.T) / 2)
     flat = not values.min() > _FLAT * values.max()
     inverse = vectors / np.maximum(values, _FLAT * max(values.max(), 1e-12)) @ vectors.T
-    _, slopes, here = _common_edges(level, frame, matrix, basis)
+    _, slopes, here = _common_edges(level, matrix, basis)
     _, blocks = np.unique(level.blocks[level.sharp][here], return_inverse=True)
     used = max(int(blocks.max()) + 1, count + 1)
     sums = np.stack([np.bincount(blocks, part, used) for part in slopes.T], axis=1)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from math import ceil, hypot
-from typing import Final, Literal, NamedTuple, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -12,6 +12,7 @@ from scipy.special import fdtrc
 
 from chipglow.quantities import Array
 from chipglow.scene import Raster
+from chipglow.scene.lines import nearest
 from chipglow.text import Notes
 
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
@@ -26,16 +27,6 @@ _EXACT: Final = 1e-9
 
 _BEST_PICKED: Final = 0.02
 """Scatter in visible pixels under which points are not picked: that of dots' middles."""
-
-
-class Geometry(NamedTuple):
-    """How a visible picture lies on an infrared image."""
-
-    pixel_size: float
-    """Side of a visible pixel in m."""
-    turn: float
-    mirrored: bool
-    """Whether one is the mirror image of the other."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +45,7 @@ class Registration:
     model: Model
     method: Method
     degrees_of_freedom: float = np.inf
-    """Degrees of freedom of the covariance: Student's t gives the intervals; infinite for mutual
-    information.
-    """
+    """Degrees of freedom of the covariance, for Student's t; infinite for mutual information."""
     notes: Notes = field(default_factory=Notes)
     """Assumptions, and reasons why it may be wrong."""
 
@@ -105,33 +94,24 @@ class Registration:
         return (self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
-        """Return median and largest standard uncertainty of a mapped position in m.
-
-        It is the root of the sum of the variances along x and y.
-        """
+        """Return median and largest standard uncertainty in m, of x and y together."""
         places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1)
         variance = np.trace(self.position_covariance(places), axis1=-2, axis2=-1)
         found = np.sqrt(np.maximum(variance, 0.0))
         return float(np.median(found)), float(found.max())
 
-    def geometry(self, raster: Raster) -> Geometry:
-        """Return the size and turn of the visible picture in the middle of an infrared image."""
+    def geometry(self, raster: Raster) -> tuple[float, float, bool]:
+        """Return the size of a visible pixel in m, its turn in degrees, and if it is mirrored."""
         left, right, bottom, top = raster.extent
         slope = self.jacobian(np.array([(left + right) / 2, (bottom + top) / 2]))
         area = float(np.linalg.det(slope))
         turn = float(np.degrees(np.arctan2(-slope[1, 0] * np.sign(area), slope[0, 0])))
-        return Geometry(1 / float(np.sqrt(abs(area))), turn, area > 0)
+        return 1 / float(np.sqrt(abs(area))), turn, area > 0
 
     def warp(self, image: NDArray[np.floating], raster: Raster, shape: tuple[int, int]) -> Array:
         """Return an infrared image as the visible camera would have it."""
         rows, columns = np.indices(shape)
-        place = self.positions(np.stack([columns, rows], axis=-1))
-        column = np.floor((place[..., 0] - raster.left) / raster.spacing)
-        row = np.floor((raster.top - place[..., 1]) / raster.spacing)
-        inside = (column >= 0) & (row >= 0) & (column < raster.columns) & (row < raster.rows)
-        warped = np.full(shape, np.nan)
-        warped[inside] = image[row[inside].astype(int), column[inside].astype(int)]
-        return warped
+        return nearest(image, raster, self.positions(np.stack([columns, rows], axis=-1)))
 
 
 @dataclass(frozen=True)
@@ -177,31 +157,24 @@ def fit_points(
     model : {"similarity", "affine", "homography"}
         Turn and scale, mirrored or not; or with shear; or with perspective.
     picked : bool
-        Whether people picked the points, who are not as exact as dots that are fitted: it is a
-        warning if the points agree better.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer points than the model needs and one more, from which the uncertainty
-        comes; if they lie on a line; or if they leave the model open.
+        Whether people picked the points: it is a warning if they agree better than anyone can.
 
     Notes
     -----
     Least squares of the distances in the visible picture, from the direct linear solution in
-    normalised coordinates (Hartley and Zisserman, Multiple View Geometry, 2nd ed., 4.1 and 4.4).
-    The scatter comes from the residuals; pickings in both images are in it, whichever was worse.
+    normalised coordinates (Hartley and Zisserman, Multiple View Geometry, 2nd ed., 4.1 and 4.4);
+    the uncertainty comes from the residuals, so that one point more than the model needs is least.
     A point is misplaced if the F test of its residual against the scatter of the other points
     (the externally studentised residual) is beyond 1 % over all points.
     """
     given, seen = _checked(positions, pixels, model)
     frame = NormalisedFrame.around(given, seen)
     found, target = frame.unit(given), frame.unit_pixels(seen)
-    best = min(
-        (_least(found, target, model, mirrored) for mirrored in _orientations(model)),
+    orientations = (False, True) if model == "similarity" else (False,)
+    basis, residual, slope, matrix = min(
+        (_least(found, target, model, mirrored) for mirrored in orientations),
         key=lambda fit: float(fit[1] @ fit[1]),
     )
-    basis, residual, slope, matrix = best
     freedom = residual.size - basis.shape[1]
     if np.linalg.cond(slope) > _WORST_CONDITION:
         raise ValueError(
@@ -262,6 +235,10 @@ class NormalisedFrame:
         """Return columns and rows in these coordinates."""
         return (pixels - self.pixel_centre) / self.pixel_scale
 
+    def pixels(self, matrix: Array, unit: Array) -> Array:
+        """Return columns and rows of places that a matrix in these coordinates maps."""
+        return mapped_places(matrix, unit) * self.pixel_scale + self.pixel_centre
+
     def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
         """Return a matrix in these coordinates, and its covariance, for m and pixels."""
         x, y = self.centre / self.scale
@@ -279,10 +256,7 @@ class NormalisedFrame:
 
 
 def parameter_basis(model: Model, mirrored: bool) -> Array:
-    """Return the elements of a matrix by the parameters of a model, shape (9, parameters).
-
-    The matrix is this times the parameters, and 1 for its last element.
-    """
+    """Return the elements of a matrix by a model's parameters, but for the last one's 1; (9, k)."""
     if model != "similarity":
         return np.eye(9)[:, : _PARAMETERS[model]]
     sign = -1.0 if mirrored else 1.0
@@ -349,17 +323,11 @@ def _least_points(model: Model) -> int:
     return ceil(_PARAMETERS[model] / 2) + 1
 
 
-def _orientations(model: Model) -> tuple[bool, ...]:
-    return (False, True) if model == "similarity" else (False,)
-
-
 def _misplaced(residual: Array, hat: Array, variance: float, freedom: int) -> NDArray[np.bool_]:
     """Do the F test of every point against the scatter of the others, 1 % over all points."""
     count = residual.size // 2
-    if freedom <= 2 or variance <= _EXACT**2:
-        return np.zeros(count, np.bool_)
     misplaced = np.zeros(count, np.bool_)
-    for i in range(count):
+    for i in range(count if freedom > 2 and variance > _EXACT**2 else 0):
         part = slice(2 * i, 2 * i + 2)
         own = float(residual[part] @ np.linalg.solve(np.eye(2) - hat[part, part], residual[part]))
         others = max(variance * freedom - own, 0.0) / (freedom - 2)

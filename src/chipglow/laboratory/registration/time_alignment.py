@@ -15,7 +15,6 @@ from scipy.special import stdtr
 from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import Array
-from chipglow.scene import Raster
 from chipglow.text import Notes
 
 _FEWEST: Final = 6
@@ -55,25 +54,15 @@ def align_times(
         A number a frame that shows the same event: the position of the chip's edge, or the mean
         brightness of a region. One may fall where the other rises.
 
-    Raises
-    ------
-    ValueError
-        If there are too few frames, times do not ascend, or a signal does not change.
-
     Notes
     -----
-    The visible signal, smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
-    54 (2010) 1167), is put to the infrared times; the correlation of both is largest at the offset
-    that is least squares for infrared = a + b visible(time). All offsets are tried, a third of a
-    visible frame apart, at which at least half of the infrared frames have visible ones;
-    Gauss-Newton refines it. Changes faster than the visible camera's frames, which the spline
-    cannot follow, go into the residuals and with them into the uncertainty.
+    The visible signal is smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
+    54 (2010) 1167). Of all offsets at which at least half of the infrared frames have visible ones,
+    that of the largest correlation is refined by least squares. Changes faster than the visible
+    frames go into the residuals and with them into the uncertainty.
     """
-    for name, times, values in (
-        ("infrared", infrared_times, infrared_signal),
-        ("visible", visible_times, visible_signal),
-    ):
-        _check(name, times, values)
+    _check("infrared", infrared_times, infrared_signal)
+    _check("visible", visible_times, visible_signal)
     smooth = _smoothed(visible_signal / np.std(visible_signal))
     spline = CubicSpline(visible_times, smooth, extrapolate=False)
     target = (infrared_signal - infrared_signal.mean()) / infrared_signal.std()
@@ -94,10 +83,7 @@ def simultaneous_frames(
     visible_times: Array,
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
-    """Return the numbers of the visible frames that were exposed within each integration.
-
-    Times are when integrations and exposures began in s.
-    """
+    """Return the visible frames exposed within each integration; times in s are starts."""
     begins = infrared_times + alignment.offset
     return [
         np.flatnonzero(
@@ -105,28 +91,6 @@ def simultaneous_frames(
         )
         for begin in begins
     ]
-
-
-def region_signals(
-    registration: Registration,
-    infrared: NDArray[np.floating],
-    raster: Raster,
-    visible: NDArray[np.generic],
-    region: tuple[float, float, float, float],
-) -> tuple[Array, Array]:
-    """Return the mean brightness of one region in every frame of both cameras."""
-    left, bottom, right, top = region
-    columns = (raster.x >= left) & (raster.x <= right)
-    rows = (raster.y >= bottom) & (raster.y <= top)
-    down, across = np.indices(visible.shape[1:])
-    place = registration.positions(np.stack([across, down], axis=-1))
-    inside = (place[..., 0] >= left) & (place[..., 0] <= right)
-    inside &= (place[..., 1] >= bottom) & (place[..., 1] <= top)
-    if not (columns.any() and rows.any() and inside.any()):
-        raise ValueError("region: must lie within both images")
-    hot = infrared[:, rows][:, :, columns].reshape(len(infrared), -1).mean(axis=1)
-    bright = visible.reshape(len(visible), -1)[:, inside.ravel()].mean(axis=1)
-    return np.asarray(hot, np.float64), np.asarray(bright, np.float64)
 
 
 def _check(name: str, times: Array, values: Array) -> None:
@@ -268,9 +232,19 @@ def align_recordings(
     if "integration_time" not in infrared.data.attrs:
         raise ValueError("the measurement does not state its integration_time")
     integration = float(infrared.data.attrs["integration_time"])
-    hot, bright = region_signals(
-        registration, infrared.radiance, infrared.raster, visible.signal, region
-    )
+    left, bottom, right, top = region
+
+    def inside(places: Array) -> NDArray[np.bool_]:
+        x, y = places[..., 0], places[..., 1]
+        return (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+
+    down, across = np.indices(visible.signal.shape[1:])
+    seen = inside(registration.positions(np.stack([across, down], axis=-1)))
+    hot = inside(np.stack(np.meshgrid(infrared.raster.x, infrared.raster.y), axis=-1))
+    if not (hot.any() and seen.any()):
+        raise ValueError("region: must lie within both images")
+    signals = infrared.radiance[:, hot].mean(axis=1), visible.signal[:, seen].mean(axis=1)
+    heat, brightness = (np.asarray(signal, np.float64) for signal in signals)
     exposure = visible.integration_time or float(np.median(np.diff(visible.times)))
     notes = Notes()
     if visible.integration_time is None:
@@ -278,7 +252,7 @@ def align_recordings(
             f"A visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
         )
     times = infrared.times
-    clocks = align_times(times + integration / 2, hot, visible.times + exposure / 2, bright)
+    clocks = align_times(times + integration / 2, heat, visible.times + exposure / 2, brightness)
     within = simultaneous_frames(clocks, times, integration, visible.times, exposure)
     notes.warnings.extend(clocks.warnings)
     return RecordingAlignment(clocks, times, within, notes)
