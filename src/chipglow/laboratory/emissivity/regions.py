@@ -99,5 +99,11 @@ def _numbers(*coordinates: float | str) -> tuple[list[float], Literal["pixel", "
 
 
 def load_regions(path: str | Path) -> tuple[Region, ...]:
-    """Read named polygons, rectangles and circles of an image from a YAML file."""
+    """Read named regions of an image from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        YAML file of polygons, rectangles and circles.
+    """
     return load_described(RegionsDescription, path).build()

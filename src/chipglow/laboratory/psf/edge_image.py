@@ -81,6 +81,11 @@ def edge_image(
         Its name in messages.
     region : tuple of slice, optional
         Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If the region is not within the image.
     """
     attributes = measurement.data.attrs
     image = _mean_image(

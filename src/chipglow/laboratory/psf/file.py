@@ -85,6 +85,11 @@ def write_psf(
         `MeasuredPSF.from_file`.
     psf : MeasuredPSF, optional
         The kernel to write; by default that of the best model (`psf_kernel`).
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
     """
     psf = psf_kernel(knife) if psf is None else psf
     data = to_xarray(psf.estimate, "kernel", ("y", "x"))

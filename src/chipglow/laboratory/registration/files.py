@@ -71,7 +71,15 @@ def write_registration(registration: Registration, path: str | Path) -> None:
 
 
 def load_registration(path: str | Path) -> Registration:
-    """Read a registration from a YAML file."""
+    """Read a registration from a YAML file.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is not YAML or not a registration; the message names the file.
+    OSError
+        If it cannot be read.
+    """
     path = Path(path)
     given = read_yaml(path)
     try:

@@ -159,6 +159,11 @@ def fit_points(
     picked : bool
         Whether people picked the points: it is a warning if they agree better than anyone can.
 
+    Raises
+    ------
+    ValueError
+        If there are too few points for the model and its uncertainty, or they lie on a line.
+
     Notes
     -----
     Least squares of the distances in the visible picture, from the direct linear solution in

@@ -54,6 +54,11 @@ def align_times(
         A number a frame that shows the same event: the position of the chip's edge, or the mean
         brightness of a region. One may fall where the other rises.
 
+    Raises
+    ------
+    ValueError
+        If there are too few frames, times do not ascend, or a signal does not change.
+
     Notes
     -----
     The visible signal is smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
