@@ -33,6 +33,7 @@ from chipglow.camera import (
 )
 from chipglow.io import write_scene
 from chipglow.report import write_report
+from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.rows import all_rows
 from chipglow.scene import Raster, Scene
@@ -366,6 +367,32 @@ def test_the_netd_is_at_least_that_of_rounding():
     assert rounding > 1.0
     # Each source's mean is rounded by half a count at most, of the 0.7 x 15983 between them.
     assert camera.calibration((8, 8)).netd(303.15) == pytest.approx(rounding, rel=1e-4)
+    told = [one for one in camera.form_measurement(exposure()).notes.warnings if "NETD" in one]
+    assert len(told) == 1 and f"causes {1e3 * rounding:.0f} mK at 30 °C" in told[0]
+    fine = replace(camera, detector=replace(camera.detector, bits=22))
+    assert not any("NETD" in one for one in fine.form_measurement(exposure()).notes.warnings)
+
+
+def test_the_answer_says_where_the_camera_is_saturated(tmp_path):
+    hot = Raster(left=-60e-6, top=60e-6, spacing=2e-6, rows=60, columns=60)
+    path = tmp_path / "hot.nc"
+    write_scene(Scene.from_fields(hot, [0.0], {"temperature": np.full((1, 60, 60), 900.0)}), path)
+    said = {}
+    for hottest in ("350 degC", "900 degC"):
+        response = {"kind": "range", "hottest": hottest}
+        study = Study(
+            scene=str(path),
+            surface={"kind": "uniform", "emissivity": 1.0},
+            camera={"detector": {"response": response, "bits": 14}, "psf": None},
+            analysis={"points": {"here": ("0 um", "0 um")}, "phases": 2, "exposures": 1},
+        )
+        facts = Facts(errors(study))
+        rows = all_rows(facts)["errors"]
+        said[hottest] = answer(facts, rows)[0].text, " ".join(changes(facts, rows))
+        assert f"to {hottest.split()[0]} °C" in facts.settings["Range"]
+    assert "100 % of the pixels there are saturated" in said["350 degC"][0]
+    assert "higher measuring range" in said["350 degC"][1]
+    assert "saturated" not in "".join(said["900 degC"])
 
 
 def test_the_microbolometers_data_sheet_comes_back():

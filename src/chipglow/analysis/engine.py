@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -25,7 +25,7 @@ from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
 from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
-from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.camera import Camera, Flag, GaussianPSF, Measurement
 from chipglow.camera.exposure import sparse_frames, surroundings_radiance
 from chipglow.laboratory.chip import (
     NoContactError,
@@ -216,10 +216,11 @@ def analyse(
         variables["psf_order"] = "psf_order", list(PSF_ORDERS)
         variables["psf_width"] = "psf_width", np.asarray(plan.psf_widths), {"units": "m"}
         attributes |= {"rake_surface": plan.rake_chip, "band_surface": plan.band_chip}
-    data = xr.Dataset(variables, attrs=attributes)
-    data = data.set_coords([name for name in _COORDINATES if name in data])
     exposure = schedule.drawn.index(schedule.shown)
     read = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
+    variables |= _saturated(variables, measurements, schedule.shown, read)
+    data = xr.Dataset(variables, attrs=attributes)
+    data = data.set_coords([name for name in _COORDINATES if name in data])
     warnings += _range_warnings(measurements, schedule.shown, read)
     warnings += _filled_warnings(scene, schedule.starts[schedule.shown], task.duration, read)
     return Analysis(
@@ -435,6 +436,23 @@ def _corrected(camera: Camera, variables: Variables) -> Variables:
         "set_emissivity": ("surface", assumed, {"units": "1"}),
         "corrected": (variables["reference"][0], shown, _KELVIN),
     }
+
+
+def _saturated(
+    variables: Variables,
+    measurements: Mapping[str, Measurement],
+    shown: int,
+    read: Sequence[tuple[str, Place]],
+) -> Variables:
+    """Return the fraction of each reading's place that saturates the camera in the exposure."""
+    fractions = {}
+    for surface, place in read:
+        one = measurements[surface]
+        where = one.flags[shown] & Flag.SATURATED != 0
+        covered = place.covered(where, one.raster)
+        fractions[surface, place.name] = float(where.any()) if isnan(covered) else covered
+    keys = zip(variables["seen_surface"][1], variables["place"][1], strict=True)
+    return {"saturated": ("reading", [fractions[key] for key in keys], {"units": "1"})}
 
 
 def _attribution(task: _Task, schedule: Schedule, looked: Looked) -> Variables:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
 from chipglow.camera.detector.response import OperationPoint
-from chipglow.camera.detector.terms import Lag, follows, lagged
+from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows, lagged
 from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
@@ -331,6 +331,7 @@ class Camera(Part):
         measured = self.measurement(np.stack(images), np.array(starts), scene)
         measured.data.attrs.update(sorted(set.intersection(*effects)))
         warnings |= dict.fromkeys(self._sampling_warning(scene))
+        warnings |= dict.fromkeys(self._rounding_warning(images[0].shape))
         warnings |= dict.fromkeys(self._lag_warning(measured.times))
         warnings |= dict.fromkeys(self._border_warning(np.stack(images), np.stack(similar), scene))
         if warnings:
@@ -481,6 +482,21 @@ class Camera(Part):
                 f"pixel of {1e6 * self.pitch:.3g} µm: what changes within a sample is missing, and "
                 "the errors by pixels and blur may be too small."
             )
+
+    def _rounding_warning(self, shape: tuple[int, int]) -> Iterator[str]:
+        """Yield a warning if rounding to counts exceeds the stated NETD."""
+        calibration = self.calibration(shape)
+        for term in self.detector.terms if self.detector else ():
+            if isinstance(term, EquivalentNoise) and calibration is not None:
+                kelvins = calibration.rounding / float(self.band.slope(term.temperature))
+                if kelvins > term.netd:
+                    yield (
+                        f"The stated NETD of {1e3 * term.netd:.3g} mK is not reached: rounding to "
+                        f"{calibration.detector.bits} bits up to "
+                        f"{calibration.full_temperature - 273.15:.0f} °C causes "
+                        f"{1e3 * kelvins:.0f} mK at {term.temperature - 273.15:.4g} °C. NETD and "
+                        "range must be those of the same setting of the camera."
+                    )
 
     def _lag_warning(self, starts: Array) -> Iterator[str]:
         """Yield warnings if lag is modelled but no frame follows another."""

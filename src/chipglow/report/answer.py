@@ -14,6 +14,9 @@ from chipglow.report.rows import MAIN, Row, draws_text, slug, spread_text
 _MAX_SENTENCES: Final = 3
 """Number of sentences; the tables hold all errors."""
 
+_MANY: Final = 0.5
+"""Fraction of saturated pixels from which on a place is called saturated."""
+
 
 class Statement(NamedTuple):
     """A sentence on an error, and the id of its explanation on the page."""
@@ -61,7 +64,15 @@ def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
     if row.paper is not None and row.differs is not None:
         side = "outside" if row.differs else "within"
         parts.append(f"the paper's {-row.paper:.0f} °C lies {side} the interval of a single frame")
+    if (saturated := _saturated(facts, name)) >= _MANY:
+        percent = quantity_text(100 * saturated, "%", 0)
+        parts.append(f"{percent} of the pixels there are saturated: a camera shows no temperature")
     return "; ".join(parts) + "."
+
+
+def _saturated(facts: Facts, name: str) -> float:
+    """Return the fraction of a reading's place that saturates the camera."""
+    return float(facts.data.saturated.sel(reading=name))
 
 
 def _of_true_temperature(facts: Facts, name: str) -> str:
@@ -86,6 +97,8 @@ def changes(facts: Facts, errors: Sequence[Row]) -> list[str]:
             continue
         sign = -1 if row.here < 0 else 1
         part, draws = max(row.parts.items(), key=lambda item: sign * item[1].mean)
+        if _saturated(facts, name) >= _MANY:
+            part = "saturated"
         values = {"quantity": row.quantity, "here": row.here, "part": draws.mean}
         sentences.append(facts.text(texts()["changes"][part], **values))
     return sentences

@@ -154,6 +154,9 @@ class Facts:
         blur = "none" if psf is None else f"{psf}, {1e6 * psf.fwhm:.3g} µm wide at half maximum"
         applied = {"detector": "on the pixel image", "optics": "before the pixels integrate"}
         bits = camera.detector.bits if camera.detector else None
+        lowest = "no lower limit" if limit is None else f"from {limit - KELVIN:.0f} °C"
+        calibration = camera.calibration((pixels.rows, pixels.columns))
+        highest = f" to {calibration.full_temperature - KELVIN:.0f} °C" if calibration else ""
         reflected = camera.reflected
         settings = {
             "Spectral band": spectral,
@@ -162,7 +165,7 @@ class Facts:
             "Point spread function": blur
             if psf is None
             else f"{blur}, {applied[camera.psf_order]}",
-            "Range": "no lower limit" if limit is None else f"from {limit - KELVIN:.0f} °C",
+            "Range": f"{lowest}{highest}",
             "Reflected temperature": (
                 "none" if reflected is None else f"{reflected - KELVIN:.0f} °C"
             ),

@@ -171,7 +171,7 @@ def error_lines(facts: Facts) -> Figure | None:
         for axes, values, colour, label in (
             (left, reference, GREY, "reference"),
             (left, reference + error, BLUE, "measured"),
-            (right, error, BLUE, "error"),
+            (right, error, GREEN, "error"),
             (right, portion, VERMILLION, "PSF contribution"),
         ):
             drawing.draw_mean(axes, at, _draws(values[shown].values), colour, label)
@@ -284,13 +284,13 @@ def _draw_marks(axes: Axes, facts: Facts) -> None:
 
 def _draw_published(axes: Axes, line: str) -> None:
     error, fraction = PAPER[f"{line}_error_degC"], PAPER[f"{line}_psf_fraction_percent"]
-    _draw_point(axes, 0.0, error.value, BLUE, "the paper's error")
+    _draw_point(axes, 0.0, error.value, GREEN, "the paper's error")
     portion = error.value * fraction.value / 100
     _draw_point(axes, 0.0, portion, VERMILLION, "the paper's PSF contribution")
     worst = PAPER.get(f"{line}_worst_error_degC")
     if worst is not None:
         label = "the paper, beside the band"
-        axes.axhline(worst.value, color=BLUE, linestyle="--", linewidth=1.0, label=label)
+        axes.axhline(worst.value, color=GREEN, linestyle="--", linewidth=1.0, label=label)
         axes.set_ylim(bottom=min(axes.get_ylim()[0], 1.1 * worst.value))
 
 

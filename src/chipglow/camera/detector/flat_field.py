@@ -111,10 +111,14 @@ class FlatFieldCalibration:
             self.detector, self.point, self.bad.shape, seen, self.detector.frames, "netd"
         )
         variance = self.radiance(frames)[0].var(axis=0, ddof=1)
-        (low, high), (dark, bright) = self.levels, self.sources
-        rounding = _QUANTISATION * (bright - dark) / (high - low)
-        noise = max(float(np.sqrt(variance[~self.bad].mean())), rounding)
+        noise = max(float(np.sqrt(variance[~self.bad].mean())), self.rounding)
         return float(noise / self.point.band.slope(temperature))
+
+    @property
+    def rounding(self) -> float:
+        """Standard deviation of the radiance by rounding to counts in W/(m² sr)."""
+        (low, high), (dark, bright) = self.levels, self.sources
+        return _QUANTISATION * (bright - dark) / (high - low)
 
     @cached_property
     def half_temperature(self) -> float:
