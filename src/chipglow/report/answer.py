@@ -114,7 +114,7 @@ def error_text(error: Distribution) -> str:
         return f"{text} (a single draw)"
     low, high = sorted(scale * end for end in error.interval)
     if not isfinite(low):
-        return f"{text} ({error.draws} draws)"
+        return f"{text} (no interval: {error.draws} draws with too few degrees of freedom)"
     least = quantity_text(abs(low), "°C", 0) + (f" too {other}" if low < 0 else "")
     most = f"{quantity_text(high, '°C', 0)} too {way}"
     return f"{text} on average; in a single frame between {least} and {most}"
