@@ -30,11 +30,7 @@ _MAX_REACH: Final = 2048
 def blur(
     radiance: Array, psf: PointSpreadFunction, spacing: float, beyond: Beyond = "edge"
 ) -> Array:
-    """Convolve a field of radiance (y, x) with a point spread function.
-
-    Beyond its edges, the field continues with the nearest value, or is zero. There is no wraparound
-    and no truncation of the point spread function.
-    """
+    """Convolve a field (y, x) with all of a point spread function, without wraparound."""
     edge, nothing = blurs(radiance, psf, spacing)
     return edge if beyond == "edge" else nothing
 
@@ -64,17 +60,15 @@ class _Kernel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
-    """Light from beyond one edge of a field, where its values continue.
-
-    `spectrum` (n, frequency) is the transform along the edge of the kernel's sums over the area
-    beyond, for the `lines` inside that the light reaches. `length` is the size of the transform,
-    `reach` the half size of the kernel.
-    """
+    """Light from beyond one edge of a field, where its values continue."""
 
     lines: NDArray[np.intp]
+    """Lines inside that the light reaches."""
     spectrum: NDArray[np.complex128]
+    """Transform along the edge of the kernel's sums over the area beyond, (line, frequency)."""
     length: int
     reach: int
+    """Half size of the kernel."""
 
     @classmethod
     def from_sums(cls, sums: Array, weights: sparse.csr_array, count: int) -> "_Strip":
@@ -94,11 +88,7 @@ class _Strip:
 
 @dataclass(frozen=True, eq=False)
 class _Optics:
-    """A kernel and the pixels on which images are formed.
-
-    `down` and `across` are the weights of samples in the pixels; `edges` are left, right, upper and
-    lower.
-    """
+    """A kernel, the weights of samples in pixels, and edges: left, right, upper and lower."""
 
     kernel: _Kernel
     down: sparse.csr_array
