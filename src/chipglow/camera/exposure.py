@@ -57,11 +57,6 @@ class View:
     band: Band
     reflected: float | None = None
 
-    @property
-    def environment(self) -> float:
-        """Radiance of the surroundings in W/(m² sr)."""
-        return surroundings_radiance(self.band, self.reflected)
-
 
 def expose(
     scene: Scene,
@@ -90,8 +85,8 @@ def expose(
     sums = Sums(
         np.array([[indices_of_fields[id(v.emissivity)], bands.index(v.band)] for v in views]),
         np.stack([_fine_table(band) for band in bands]),
-        np.array([view.environment for view in views], np.float32),
-        stack.max_emissivity,
+        np.array([surroundings_radiance(v.band, v.reflected) for v in views], np.float32),
+        max(field.max_emissivity for field in fields),
         scene.raster.shape,
         check,
     )
@@ -194,7 +189,7 @@ def _sweep(
     sums: Sums,
 ) -> None:
     """Add sub-frames to sums by the fastest kernel for scene and surfaces."""
-    features = stack.features if stack.is_bare else None
+    features = None if any(field.changes for field in stack.fields) else stack.features
     if features is not None:
         splines = [one for i in indices if (one := scene.splines(i)) is not None]
         if splines:

@@ -83,13 +83,10 @@ def _outlier(residuals: Array, design: Array, stated: bool) -> int | None:
     free = residuals.size - design.shape[1] - 1
     rest = max(total - float(fall[point]), 1e-300)
     scatter = max(rest / free, 1.0) if stated else rest / free
-    limit = float(chdtri(1, _UNLIKELY / residuals.size)) if stated else _student_limit(free)
+    student = float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
+    limit = float(chdtri(1, _UNLIKELY / residuals.size)) if stated else student
     far = fall[point] > limit * scatter and fall[point] > _LEAST_FALL * total
     return point if far and (stated or free >= _LEAST_FREEDOM) else None
-
-
-def _student_limit(free: int) -> float:
-    return float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
 
 
 def _serial_probability(residuals: Array, design: Array) -> float:

@@ -198,7 +198,7 @@ class PupilPSF(PointSpreadFunction):
             if change is not None:
                 step = 2.0 / self._samples
                 places = np.stack([up[passed], across[passed]]) * scale / step + self._samples
-                part += _interpolated(change, places)
+                part += map_coordinates(change, places, order=3, mode="grid-constant")
             result[passed] += weight * part
         return result
 
@@ -401,7 +401,3 @@ def _autocorrelation(pupil: NDArray[np.complex128]) -> NDArray[np.complex128]:
     twice = [2 * count for count in pupil.shape]
     power = np.abs(fft.fft2(pupil, twice)) ** 2
     return np.asarray(fft.fftshift(np.conj(fft.ifft2(power))))
-
-
-def _interpolated(values: NDArray[np.complex128], places: Array) -> NDArray[np.complex128]:
-    return np.asarray(map_coordinates(values, places, order=3, mode="grid-constant"))
