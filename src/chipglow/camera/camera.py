@@ -12,26 +12,18 @@ from numpy.typing import NDArray
 
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
-from chipglow.camera.detector.response import OperationPoint
+from chipglow.camera.detector.response import OperationPoint, in_tables
 from chipglow.camera.detector.terms import Lag, follows, lagged
 from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import Beyond, blur, blurs, images_on_pixels
+from chipglow.camera.optics.convolution import Beyond, blur, images
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
 from chipglow.camera.sweep import Check
 from chipglow.quantities import Array, Parameter, Part
-from chipglow.quantities.units import (
-    COLDEST,
-    FREQUENCY,
-    HOTTEST,
-    LENGTH,
-    TEMPERATURE,
-    TIME,
-    Position,
-)
+from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
@@ -59,11 +51,6 @@ class Camera(Part):
 
     The default camera has no lower range limit. Its point spread function is the diffraction of a
     reflecting objective in the camera's band. `paper` returns the paper's camera.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its limits; the message names field, value and limits.
 
     Warns
     -----
@@ -135,21 +122,12 @@ class Camera(Part):
     ] = None
     lower_limit: Annotated[
         float | None,
-        Parameter(
-            "Lower range limit: lower radiance temperatures are flagged, not returned; or none.",
-            TEMPERATURE,
-            least=COLDEST,
-            most=HOTTEST,
+        in_tables(
+            "Lower range limit: lower radiance temperatures are flagged, not returned; or none."
         ),
     ] = None
     reflected: Annotated[
-        float | None,
-        Parameter(
-            "Reflected apparent temperature; none: dark surroundings.",
-            TEMPERATURE,
-            least=COLDEST,
-            most=HOTTEST,
-        ),
+        float | None, in_tables("Reflected apparent temperature; none: dark surroundings.")
     ] = None
     optics: Annotated[
         tuple[OpticsTerm, ...],
@@ -378,10 +356,10 @@ class Camera(Part):
             return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
         pixels = self.pixels(scene)
         if self.psf_order == "optics":
-            return images_on_pixels(image, self.psf, scene, pixels, self._sensitive(scene))
+            return images(image, self.psf, scene.spacing, (scene, pixels, self._sensitive(scene)))
         whole, own = whole_raster(scene, pixels)
         received = integrate(image, scene, whole, self.fill_factor)
-        edge, nothing = blurs(received, self.psf, self.pitch)
+        edge, nothing = images(received, self.psf, self.pitch)
         return edge[own], nothing[own]
 
     def _collect(

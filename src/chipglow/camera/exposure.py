@@ -90,7 +90,19 @@ def expose(
         scene.raster.shape,
         check,
     )
-    _sweep(scene, stack, indices, weights, middles, sums)
+    # The fastest kernel for scene and surfaces.
+    features = None if any(field.changes for field in fields) else stack.features
+    read = indices if features is not None else ()
+    splines = [one for index in read if (one := scene.splines(index)) is not None]
+    if features is not None and splines:
+        sums.add_splines(splines, features, weights, middles)
+    else:
+        for begin, frames in _batches(scene, indices, stack.required_fields):
+            part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
+            if features is None:
+                sums.add_given(frames, stack, part, middles - begin)
+            else:
+                sums.add_features(frames, features, part, middles - begin)
     mean, hottest = sums.mean, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
@@ -178,29 +190,6 @@ def _row_weights(
         for one, (frames, _) in zip(starts, covered, strict=True)
     ]
     return indices, weights[row_of], np.array(middles, np.intp)[row_of]
-
-
-def _sweep(
-    scene: Scene,
-    stack: EmissivityStack,
-    indices: range,
-    weights: Array,
-    middles: NDArray[np.intp],
-    sums: Sums,
-) -> None:
-    """Add sub-frames to sums by the fastest kernel for scene and surfaces."""
-    features = None if any(field.changes for field in stack.fields) else stack.features
-    if features is not None:
-        splines = [one for i in indices if (one := scene.splines(i)) is not None]
-        if splines:
-            sums.add_splines(splines, features, weights, middles)
-            return
-    for begin, frames in _batches(scene, indices, stack.required_fields):
-        part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
-        if features is None:
-            sums.add_given(frames, stack, part, middles - begin)
-        else:
-            sums.add_features(frames, features, part, middles - begin)
 
 
 def _batches(

@@ -18,7 +18,7 @@ from chipglow.surface.blend import in_blocks
 Beyond: TypeAlias = Literal["edge", "nothing"]
 """Assumption about the field beyond its edges: continued, or zero."""
 
-_Grid: TypeAlias = tuple[Raster, Raster, float]
+Grid: TypeAlias = tuple[Raster, Raster, float]
 """Samples and pixels of an image, and the pixels' fill factor."""
 
 _ROUNDING: Final = 1e-13
@@ -31,21 +31,15 @@ def blur(
     radiance: Array, psf: PointSpreadFunction, spacing: float, beyond: Beyond = "edge"
 ) -> Array:
     """Convolve a field (y, x) with all of a point spread function, without wraparound."""
-    edge, nothing = blurs(radiance, psf, spacing)
+    edge, nothing = images(radiance, psf, spacing)
     return edge if beyond == "edge" else nothing
 
 
-def blurs(radiance: Array, psf: PointSpreadFunction, spacing: float) -> tuple[Array, Array]:
-    """Return both images by `blur`, with ``edge`` and with ``nothing``."""
-    return _optics(psf, spacing, radiance.shape, None).images(radiance)
-
-
-def images_on_pixels(
-    radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
+def images(
+    radiance: Array, psf: PointSpreadFunction, spacing: float, grid: Grid | None = None
 ) -> tuple[Array, Array]:
-    """Return both images by `blur`, integrated over pixels."""
-    grid = scene, sensors, fill_factor
-    return _optics(psf, scene.spacing, scene.shape, grid).images(radiance)
+    """Return both images by `blur`, with ``edge`` and ``nothing``, of samples or on pixels."""
+    return _optics(psf, spacing, radiance.shape, grid).images(radiance)
 
 
 class _Kernel(NamedTuple):
@@ -129,7 +123,7 @@ class _Optics:
 
 @lru_cache(maxsize=4)
 def _optics(
-    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: _Grid | None
+    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: Grid | None
 ) -> _Optics:
     (rows, columns), kernel = shape, _transformed(psf, spacing, shape)
     down, across = (

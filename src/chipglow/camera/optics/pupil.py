@@ -14,6 +14,7 @@ from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 from scipy import fft
 from scipy.ndimage import map_coordinates
 
+from chipglow.camera.detector.response import in_tables
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
@@ -25,7 +26,7 @@ from chipglow.camera.optics.kernel import (
 )
 from chipglow.camera.optics.psf import PSFS, ApertureChoice, PointSpreadFunction
 from chipglow.quantities import Array, Parameter
-from chipglow.quantities.units import POSITION, TEMPERATURE
+from chipglow.quantities.units import POSITION
 from chipglow.radiometry import Band
 
 PUPIL_ENERGY: Final = 0.99
@@ -107,13 +108,7 @@ Aberrations = Annotated[
     ),
 ]
 SourceTemperature = Annotated[
-    float,
-    Parameter(
-        "Temperature of the blackbody whose spectrum weights the wavelengths.",
-        TEMPERATURE,
-        least=200.0,
-        most=6000.0,
-    ),
+    float, in_tables("Temperature of the blackbody whose spectrum weights the wavelengths.")
 ]
 
 
@@ -129,11 +124,6 @@ class PupilPSF(PointSpreadFunction):
     ----------
     band : Band
         Band of the camera, with its response.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its limits, or the aberrations exceed about 10 wavelengths.
 
     Notes
     -----
