@@ -10,10 +10,7 @@ from scipy.ndimage import convolve
 from scipy.special import erf, j0, j1
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
-from chipglow.camera.optics.convolution import (
-    blur,
-    images,
-)
+from chipglow.camera.optics.convolution import blur, images
 from chipglow.camera.optics.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
 from chipglow.camera.optics.sampling import integrate, sensor_raster
 from chipglow.scene import Raster
