@@ -218,10 +218,7 @@ class Camera(Part):
         return start + np.arange(count) / self.frame_rate
 
     def row_delays(self, scene: Raster) -> Array:
-        """Return the delay in s of the integration of each row of samples, shape (y,).
-
-        The delay belongs to the nearest row of pixels; 0 with a global shutter.
-        """
+        """Return the delay in s of each row of samples, shape (y,): that of the nearest pixels."""
         sensors = self.pixels(scene)
         if self.line_time is None:
             return np.zeros(scene.rows)
@@ -268,11 +265,7 @@ class Camera(Part):
         start: float,
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
-        """Expose the camera to several surfaces from `prepare` in one pass over the frames.
-
-        `start` is the start of the first row's integration in s. `check` is called periodically; an
-        exception that it raises aborts the exposure.
-        """
+        """Expose the camera to several surfaces from `prepare` in one pass; see `expose`."""
         views = [View(field, self.band, self.reflected) for field in fields]
         delays = self.row_delays(scene.raster)
         return expose(scene, views, start, self.integration_time, delays, check)
@@ -280,10 +273,7 @@ class Camera(Part):
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Form one frame from each exposure.
 
-        Blur, integration over the pixel and mean over time are linear and commute: the mean of an
-        exposure is blurred and integrated once. This equals the loop of Figure 6. Cameras with the
-        same band, integration time and surroundings can share exposures.
-
+        Blur, integration over the pixel and mean over time commute: it equals the loop of Figure 6.
         Beyond the scene, radiance continues as at the edge. The attribute ``warnings`` states where
         pixels change by more than `BORDER_TOLERANCE` if the surroundings instead resemble what each
         pixel sees within the scene.
@@ -403,23 +393,18 @@ class Camera(Part):
         )
 
     def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
-        """Apply detector and calibration to images (time, y, x); return radiance and flags.
-
-        Without a detector, only the lag of a thermal time constant is applied and flags are None.
-        """
+        """Apply lag, detector and calibration to images (time, y, x); return radiance and flags."""
         if self.time_constant is not None:
             frame_time = 1 / self.frame_rate
             images = lagged(images, starts, frame_time, exp(-frame_time / self.time_constant))
         calibration = self.calibration(images.shape[1:])
         if self.detector is None or calibration is None:
             return images, None
-        generators = [self._generator(float(start)) for start in starts]
+        # The noise of a frame follows from the seed and its start.
+        keys = (np.asarray(starts, np.float64) + 0.0).view(np.uint64).tolist()
+        generators = [np.random.default_rng([self.seed, key]) for key in keys]
         counts = self.detector.counts(images, generators, calibration.point, starts)
         return calibration.radiance(counts)
-
-    def _generator(self, start: float) -> np.random.Generator:
-        """Return the noise generator of the frame with this start time."""
-        return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
 
     def _lag_warning(self, starts: Array) -> Iterator[str]:
         """Yield warnings if lag is modelled but no frame follows another."""

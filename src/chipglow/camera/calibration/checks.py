@@ -21,11 +21,10 @@ _LEAST_FALL: Final = 0.5
 def residual_warnings(
     residuals: Array, design: Array, kelvins: Array, stated: bool, drifts: bool
 ) -> Iterator[str]:
-    """Yield doubts about a calibration from its residuals, as sentences.
+    """Yield doubts about a calibration, as sentences.
 
     `residuals` (n,), in the order of the measurement, and `design` (n, parameters), the change of
-    the points with the parameters, are over the standard uncertainties. Unless these are `stated`,
-    only the order of the residuals is judged.
+    the points with the parameters, are over the standard uncertainties.
     """
     free = residuals.size - design.shape[1]
     total = float(residuals @ residuals)

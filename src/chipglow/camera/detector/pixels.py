@@ -147,9 +147,8 @@ def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_
 def replace_bad_pixels(signal: Array, bad: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
     """Replace bad pixels of frames (time, y, x) by the median of their good neighbours.
 
-    Returns the frames, NaN where a pixel is bad and not replaced, and which pixels were replaced.
-    Not replaced are clusters of more than `LARGEST_CLUSTER`, and pixels of whose eight neighbours
-    less than three are good.
+    Returns the frames and which were replaced; others are NaN: clusters of more than
+    `LARGEST_CLUSTER`, and pixels of whose eight neighbours less than three are good.
     """
     if bad.shape != signal.shape[1:]:
         raise ValueError(

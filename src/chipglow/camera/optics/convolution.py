@@ -156,13 +156,9 @@ def _transformed(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int
     whole = np.zeros(padded)
     whole[: inner.shape[0], : inner.shape[1]] = inner
     centred = np.roll(whole, (-reach[0], -reach[1]), axis=(0, 1))
-    beyond = tuple(_sums_beyond(one) for one in towards)
+    halves = (one[:, : one.shape[1] // 2 : -1] for one in towards)
+    beyond = tuple(half.cumsum(axis=1)[:, ::-1].T for half in halves)
     return _Kernel(fft.rfft2(centred, overwrite_x=True), padded, beyond)
-
-
-def _sums_beyond(kernel: Array) -> Array:
-    """Return sums of a kernel over the area beyond the left edge, for each line inside."""
-    return kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1].T
 
 
 def _sums(weights: sparse.csr_array, values: NDArray[Any]) -> NDArray[Any]:

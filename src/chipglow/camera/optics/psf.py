@@ -59,6 +59,10 @@ DiffractionWavelength = Annotated[
     ),
 ]
 
+Obscuration = Annotated[
+    float, Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9)
+]
+
 
 class PSFChoice(Part, ABC):
     """Settings from which a camera's point spread function is made."""
@@ -122,10 +126,7 @@ class AnnularAperturePSF(PointSpreadFunction):
     numerical_aperture: Annotated[
         float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
     ] = 0.28
-    obscuration: Annotated[
-        float,
-        Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9),
-    ] = 0.35
+    obscuration: Obscuration = 0.35
 
     def __str__(self) -> str:
         of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""

@@ -24,7 +24,7 @@ from chipglow.camera.optics.kernel import (
     poisson_squares,
     resized,
 )
-from chipglow.camera.optics.psf import PSFS, ApertureChoice, PointSpreadFunction
+from chipglow.camera.optics.psf import PSFS, ApertureChoice, Obscuration, PointSpreadFunction
 from chipglow.quantities import Array, Parameter
 from chipglow.quantities.units import POSITION
 from chipglow.radiometry import Band
@@ -78,9 +78,6 @@ def _whole(index: object) -> Any:
     return int(index) if isinstance(index, str) and re.fullmatch("[0-9]{1,3}", index) else index
 
 
-Obscuration = Annotated[
-    float, Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9)
-]
 Defocus = Annotated[
     float,
     Parameter(
