@@ -119,13 +119,6 @@ def test_a_black_body_measures_its_temperature(temperature, pitch, fill, offset,
     np.testing.assert_allclose(measured, np.float32(temperature), atol=tolerance, rtol=0)
 
 
-def test_where_there_is_no_surface_nothing_is_reflected():
-    scene = make_scene(np.full((1, 18, 18), 900.0), material=0)
-    exposure = Camera(reflected=800.0).expose(scene, BLACK, 0.0)
-    assert (exposure.mean_radiance == 0).all()
-    assert np.isnan(exposure.peak_temperature).all()
-
-
 def test_radiance_is_as_exact_as_it_is_said_to_be():
     temperature = np.linspace(250, 3000, 100 * 100).reshape(1, 100, 100).astype(np.float32)
     exposure = Camera().expose(make_scene(temperature), BLACK, 0.0)
@@ -161,6 +154,7 @@ def test_no_emissivity_is_not_no_material():
     np.testing.assert_allclose(mirror.mean_radiance, camera.band.radiance(800.0))
     assert (mirror.peak_temperature == 900.0).all()
     assert (nothing.mean_radiance == 0.0).all()
+    assert np.isnan(nothing.peak_temperature).all()
 
 
 def test_exposures_of_several_surfaces_are_those_of_each():
@@ -544,20 +538,15 @@ def test_what_does_not_fit_the_scene_is_refused(camera, start, message):
         camera.measure(scene, BLACK, start)
 
 
-def test_what_has_no_radiance_is_refused():
-    scene = make_scene(np.full((1, 9, 9), 900.0))
-    surface = Painted(scene.times, np.full((1, 9, 9), 1.5, dtype=np.float32))
+def test_what_has_no_radiance_or_grid_is_refused():
+    small, large = (make_scene(np.full((1, 9, columns), 900.0)) for columns in (9, 18))
+    surface = Painted(small.times, np.full((1, 9, 9), 1.5, dtype=np.float32))
     with pytest.raises(ValueError, match="or emissivity not within 0 to 1 at 81 samples"):
-        Camera().measure(scene, surface, 0.0)
-
-
-def test_exposures_of_different_grids_are_refused():
-    one = Camera().expose(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0)
-    other = Camera().expose(make_scene(np.full((1, 9, 18), 900.0)), BLACK, 0.0)
-    with pytest.raises(ValueError, match="the same grid"):
-        Camera().form_measurement([one, other])
-    with pytest.raises(ValueError, match="at least one exposure"):
-        Camera().form_measurement([])
+        Camera().measure(small, surface, 0.0)
+    exposures = [Camera().expose(scene, BLACK, 0.0) for scene in (small, large)]
+    for wrong in (exposures, []):
+        with pytest.raises(ValueError, match="at least one exposure, all of the same grid"):
+            Camera().form_measurement(wrong)
 
 
 def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():

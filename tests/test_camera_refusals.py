@@ -9,11 +9,13 @@ import pytest
 from chipglow.camera import (
     CalibrationErrors,
     Camera,
+    DarkCurrent,
     Detector,
     EnergyResponse,
     GaussianPSF,
     LinearCalibration,
     MeasuredPSF,
+    PhotonResponse,
     Pupil,
     PupilPSF,
     RatioCamera,
@@ -28,6 +30,7 @@ from chipglow.study import Study, load_study
 from chipglow.surface import (
     CHIP_1,
     Emissivity,
+    ParabolicOxide,
     PhaseSurface,
     SpectralTable,
     UniformSurface,
@@ -40,11 +43,21 @@ BARE = Scene.from_fields(
 )
 WITH_TOOL = BARE.with_tool(ToolGeometry())
 LOPSIDED = np.arange(9.0).reshape(3, 3)
+PIXEL, WRONG = (MeasuredPSF(np.eye(3), 1e-6, includes=(one,)) for one in ("footprint", "pixel"))
 TWO = Camera(SHORT), Camera(LONG)
+PHOTONS = PhotonResponse(0.8, 15e-6, 2.5)
+LONE = replace(
+    BAND, response=TabulatedResponse((3.8e-6, 4.0e-6, 4.1e-6, 5.1e-6), (0.0, 1.0, 0.0, 0.0))
+)
+OXIDISED = UniformSurface(0.4).modified(ParabolicOxide())
 
 
 def detector(**fields):
     return Detector(**{"response": EnergyResponse(1.0), "gain": 1.0, **fields})
+
+
+def developed(band=BAND, **fields):
+    return Camera(band, detector=detector(**fields)).calibration((4, 4))
 
 
 def fitted(**changed):
@@ -77,6 +90,12 @@ REFUSED = {
     "terms.0: 3, expected one such as {kind: gain-pattern": lambda: detector(terms=(3,)),
     "two are of kind 'read-noise'": lambda: detector(terms=(ReadNoise(1.0),) * 2),
     "hot: 800 K, expected more than the 900 K": lambda: detector(cold=900.0, hot=800.0),
+    "full in the dark, expected a smaller current": lambda: developed(terms=(DarkCurrent(1e13),)),
+    "Detector.hot: 1227 °C fills the detector .* less than": lambda: developed(hot=1500.0),
+    "sources .* expected the second brighter": lambda: developed(cold=1200.0),
+    "PhotonResponse.wavelength: 4.45 um, expected": lambda: developed(response=PHOTONS, band=LONE),
+    "psf_order: must be 'optics', because": lambda: Camera(psf=PIXEL, psf_order="detector"),
+    r"psf.includes: \('pixel',\), only footprint": lambda: Camera(psf=WRONG),
     "psf: spacing must be positive .*'1 um'": lambda: MeasuredPSF(LOPSIDED, "1 um"),
     "psf: spacing must be positive .*-1e-06": lambda: MeasuredPSF(LOPSIDED, -1e-6),
     r"kernel must be square .* shape \(2, 3\)": lambda: MeasuredPSF(LOPSIDED[:2], 1e-6),
@@ -87,6 +106,8 @@ REFUSED = {
     "each once": lambda: PupilPSF(BAND, 0.3, zernike=((4, 1e-7), (4, 1e-7))),
     "its rms in m": lambda: PupilPSF(BAND, 0.3, zernike=((4, float("nan")),)),
     "the limit is some 10 wavelengths": lambda: PupilPSF(BAND, 0.5, defocus=2e-3),
+    "magnification: is missing": lambda: Pupil(f_number=2.5).for_camera(BAND, None),
+    r"aperture of 1\.2 .* at most 1": lambda: Pupil(working_f_number=2.5).aperture(6.0),
     "pass one of numerical_aperture, f_number": Pupil,
     "one of numerical_aperture": lambda: Pupil(numerical_aperture=0.3, f_number=2.0),
     "bands: .* the band of the shorter wavelengths": lambda: RatioThermometer(LONG, SHORT),
@@ -128,6 +149,8 @@ REFUSED = {
     "emissivities from 1.6": lambda: SpectralTable(((3e-6, 300.0, 1.6),)),
     "covers the rake face": lambda: Wedge(overhang=-40e-6),
     "does not state its tool": lambda: UniformSurface(0.4).modified(Wedge()).prepare(BARE, BAND),
+    "oxide: the scene has no material coordinates": lambda: OXIDISED.prepare(BARE),
+    "spectral: no band": lambda: SpectralTable(((3e-6, 300.0, 0.6),)).prepare(BARE),
     "no band is given": lambda: UniformSurface(0.4).modified(Wedge()).prepare(WITH_TOOL),
     "expected one of wedge": lambda: reflecting(kind="groove"),
     "up to 90 deg": lambda: reflecting(angle="95 deg"),

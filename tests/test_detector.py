@@ -91,13 +91,6 @@ def test_other_responses():
     assert set(RESPONSES.kinds) == {"photon", "energy", "range"}
 
 
-def test_a_wavelength_without_response_is_refused():
-    lone = TabulatedResponse((3.8e-6, 4.0e-6, 4.1e-6, 5.1e-6), (0.0, 1.0, 0.0, 0.0))
-    point = OperationPoint(Band(3.8e-6, 5.1e-6, lone))
-    with pytest.raises(ValueError, match=r"PhotonResponse.wavelength: 4.45 um, expected"):
-        PhotonResponse(0.8, 15e-6, 2.5).electrons(point, 1.0)
-
-
 def test_quantisation_has_a_variance_of_a_twelfth():
     """Of a signal that is spread evenly over the counts."""
     radiance = generator().uniform(100.0, 1100.0, (1, 400, 400))

@@ -115,9 +115,3 @@ def test_growth_is_that_of_arrhenius():
     assert np.log(ratio) == pytest.approx(169_452 / 8.314462618 * (1 / 973.15 - 1 / 1273.15))
     # By hand at 700 °C: 6.1e-4 exp(-20.943) = 4.9e-13 m²/s, so 7 nm in 100 us.
     assert np.sqrt(OXIDE.growth(973.15) * 100e-6) == pytest.approx(7.0e-9, rel=0.01)
-
-
-def test_a_scene_without_material_coordinates_is_refused():
-    made = Scene.from_fields(RASTER, [0.0], {"temperature": np.full((1, *RASTER.shape), 500.0)})
-    with pytest.raises(ValueError, match="oxide: the scene has no material coordinates"):
-        SURFACE.prepare(made)

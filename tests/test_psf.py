@@ -10,10 +10,7 @@ from scipy.ndimage import convolve
 from scipy.special import erf, j0, j1
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
-from chipglow.camera.optics.convolution import (
-    blur,
-    images_on_pixels,
-)
+from chipglow.camera.optics.convolution import blur, images
 from chipglow.camera.optics.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
 from chipglow.camera.optics.sampling import integrate, sensor_raster
 from chipglow.scene import Raster
@@ -265,8 +262,8 @@ def test_an_image_on_pixels_is_what_they_integrate_of_the_whole_one(psf, pitch, 
     radiance = np.random.default_rng(6).lognormal(0.0, 3.0, scene.shape)
     # What transforms round is a part of the largest value, not of each.
     exact = {"rtol": 1e-13, "atol": 1e-15 * radiance.max()}
-    images = images_on_pixels(radiance, psf, scene, sensors, fill)
-    for image, beyond in zip(images, ("edge", "nothing"), strict=True):
+    both = images(radiance, psf, scene.spacing, (scene, sensors, fill))
+    for image, beyond in zip(both, ("edge", "nothing"), strict=True):
         expected = integrate(blur(radiance, psf, scene.spacing, beyond), scene, sensors, fill)
         np.testing.assert_allclose(image, expected, **exact)
 

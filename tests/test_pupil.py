@@ -212,16 +212,12 @@ def test_an_f_number_is_a_numerical_aperture():
     airy = AiryAperture(f_number=2.5).for_camera(MWIR, 2.5)
     assert found == PupilPSF(MWIR, airy.numerical_aperture, 0.3)
     assert airy.wavelength == pytest.approx(4.45e-6)
-    with pytest.raises(ValueError, match="magnification: is missing"):
-        Pupil(f_number=2.5).for_camera(MWIR, None)
 
 
 def test_a_working_f_number_is_that_of_the_light_at_the_detector():
     # Abbe's sine condition: NA at the detector, 1 / (2 N), times the magnification.
     assert AiryAperture(working_f_number=2.5).aperture(4.0) == pytest.approx(0.8)
     assert AiryAperture(working_f_number=2.5).aperture(1.0) == pytest.approx(0.2)
-    with pytest.raises(ValueError, match=r"numerical aperture of 1\.2 .* at most 1"):
-        AiryAperture(working_f_number=2.5).aperture(6.0)
 
 
 def test_transfer_of_a_clear_pupil():

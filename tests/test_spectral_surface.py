@@ -79,8 +79,3 @@ def test_resistivity_grows_with_temperature():
     assert values[1] / values[0] == pytest.approx(np.sqrt(5), rel=0.06)
     # The hotter of two equal bands weights shorter waves: another reason to grow, of some permille.
     assert values[0] == pytest.approx(0.365 * np.sqrt(1.7e-7 / 4.7e-6), rel=0.07)
-
-
-def test_without_a_camera_there_is_no_band():
-    with pytest.raises(ValueError, match="spectral: no band"):
-        TABLE.prepare(scene(500.0))

@@ -19,9 +19,7 @@ from chipglow.camera.camera import (
     Camera as Camera,
     ChipglowWarning as ChipglowWarning,
 )
-from chipglow.camera.detector.detector import (
-    Detector as Detector,
-)
+from chipglow.camera.detector.detector import Detector as Detector
 from chipglow.camera.detector.flat_field import (
     FlatFieldCalibration as FlatFieldCalibration,
     flat_field_calibration as flat_field_calibration,
@@ -79,9 +77,7 @@ from chipglow.camera.optics.blurs import (
     LinearMotion as LinearMotion,
     Vibration as Vibration,
 )
-from chipglow.camera.optics.convolution import (
-    blur as blur,
-)
+from chipglow.camera.optics.convolution import blur as blur
 from chipglow.camera.optics.psf import (
     PSFS as PSFS,
     AiryAperture as AiryAperture,

@@ -12,26 +12,18 @@ from numpy.typing import NDArray
 
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
-from chipglow.camera.detector.response import OperationPoint
+from chipglow.camera.detector.response import OperationPoint, in_tables
 from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows, lagged
 from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import Beyond, blur, blurs, images_on_pixels
+from chipglow.camera.optics.convolution import Beyond, blur, images
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
 from chipglow.camera.sweep import Check
 from chipglow.quantities import Array, Parameter, Part
-from chipglow.quantities.units import (
-    COLDEST,
-    FREQUENCY,
-    HOTTEST,
-    LENGTH,
-    TEMPERATURE,
-    TIME,
-    Position,
-)
+from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
@@ -62,11 +54,6 @@ class Camera(Part):
 
     The default camera has no lower range limit. Its point spread function is the diffraction of a
     reflecting objective in the camera's band. `paper` returns the paper's camera.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its limits; the message names field, value and limits.
 
     Warns
     -----
@@ -138,21 +125,12 @@ class Camera(Part):
     ] = None
     lower_limit: Annotated[
         float | None,
-        Parameter(
-            "Lower range limit: lower radiance temperatures are flagged, not returned; or none.",
-            TEMPERATURE,
-            least=COLDEST,
-            most=HOTTEST,
+        in_tables(
+            "Lower range limit: lower radiance temperatures are flagged, not returned; or none."
         ),
     ] = None
     reflected: Annotated[
-        float | None,
-        Parameter(
-            "Reflected apparent temperature; none: dark surroundings.",
-            TEMPERATURE,
-            least=COLDEST,
-            most=HOTTEST,
-        ),
+        float | None, in_tables("Reflected apparent temperature; none: dark surroundings.")
     ] = None
     optics: Annotated[
         tuple[OpticsTerm, ...],
@@ -243,10 +221,7 @@ class Camera(Part):
         return start + np.arange(count) / self.frame_rate
 
     def row_delays(self, scene: Raster) -> Array:
-        """Return the delay in s of the integration of each row of samples, shape (y,).
-
-        The delay belongs to the nearest row of pixels; 0 with a global shutter.
-        """
+        """Return the delay in s of each row of samples, shape (y,): that of the nearest pixels."""
         sensors = self.pixels(scene)
         if self.line_time is None:
             return np.zeros(scene.rows)
@@ -293,11 +268,7 @@ class Camera(Part):
         start: float,
         check: Check | None = None,
     ) -> tuple[Exposure, ...]:
-        """Expose the camera to several surfaces from `prepare` in one pass over the frames.
-
-        `start` is the start of the first row's integration in s. `check` is called periodically; an
-        exception that it raises aborts the exposure.
-        """
+        """Expose the camera to several surfaces from `prepare` in one pass; see `expose`."""
         views = [View(field, self.band, self.reflected) for field in fields]
         delays = self.row_delays(scene.raster)
         return expose(scene, views, start, self.integration_time, delays, check)
@@ -305,10 +276,7 @@ class Camera(Part):
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Form one frame from each exposure.
 
-        Blur, integration over the pixel and mean over time are linear and commute: the mean of an
-        exposure is blurred and integrated once. This equals the loop of Figure 6. Cameras with the
-        same band, integration time and surroundings can share exposures.
-
+        Blur, integration over the pixel and mean over time commute: it equals the loop of Figure 6.
         Beyond the scene, radiance continues as at the edge. The attribute ``warnings`` states where
         pixels change by more than `BORDER_TOLERANCE` if the surroundings instead resemble what each
         pixel sees within the scene.
@@ -341,22 +309,9 @@ class Camera(Part):
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
-        """Measure a scene.
+        """Measure a scene, a frame for each start of an integration in s, such as `frame_times`.
 
-        Parameters
-        ----------
-        scene : Scene
-            The true temperatures.
-        surface : Surface
-            The emissivity.
-        start : float or sequence of float
-            Start of each frame's integration in s; `frame_times` returns a sequence at the frame
-            rate.
-
-        Returns
-        -------
-        Measurement
-            One frame for each start, with the scene's tool and attributes of camera and surface.
+        The measurement has the scene's tool, and attributes of camera and surface.
         """
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)
@@ -376,23 +331,10 @@ class Camera(Part):
         return np.where(fraction < 1 - _ROUNDING, 1 - fraction, 0.0)
 
     def form_image(self, radiance: Array, scene: Raster, gather: Gather = integrate) -> Array:
-        """Form the image of a radiance map on the pixels by optics, PSF and footprint.
+        """Return the radiance that pixels display of that of a scene's samples in W/(m² sr).
 
-        Parameters
-        ----------
-        radiance : ndarray
-            Mean radiance over the integration time in W/(m² sr), shape `scene.shape`, such as
-            `Exposure.mean_radiance`.
-        scene : Raster
-            Grid of the samples.
-        gather : callable
-            Takes samples, their raster, the raster of the pixels and the fill factor. Returns the
-            values that the pixels receive, such as the mean over each square (`integrate`).
-
-        Returns
-        -------
-        ndarray
-            Pixel radiance in W/(m² sr), shape `pixels(scene).shape`.
+        `gather` takes samples, their raster, that of the pixels and the fill factor, and returns
+        what the pixels receive, such as the mean over each square (`integrate`).
         """
         image = np.asarray(radiance, np.float64)
         if image.shape != scene.shape:
@@ -409,10 +351,10 @@ class Camera(Part):
             return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
         pixels = self.pixels(scene)
         if self.psf_order == "optics":
-            return images_on_pixels(image, self.psf, scene, pixels, self._sensitive(scene))
+            return images(image, self.psf, scene.spacing, (scene, pixels, self._sensitive(scene)))
         whole, own = whole_raster(scene, pixels)
         received = integrate(image, scene, whole, self.fill_factor)
-        edge, nothing = blurs(received, self.psf, self.pitch)
+        edge, nothing = images(received, self.psf, self.pitch)
         return edge[own], nothing[own]
 
     def _collect(
@@ -456,23 +398,18 @@ class Camera(Part):
         )
 
     def read(self, images: Array, starts: Array) -> tuple[Array, NDArray[np.uint8] | None]:
-        """Apply detector and calibration to images (time, y, x); return radiance and flags.
-
-        Without a detector, only the lag of a thermal time constant is applied and flags are None.
-        """
+        """Apply lag, detector and calibration to images (time, y, x); return radiance and flags."""
         if self.time_constant is not None:
             frame_time = 1 / self.frame_rate
             images = lagged(images, starts, frame_time, exp(-frame_time / self.time_constant))
         calibration = self.calibration(images.shape[1:])
         if self.detector is None or calibration is None:
             return images, None
-        generators = [self._generator(float(start)) for start in starts]
+        # The noise of a frame follows from the seed and its start.
+        keys = (np.asarray(starts, np.float64) + 0.0).view(np.uint64).tolist()
+        generators = [np.random.default_rng([self.seed, key]) for key in keys]
         counts = self.detector.counts(images, generators, calibration.point, starts)
         return calibration.radiance(counts)
-
-    def _generator(self, start: float) -> np.random.Generator:
-        """Return the noise generator of the frame with this start time."""
-        return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
 
     def _sampling_warning(self, scene: Raster) -> Iterator[str]:
         """Yield a warning if the scene's samples are too coarse for blur and footprint."""

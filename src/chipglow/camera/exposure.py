@@ -57,11 +57,6 @@ class View:
     band: Band
     reflected: float | None = None
 
-    @property
-    def environment(self) -> float:
-        """Radiance of the surroundings in W/(m² sr)."""
-        return surroundings_radiance(self.band, self.reflected)
-
 
 def expose(
     scene: Scene,
@@ -73,9 +68,8 @@ def expose(
 ) -> tuple[Exposure, ...]:
     """Integrate the apparent radiance of views of a scene over a duration, starting at `start`.
 
-    Each frame is read once; surfaces and bands that views share are computed once. `delays` in s
-    are the delays of each row of samples with a rolling shutter. `check` is called periodically; an
-    exception that it raises aborts the exposure.
+    Surfaces and bands that views share are computed once. `delays` in s are those of each row of
+    samples with a rolling shutter. An exception that `check` raises aborts the exposure.
 
     Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
     (Equation 2). The void, "undefined" in the paper, has no radiance. L is interpolated in a table
@@ -91,12 +85,24 @@ def expose(
     sums = Sums(
         np.array([[indices_of_fields[id(v.emissivity)], bands.index(v.band)] for v in views]),
         np.stack([_fine_table(band) for band in bands]),
-        np.array([view.environment for view in views], np.float32),
-        stack.max_emissivity,
+        np.array([surroundings_radiance(v.band, v.reflected) for v in views], np.float32),
+        max(field.max_emissivity for field in fields),
         scene.raster.shape,
         check,
     )
-    _sweep(scene, stack, indices, weights, middles, sums)
+    # The fastest kernel for scene and surfaces.
+    features = None if any(field.changes for field in fields) else stack.features
+    read = indices if features is not None else ()
+    splines = [one for index in read if (one := scene.splines(index)) is not None]
+    if features is not None and splines:
+        sums.add_splines(splines, features, weights, middles)
+    else:
+        for begin, frames in _batches(scene, indices, stack.required_fields):
+            part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
+            if features is None:
+                sums.add_given(frames, stack, part, middles - begin)
+            else:
+                sums.add_features(frames, features, part, middles - begin)
     mean, hottest = sums.mean, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
@@ -184,29 +190,6 @@ def _row_weights(
         for one, (frames, _) in zip(starts, covered, strict=True)
     ]
     return indices, weights[row_of], np.array(middles, np.intp)[row_of]
-
-
-def _sweep(
-    scene: Scene,
-    stack: EmissivityStack,
-    indices: range,
-    weights: Array,
-    middles: NDArray[np.intp],
-    sums: Sums,
-) -> None:
-    """Add sub-frames to sums by the fastest kernel for scene and surfaces."""
-    features = stack.features if stack.is_bare else None
-    if features is not None:
-        splines = [one for i in indices if (one := scene.splines(i)) is not None]
-        if splines:
-            sums.add_splines(splines, features, weights, middles)
-            return
-    for begin, frames in _batches(scene, indices, stack.required_fields):
-        part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
-        if features is None:
-            sums.add_given(frames, stack, part, middles - begin)
-        else:
-            sums.add_features(frames, features, part, middles - begin)
 
 
 def _batches(

@@ -45,12 +45,10 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 
 
 class Sums:
-    """Sums over the sub-frames; see `Exposure`.
+    """Sums over the sub-frames, shape (view, y, x) but `hottest`; see `Exposure`.
 
-    `views` are the indices of each view's surface and band, shape (view, 2). `tables` contain each
-    band's radiance at 200 K and above, and its change to the next value, shape (band, n, 2).
-    `environments` is the radiance of each view's surroundings in W/(m² sr). `mean`, `centre` and
-    `peak` have shape (view, y, x), `hottest` has (y, x).
+    `views` are indices of surface and band, (view, 2); `tables` each band's radiance and its change
+    to the next value, (band, n, 2); `environments` the radiance of each view's surroundings.
     """
 
     def __init__(

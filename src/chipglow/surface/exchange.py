@@ -30,15 +30,12 @@ class Exchange:
     borders of bodies, whose inside no ray reaches. Every element has one temperature and
     emissivity, reflects grey and partly like a mirror, the rest diffusely.
 
-    Notes
-    -----
-    In a cross-section a diffuse element sends (1/2) d(sin φ) of its radiation into the angle dφ
-    to its normal; a mirror keeps a ray's direction along the elements, so that it is a mirror in
-    the cross-section too (Howell, Mengüç, Daun and Siegel, Thermal Radiation Heat Transfer,
-    chapters 4 to 6). The irradiation H of element i, as a radiance, is the mean over its rays of
-    what they meet: B of the first element, m times B of the next, and so on, and what is left of
-    the surroundings. B = ε L + (1 − ε)(1 − s) H is the diffuse radiosity, m = (1 − ε) s with the
-    fraction s of the reflected light that mirrors make.
+    A diffuse element sends (1/2) d(sin φ) of its radiation into the angle dφ to its normal; a
+    mirror is one in the cross-section too (Howell, Mengüç, Daun and Siegel, Thermal Radiation Heat
+    Transfer, chapters 4 to 6). The irradiation H of element i, as a radiance, is the mean over its
+    rays of what they meet: B of the first element, m times B of the next, and so on, and what is
+    left of the surroundings. B = ε L + (1 − ε)(1 − s) H is the diffuse radiosity, m = (1 − ε) s
+    with the fraction s of the reflected light that mirrors make.
     """
 
     starts: Array

@@ -39,11 +39,6 @@ _WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
 class FeatureSurface(Surface, Part):
     """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
 
-    Raises
-    ------
-    ValueError
-        If the grain is not positive, the seed is negative or `follow` is unknown.
-
     Notes
     -----
     "Create emissivity maps for each feature" and what follows in Heigel and Whitenton (2010). The
@@ -254,21 +249,11 @@ class EmissivityStack:
         return replace(bare[0], surfaces=tuple(one.surfaces[0] for one in bare))
 
     @property
-    def is_bare(self) -> bool:
-        """Whether no field has a modifier."""
-        return not any(field.changes for field in self.fields)
-
-    @property
     def required_fields(self) -> frozenset[str] | None:
         """Fields of a frame that are read in addition to temperature and material; None: all."""
         sets = [field.fields for field in self.fields]
         known = [one for one in sets if one is not None]
         return frozenset().union(*known) if len(known) == len(sets) else None
-
-    @property
-    def max_emissivity(self) -> float:
-        """Largest emissivity that is possible."""
-        return max(field.max_emissivity for field in self.fields)
 
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample for every field, shape (field, y, x)."""

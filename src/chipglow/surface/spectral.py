@@ -187,7 +187,7 @@ class Dispersion(Modifier):
 
 
 def required_band(name: str, band: Band | None) -> Band:
-    """Return the camera's band, without which what is not grey has no emissivity."""
+    """Return the camera's band, which what is not grey requires."""
     if band is None:
         raise ValueError(f"{name}: no band is given, expected that of a camera")
     return band

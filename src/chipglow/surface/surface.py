@@ -28,24 +28,16 @@ Change: TypeAlias = Callable[[NDArray[np.float32], Frame], NDArray[Any]]
 
 @dataclass(frozen=True, eq=False)
 class EmissivityField:
-    """The emissivity of one scene's samples, frame by frame; made by `Surface.prepare`.
-
-    Parameters
-    ----------
-    bare : callable
-        Emissivity of every sample of a frame, float32 of shape (y, x), from 0 to 1; 0 in the void.
-    fields : frozenset of str, optional
-        Fields of a frame that are read beside temperature and material; by default all.
-    changes : tuple of callable
-        Changes of the bare emissivity by modifiers, in order.
-    max_emissivity : float
-        Largest emissivity that is possible: 1, unless reflected light counts as emitted.
-    """
+    """The emissivity of one scene's samples, frame by frame; made by `Surface.prepare`."""
 
     bare: Callable[[Frame], NDArray[np.float32]]
+    """Of every sample of a frame, shape (y, x), from 0 to 1; 0 in the void."""
     fields: frozenset[str] | None = None
+    """Fields of a frame that are read beside temperature and material; by default all."""
     changes: tuple[Change, ...] = ()
+    """Changes of the bare emissivity by modifiers, in order."""
     max_emissivity: float = 1.0
+    """Over 1 if reflected light counts as emitted."""
 
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample of a frame, shape (y, x); 0 in the void."""
@@ -101,19 +93,8 @@ class Surface(Part, ABC):
     ) -> EmissivityField:
         """Lay the surface on a scene; what depends on the whole scene is computed here.
 
-        Parameters
-        ----------
-        scene : Scene
-            The scene.
-        band : Band, optional
-            The camera's spectral band, for a surface that is not grey.
-        reflected : float, optional
-            Temperature of the surroundings that the surface reflects in K; None: they are dark.
-
-        Raises
-        ------
-        ValueError
-            If the scene lacks a field, or a surface that is not grey has no band.
+        A surface that is not grey requires the camera's band. `reflected` is the temperature of the
+        surroundings that it reflects in K; None: they are dark.
         """
 
     @property
@@ -135,10 +116,7 @@ class Surface(Part, ABC):
 
 
 class Modifier(Part, ABC):
-    """A modifier of the emissivity of a surface: oxide, an angle, a spectrum, reflections.
-
-    A class that adds `change`.
-    """
+    """What modifies a surface: oxide, an angle, a spectrum, reflections. A class adds `change`."""
 
     effect: ClassVar[str] = "modifier"
     """Name under which a measurement states it."""
@@ -157,20 +135,9 @@ class Modifier(Part, ABC):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """Return the change of the emissivity of a surface on a scene.
+        """Return the change of a surface's emissivity on a scene; see `Surface.prepare`.
 
-        Parameters
-        ----------
-        surface : Surface
-            The surface that is modified.
-        scene, band, reflected
-            As for `Surface.prepare`.
-
-        Returns
-        -------
-        callable
-            Takes the surface's emissivity, float32 of shape (y, x), which is 0 in the void and
-            must stay so, and the frame; returns the modified one.
+        It is 0 in the void and must stay so.
         """
 
     def redrawn(self, number: int) -> Self:

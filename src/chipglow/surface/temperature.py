@@ -81,8 +81,7 @@ class TemperatureSurface(HomogeneousSurface):
         return np.array(self.table, np.float64).reshape(-1, 2).T
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
-        values: Array = np.interp(temperature, *self.columns)
-        return values
+        return np.asarray(np.interp(temperature, *self.columns))
 
 
 @SURFACES.part
@@ -113,8 +112,7 @@ class PhaseSurface(HomogeneousSurface):
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
         table = (self.solidus, self.liquidus), (self.solid, self.liquid)
-        values: Array = np.interp(temperature, *table)
-        return values
+        return np.asarray(np.interp(temperature, *table))
 
 
 @dataclass(frozen=True)

@@ -102,13 +102,10 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinl
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """A periodic map of emissivity: deviates, enlarged by cubic convolution.
+    """A periodic map of emissivity: normal deviates, enlarged where it is asked for.
 
-    Notes
-    -----
-    Heigel and Whitenton (2010) enlarge a small map of normal deviates with MATLAB's ``imresize``:
-    bicubic, the cubic convolution of Keys (1981) with a = −1/2. Here it is evaluated where it is
-    asked for.
+    Heigel and Whitenton (2010) enlarge them with MATLAB's ``imresize``: bicubic, the cubic
+    convolution of Keys (1981) with a = −1/2.
     """
 
     nodes: NDArray[np.float32]

@@ -28,11 +28,7 @@ _NODES: Final = 513
 
 @dataclass(frozen=True, eq=False)
 class CalibrationErrors:
-    """Independent errors of a calibration, and their effects on the radiance that it gives.
-
-    They are the same in all pixels, frames and files that were measured by the calibration: none
-    falls in a mean.
-    """
+    """Independent errors of a calibration, and their effects on radiance: none falls in a mean."""
 
     radiance: Array
     """In-band radiance in W/(m² sr), rising, shape (k,)."""
@@ -174,11 +170,7 @@ class FittedCalibration(Calibration):
 
     @cached_property
     def errors(self) -> CalibrationErrors:
-        """Effects of its errors on the radiance, from the coldest to the hottest blackbody.
-
-        An error at one radiance is one at others, too: ratios and differences are known better, or
-        worse, than that.
-        """
+        """Effects of its errors on the radiance, from the coldest to the hottest blackbody."""
         coldest, hottest = self.counts([self.lowest, self.highest]).tolist()
         kelvins = self.temperature(np.linspace(coldest, hottest, _NODES))
         radiance = np.asarray(self.band.radiance(kelvins), np.float64)
@@ -192,13 +184,10 @@ class FittedCalibration(Calibration):
         dL = −(∂S/∂p) dp (dL/dT) / (∂S/∂T).
         """
         errors = factor(self.covariance, CALIBRATION)
-        return np.tensordot(errors.T, self._sensitivity(temperature), 1)
-
-    def _sensitivity(self, temperature: Array) -> Array:
-        """Return the change of the radiance with each parameter at given counts, shape (n, ...)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             slope = self.band.slope(temperature) / self.slope(temperature)
-            return np.asarray(-self.gradient(temperature) * slope)
+            by_parameters = np.asarray(-self.gradient(temperature) * slope)
+        return np.tensordot(errors.T, by_parameters, 1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

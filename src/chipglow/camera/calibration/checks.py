@@ -21,11 +21,10 @@ _LEAST_FALL: Final = 0.5
 def residual_warnings(
     residuals: Array, design: Array, kelvins: Array, stated: bool, drifts: bool
 ) -> Iterator[str]:
-    """Yield doubts about a calibration from its residuals, as sentences.
+    """Yield doubts about a calibration, as sentences.
 
     `residuals` (n,), in the order of the measurement, and `design` (n, parameters), the change of
-    the points with the parameters, are over the standard uncertainties. Unless these are `stated`,
-    only the order of the residuals is judged.
+    the points with the parameters, are over the standard uncertainties.
     """
     free = residuals.size - design.shape[1]
     total = float(residuals @ residuals)
@@ -83,13 +82,10 @@ def _outlier(residuals: Array, design: Array, stated: bool) -> int | None:
     free = residuals.size - design.shape[1] - 1
     rest = max(total - float(fall[point]), 1e-300)
     scatter = max(rest / free, 1.0) if stated else rest / free
-    limit = float(chdtri(1, _UNLIKELY / residuals.size)) if stated else _student_limit(free)
+    student = float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
+    limit = float(chdtri(1, _UNLIKELY / residuals.size)) if stated else student
     far = fall[point] > limit * scatter and fall[point] > _LEAST_FALL * total
     return point if far and (stated or free >= _LEAST_FREEDOM) else None
-
-
-def _student_limit(free: int) -> float:
-    return float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
 
 
 def _serial_probability(residuals: Array, design: Array) -> float:

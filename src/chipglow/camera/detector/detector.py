@@ -13,12 +13,12 @@ from chipglow.camera.detector.response import (
     DetectorResponse,
     OperationPoint,
     RangeResponse,
+    in_tables,
 )
 from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout, Stage
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Array, Parameter, Part
-from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 
 Correction: TypeAlias = Literal["two-point", "one-point", "none"]
 """Non-uniformity correction: by frames of two flat-field sources, of one, or none."""
@@ -61,22 +61,10 @@ class Detector(Part):
     ] = "two-point"
     frames: Annotated[int, Parameter("Frames of each source for that.", least=2, most=10_000)] = 32
     cold: Annotated[
-        float | None,
-        Parameter(
-            "The darker source, a blackbody; none: what fills a tenth.",
-            TEMPERATURE,
-            least=COLDEST,
-            most=HOTTEST,
-        ),
+        float | None, in_tables("The darker source, a blackbody; none: what fills a tenth.")
     ] = None
     hot: Annotated[
-        float | None,
-        Parameter(
-            "The brighter source; none: what fills eight tenths.",
-            TEMPERATURE,
-            least=COLDEST,
-            most=HOTTEST,
-        ),
+        float | None, in_tables("The brighter source; none: what fills eight tenths.")
     ] = None
     least_signal: Annotated[
         float,

@@ -46,10 +46,8 @@ _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
 class FlatFieldCalibration:
     """A camera's conversion of its detector's counts to radiance.
 
-    The detector's `correction` equalises the pixels. Two sources, blackbodies of known
-    radiance, give the straight line from the median pixel's counts to radiance. So what remains in
-    the radiance is noise, rounding, what the pixels differ in besides, the frames of the sources
-    being few, and non-linearity.
+    The detector's `correction` equalises the pixels. Two blackbodies of known radiance give the
+    straight line from the median pixel's counts to radiance.
     """
 
     detector: Detector
@@ -100,9 +98,8 @@ class FlatFieldCalibration:
     def netd(self, temperature: float) -> float:
         """Return the noise-equivalent temperature difference in K of a blackbody in K.
 
-        The standard deviation over time of the calibrated radiance, root mean square over the
-        pixels, over dL/dT: temporal noise of the detector, as a laboratory measures it.
-        At least that of rounding to whole counts. NaN for a blackbody that saturates it.
+        Temporal noise of the calibrated radiance, root mean square over the pixels, over dL/dT; at
+        least that of rounding to whole counts. NaN for a blackbody that saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
         if seen >= full_light(self.detector, self.point):
@@ -210,9 +207,8 @@ def full_light(detector: Detector, point: OperationPoint) -> float:
 def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
     """Return the lowest radiance temperature in K that a detector measures at its exposure.
 
-    Temperature of the blackbody whose mean signal above the dark level is `least_signal` times its
-    noise: the standard deviation over time, or that of rounding where it is larger. At least the
-    200 K from which on a band's tables go.
+    Of the blackbody whose mean signal above the dark level is `least_signal` times its noise, the
+    standard deviation over time or of rounding; 200 K or more, as a band's tables.
     """
 
     def excess(logarithm: float) -> float:

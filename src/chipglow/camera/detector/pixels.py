@@ -121,7 +121,10 @@ def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> Ba
     level = mean_frame(frames)
     stuck, noisy = _by_noise(frames)
     if hot is None:
-        return BadPixels(stuck, noisy, _far_off(level))
+        distance = np.abs(level - np.median(level))
+        spread = 1.4826 * float(np.median(distance))
+        far_off = ~(distance <= LEVEL_LIMIT * spread) if spread > 0 else distance > 0
+        return BadPixels(stuck, noisy, far_off)
     stuck_hot, noisy_hot = _by_noise(hot)
     rise = signal_rise(level, mean_frame(hot))
     gain = rise / np.median(rise)
@@ -141,18 +144,11 @@ def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_
     return noise == 0, noise > NOISE_LIMIT * usual
 
 
-def _far_off(level: Array) -> NDArray[np.bool_]:
-    distance = np.abs(level - np.median(level))
-    spread = 1.4826 * float(np.median(distance))
-    return ~(distance <= LEVEL_LIMIT * spread) if spread > 0 else distance > 0
-
-
 def replace_bad_pixels(signal: Array, bad: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
     """Replace bad pixels of frames (time, y, x) by the median of their good neighbours.
 
-    Returns the frames, NaN where a pixel is bad and not replaced, and which pixels were replaced.
-    Not replaced are clusters of more than `LARGEST_CLUSTER`, and pixels of whose eight neighbours
-    less than three are good.
+    Returns the frames and which were replaced; others are NaN: clusters of more than
+    `LARGEST_CLUSTER`, and pixels of whose eight neighbours less than three are good.
     """
     if bad.shape != signal.shape[1:]:
         raise ValueError(

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from functools import partial
 from math import pi
 from typing import Annotated, Final
 
@@ -9,11 +10,22 @@ import numpy as np
 from scipy.constants import c, h
 
 from chipglow.quantities import Family, Parameter, Part
-from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, WAVELENGTH
+from chipglow.quantities.units import (
+    COLDEST,
+    FREQUENCY,
+    HOTTEST,
+    LENGTH,
+    TEMPERATURE,
+    TIME,
+    WAVELENGTH,
+)
 from chipglow.radiometry import Band
 
 RESPONSES: Final = Family("detector_response")
 """By their kind; other packages add theirs in the group ``chipglow.detector_response``."""
+
+in_tables: Final = partial(Parameter, quantity=TEMPERATURE, least=COLDEST, most=HOTTEST)
+"""Declares a temperature at which a band's radiance is known."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +56,7 @@ class DetectorResponse(Part, ABC):
     def electrons(self, point: OperationPoint, capacity: float) -> float:
         """Return the electrons that 1 W/(m² sr) makes in an element in one frame.
 
-        Parameters
-        ----------
-        point : OperationPoint
-            How the camera uses the detector.
-        capacity : float
-            Electrons that fill the detector or its digitiser.
+        `capacity` are those that fill the detector or its digitiser.
         """
 
 

@@ -12,9 +12,9 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.detector.response import OperationPoint
+from chipglow.camera.detector.response import OperationPoint, in_tables
 from chipglow.quantities import Array, Family, Parameter, Part
-from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME, Quantity
+from chipglow.quantities.units import TEMPERATURE_DIFFERENCE, TIME, Quantity
 
 DETECTOR_TERMS: Final = Family("detector_term")
 """Terms by their kind; other packages add theirs in the group ``chipglow.detector_term``."""
@@ -84,20 +84,7 @@ class DetectorTerm(Part, ABC):
 
     @abstractmethod
     def apply(self, electrons: Array, readout: Readout) -> Array:
-        """Return the electrons with the effect.
-
-        Parameters
-        ----------
-        electrons : ndarray
-            Signal of every element and frame after the previous stages, shape (time, y, x).
-        readout : Readout
-            The frames.
-
-        Returns
-        -------
-        ndarray
-            Signal of the same shape.
-        """
+        """Return the electrons after the previous stages, shape (time, y, x), with the effect."""
 
 
 @DETECTOR_TERMS.part
@@ -327,9 +314,7 @@ class EquivalentNoise(DetectorTerm):
     netd: Annotated[
         float, Parameter("Difference as large as the noise.", TEMPERATURE_DIFFERENCE, least=0.0)
     ]
-    temperature: Annotated[
-        float, Parameter("Temperature of the blackbody.", TEMPERATURE, least=200.0, most=6000.0)
-    ] = 303.15
+    temperature: Annotated[float, in_tables("Temperature of the blackbody.")] = 303.15
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
         radiance = self.netd * float(readout.point.band.slope(self.temperature))

@@ -45,13 +45,7 @@ class BlurTerm(Part, ABC):
 
     @abstractmethod
     def transfer(self, across: Array, up: Array) -> Array:
-        """Return the transfer function, 1 at zero frequency.
-
-        Parameters
-        ----------
-        across, up : ndarray
-            Spatial frequencies to the right and up in 1/m, broadcast against each other.
-        """
+        """Return the transfer function at frequencies to the right and up in 1/m, broadcast."""
 
 
 Deviation = Annotated[

@@ -18,7 +18,7 @@ from chipglow.surface.blend import in_blocks
 Beyond: TypeAlias = Literal["edge", "nothing"]
 """Assumption about the field beyond its edges: continued, or zero."""
 
-_Grid: TypeAlias = tuple[Raster, Raster, float]
+Grid: TypeAlias = tuple[Raster, Raster, float]
 """Samples and pixels of an image, and the pixels' fill factor."""
 
 _ROUNDING: Final = 1e-13
@@ -30,26 +30,16 @@ _MAX_REACH: Final = 2048
 def blur(
     radiance: Array, psf: PointSpreadFunction, spacing: float, beyond: Beyond = "edge"
 ) -> Array:
-    """Convolve a field of radiance (y, x) with a point spread function.
-
-    Beyond its edges, the field continues with the nearest value, or is zero. There is no wraparound
-    and no truncation of the point spread function.
-    """
-    edge, nothing = blurs(radiance, psf, spacing)
+    """Convolve a field (y, x) with all of a point spread function, without wraparound."""
+    edge, nothing = images(radiance, psf, spacing)
     return edge if beyond == "edge" else nothing
 
 
-def blurs(radiance: Array, psf: PointSpreadFunction, spacing: float) -> tuple[Array, Array]:
-    """Return both images by `blur`, with ``edge`` and with ``nothing``."""
-    return _optics(psf, spacing, radiance.shape, None).images(radiance)
-
-
-def images_on_pixels(
-    radiance: Array, psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float
+def images(
+    radiance: Array, psf: PointSpreadFunction, spacing: float, grid: Grid | None = None
 ) -> tuple[Array, Array]:
-    """Return both images by `blur`, integrated over pixels."""
-    grid = scene, sensors, fill_factor
-    return _optics(psf, scene.spacing, scene.shape, grid).images(radiance)
+    """Return both images by `blur`, with ``edge`` and ``nothing``, of samples or on pixels."""
+    return _optics(psf, spacing, radiance.shape, grid).images(radiance)
 
 
 class _Kernel(NamedTuple):
@@ -64,17 +54,15 @@ class _Kernel(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Strip:
-    """Light from beyond one edge of a field, where its values continue.
-
-    `spectrum` (n, frequency) is the transform along the edge of the kernel's sums over the area
-    beyond, for the `lines` inside that the light reaches. `length` is the size of the transform,
-    `reach` the half size of the kernel.
-    """
+    """Light from beyond one edge of a field, where its values continue."""
 
     lines: NDArray[np.intp]
+    """Lines inside that the light reaches."""
     spectrum: NDArray[np.complex128]
+    """Transform along the edge of the kernel's sums over the area beyond, (line, frequency)."""
     length: int
     reach: int
+    """Half size of the kernel."""
 
     @classmethod
     def from_sums(cls, sums: Array, weights: sparse.csr_array, count: int) -> "_Strip":
@@ -94,11 +82,7 @@ class _Strip:
 
 @dataclass(frozen=True, eq=False)
 class _Optics:
-    """A kernel and the pixels on which images are formed.
-
-    `down` and `across` are the weights of samples in the pixels; `edges` are left, right, upper and
-    lower.
-    """
+    """A kernel, the weights of samples in pixels, and edges: left, right, upper and lower."""
 
     kernel: _Kernel
     down: sparse.csr_array
@@ -139,7 +123,7 @@ class _Optics:
 
 @lru_cache(maxsize=4)
 def _optics(
-    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: _Grid | None
+    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: Grid | None
 ) -> _Optics:
     (rows, columns), kernel = shape, _transformed(psf, spacing, shape)
     down, across = (
@@ -172,13 +156,9 @@ def _transformed(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int
     whole = np.zeros(padded)
     whole[: inner.shape[0], : inner.shape[1]] = inner
     centred = np.roll(whole, (-reach[0], -reach[1]), axis=(0, 1))
-    beyond = tuple(_sums_beyond(one) for one in towards)
+    halves = (one[:, : one.shape[1] // 2 : -1] for one in towards)
+    beyond = tuple(half.cumsum(axis=1)[:, ::-1].T for half in halves)
     return _Kernel(fft.rfft2(centred, overwrite_x=True), padded, beyond)
-
-
-def _sums_beyond(kernel: Array) -> Array:
-    """Return sums of a kernel over the area beyond the left edge, for each line inside."""
-    return kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1].T
 
 
 def _sums(weights: sparse.csr_array, values: NDArray[Any]) -> NDArray[Any]:

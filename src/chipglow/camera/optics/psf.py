@@ -37,18 +37,13 @@ radiates 10 000 times as much as one at 573 K next to it.
 """
 
 ANNULAR_ENERGY: Final = 0.99
-"""Fraction of diffracted light within `AnnularAperturePSF.kernel`.
-
-The fraction beyond a radius r falls only as 1/r. `PointSpreadFunction.view_kernel` contains all
-light.
-"""
+"""Fraction of diffracted light within `AnnularAperturePSF.kernel`; that beyond r falls as 1/r."""
 
 FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
 """Ratio of full width at half maximum to standard deviation of a Gaussian."""
 
 _FAR: Final = 30.0
 """Radius v beyond which the mean irradiance of diffraction rings falls as 1/r³, within 2 %."""
-
 
 PSFS: Final = Family("psf")
 """Point spread functions by kind; other packages register theirs in the group ``chipglow.psf``."""
@@ -64,16 +59,17 @@ DiffractionWavelength = Annotated[
     ),
 ]
 
+Obscuration = Annotated[
+    float, Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9)
+]
+
 
 class PSFChoice(Part, ABC):
     """Settings from which a camera's point spread function is made."""
 
     @abstractmethod
     def for_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
-        """Return the point spread function on the scene for a band and a magnification of the lens.
-
-        Raises a ValueError if a required magnification is missing.
-        """
+        """Return that on the scene for a band and, if required, a magnification of the lens."""
 
 
 class PointSpreadFunction(PSFChoice):
@@ -96,35 +92,17 @@ class PointSpreadFunction(PSFChoice):
 
     @abstractmethod
     def kernel(self, spacing: float) -> Array:
-        """Return the fractions of a point's light on a grid of squares.
+        """Return the fractions of a point's light on squares with sides of `spacing` in m.
 
-        Parameters
-        ----------
-        spacing : float
-            Side of a square in m. The point is at the centre of the central square.
-
-        Returns
-        -------
-        ndarray
-            A square array with an odd number of rows, first row on top. Its sum is less than 1 by
-            the light outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
+        A square array with an odd number of rows, first row on top; the point is at the centre of
+        the central one. Its sum is less than 1 by the light that falls outside.
         """
 
     def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
-        """Return the fractions of all of a point's light on a grid of limited size.
+        """Return the fractions of all of a point's light, of sum 1, on a grid of limited size.
 
-        Parameters
-        ----------
-        spacing : float
-            Side of a square in m. The point is at the centre of the central square.
-        rows, columns : int
-            Largest number of squares on each side of the central one.
-
-        Returns
-        -------
-        ndarray
-            Fractions of sum 1, shape (2 m + 1, 2 n + 1) with m ≤ `rows` and n ≤ `columns`. The
-            border squares also contain the light beyond them.
+        The shape is (2 m + 1, 2 n + 1) with m ≤ `rows` and n ≤ `columns`; border squares also
+        contain the light beyond them.
         """
         return folded(normalised(self.kernel(spacing)), rows, columns)
 
@@ -148,10 +126,7 @@ class AnnularAperturePSF(PointSpreadFunction):
     numerical_aperture: Annotated[
         float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
     ] = 0.28
-    obscuration: Annotated[
-        float,
-        Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9),
-    ] = 0.35
+    obscuration: Obscuration = 0.35
 
     def __str__(self) -> str:
         of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""

@@ -14,6 +14,7 @@ from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 from scipy import fft
 from scipy.ndimage import map_coordinates
 
+from chipglow.camera.detector.response import in_tables
 from chipglow.camera.optics.kernel import (
     check_length,
     folded,
@@ -23,9 +24,9 @@ from chipglow.camera.optics.kernel import (
     poisson_squares,
     resized,
 )
-from chipglow.camera.optics.psf import PSFS, ApertureChoice, PointSpreadFunction
+from chipglow.camera.optics.psf import PSFS, ApertureChoice, Obscuration, PointSpreadFunction
 from chipglow.quantities import Array, Parameter
-from chipglow.quantities.units import POSITION, TEMPERATURE
+from chipglow.quantities.units import POSITION
 from chipglow.radiometry import Band
 
 PUPIL_ENERGY: Final = 0.99
@@ -77,9 +78,6 @@ def _whole(index: object) -> Any:
     return int(index) if isinstance(index, str) and re.fullmatch("[0-9]{1,3}", index) else index
 
 
-Obscuration = Annotated[
-    float, Parameter("Central obstruction as a fraction of the diameter.", least=0.0, most=0.9)
-]
 Defocus = Annotated[
     float,
     Parameter(
@@ -107,13 +105,7 @@ Aberrations = Annotated[
     ),
 ]
 SourceTemperature = Annotated[
-    float,
-    Parameter(
-        "Temperature of the blackbody whose spectrum weights the wavelengths.",
-        TEMPERATURE,
-        least=200.0,
-        most=6000.0,
-    ),
+    float, in_tables("Temperature of the blackbody whose spectrum weights the wavelengths.")
 ]
 
 
@@ -129,11 +121,6 @@ class PupilPSF(PointSpreadFunction):
     ----------
     band : Band
         Band of the camera, with its response.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its limits, or the aberrations exceed about 10 wavelengths.
 
     Notes
     -----
@@ -198,7 +185,7 @@ class PupilPSF(PointSpreadFunction):
             if change is not None:
                 step = 2.0 / self._samples
                 places = np.stack([up[passed], across[passed]]) * scale / step + self._samples
-                part += _interpolated(change, places)
+                part += map_coordinates(change, places, order=3, mode="grid-constant")
             result[passed] += weight * part
         return result
 
@@ -401,7 +388,3 @@ def _autocorrelation(pupil: NDArray[np.complex128]) -> NDArray[np.complex128]:
     twice = [2 * count for count in pupil.shape]
     power = np.abs(fft.fft2(pupil, twice)) ** 2
     return np.asarray(fft.fftshift(np.conj(fft.ifft2(power))))
-
-
-def _interpolated(values: NDArray[np.complex128], places: Array) -> NDArray[np.complex128]:
-    return np.asarray(map_coordinates(values, places, order=3, mode="grid-constant"))

@@ -100,21 +100,13 @@ def line_weights(
     scene: Raster, sensors: Raster, fill_factor: float
 ) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Return the weights of samples in pixels down and across; each row has sum 1."""
-    down = _line_weights(
-        scene.top - sensors.top, scene.rows, sensors.rows, scene, sensors, fill_factor
-    )
-    across = _line_weights(
-        sensors.left - scene.left, scene.columns, sensors.columns, scene, sensors, fill_factor
-    )
-    return down, across
-
-
-def _line_weights(
-    begin: float, samples: int, count: int, scene: Raster, sensors: Raster, fill_factor: float
-) -> sparse.csr_array:
-    """Return the weights of a line of samples in a line of pixels; each row has sum 1."""
     side = sensors.spacing * sqrt(fill_factor)
-    first = begin + (sensors.spacing - side) / 2
-    left = first + sensors.spacing * np.arange(count, dtype=np.float64)
-    lengths = overlap_lengths(left, side, samples, scene.spacing)
-    return sparse.csr_array(lengths / lengths.sum(axis=1, keepdims=True))
+
+    def along(begin: float, samples: int, count: int) -> sparse.csr_array:
+        first = begin + (sensors.spacing - side) / 2
+        left = first + sensors.spacing * np.arange(count, dtype=np.float64)
+        lengths = overlap_lengths(left, side, samples, scene.spacing)
+        return sparse.csr_array(lengths / lengths.sum(axis=1, keepdims=True))
+
+    down = along(scene.top - sensors.top, scene.rows, sensors.rows)
+    return down, along(sensors.left - scene.left, scene.columns, sensors.columns)
