@@ -16,8 +16,7 @@ from math import pi, radians
 from pathlib import Path
 
 import numpy as np
-from common import arguments
-from experiments import aligned
+from common import arguments, print_tables
 
 from chipglow.camera import Camera
 from chipglow.io import open_scene
@@ -176,8 +175,8 @@ def main() -> None:
         "as cut": Face.of(scene, camera, hot_tool=False),
         "as warm as the chip": Face.of(scene, camera, hot_tool=True),
     }
-    print(aligned(by_shape(faces, given.angles)))
-    print(aligned(explained(faces, given.draws)))
+    print_tables([by_shape(faces, given.angles)])
+    print_tables([explained(faces, given.draws)])
 
 
 if __name__ == "__main__":
