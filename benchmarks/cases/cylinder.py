@@ -130,15 +130,9 @@ def thick_cylinder(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
     growing = "the transfer dissipates what a cell cannot resolve; elastic strain is 0.2 %"
     checks = (
         *(
-            Check(
-                what,
-                "Hill, 2k ln(b/a), mean over the path",
-                limit_pressure(result.swept[-1]) / 1e6,
-                result.pressure / 1e6,
-                tolerance,
-                "the bore's edge is a stair of cells",
-                "MPa",
-            )
+            Check(what, "Hill, 2k ln(b/a), mean over the path",
+                  limit_pressure(result.swept[-1]) / 1e6, result.pressure / 1e6, tolerance,
+                  "the bore's edge is a stair of cells", "MPa")
             for what, result, tolerance in limits
         ),
         Check("growth of the bore until it stops", "ordinary differential equation",

@@ -58,24 +58,9 @@ def conduction(cells=(20e-6, 10e-6, 5e-6)):
         right.set_ylabel("mean error / K")
 
     checks = (
-        Check(
-            "order of convergence",
-            "erfc",
-            2.0,
-            order(cells, errors),
-            0.2,
-            "central differences on the grid; three cells only",
-            absolute=True,
-        ),
-        Check(
-            "mean error after 60 µs, cell 10 µm",
-            "erfc",
-            0.0,
-            errors[1],
-            1.0,
-            "a step of 600 K over 90 µm: (10/90)² of a few kelvins",
-            unit="K",
-            absolute=True,
-        ),
-    )
+        Check("order of convergence", "erfc", 2.0, order(cells, errors), 0.2,
+              "central differences on the grid; three cells only", absolute=True),
+        Check("mean error after 60 µs, cell 10 µm", "erfc", 0.0, errors[1], 1.0,
+              "a step of 600 K over 90 µm: (10/90)² of a few kelvins", unit="K", absolute=True),
+    )  # fmt: skip
     return Case("conduction", "Two half-spaces", checks, draw)

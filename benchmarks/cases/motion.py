@@ -53,7 +53,7 @@ def momentum():
     checks = tuple(
         Check(what, "conservation", 0.0, float(np.abs(change).max()), *told, absolute=True)
         for what, change, *told in rows
-    )
+    )  # fmt: skip
     return Case("momentum", "A free, spinning block", checks, draw)
 
 
@@ -126,30 +126,19 @@ def waves(cells=(20e-6, 14e-6, 10e-6, 7e-6)):
         convergence(right, cells, errors * 100, names, colours)
         right.set_ylabel("error of the speed / %")
 
+    dispersion = "dispersion of a Gaussian of standard deviation 7 cells, "
+    dispersion += "which falls with second order"
     checks = []
     for kind in (0, 1):
         speed = exact_speed(kind)
         checks += [
-            Check(
-                f"speed of the {names[kind]}, cell {cells[-1] / MICRO:g} µm",
-                formulas[kind],
-                speed,
-                speed * results[kind][-1][1],
-                0.01,
-                "dispersion of a Gaussian of standard deviation 7 cells, which falls with second "
-                "order",
-                unit="m/s",
-            ),
-            Check(
-                f"order of the {names[kind]}'s speed",
-                "quadratic B-splines",
-                2.0,
-                order(cells, errors[kind]),
-                0.3,
-                "four cells only",
-                absolute=True,
-            ),
-        ]
+            Check(f"speed of the {names[kind]}, cell {cells[-1] / MICRO:g} µm", formulas[kind],
+                  speed, speed * results[kind][-1][1], 0.01,
+                  dispersion,
+                  unit="m/s"),
+            Check(f"order of the {names[kind]}'s speed", "quadratic B-splines", 2.0,
+                  order(cells, errors[kind]), 0.3, "four cells only", absolute=True),
+        ]  # fmt: skip
     return Case("waves", "Elastic waves", tuple(checks), draw)
 
 
@@ -201,25 +190,14 @@ def vibrations(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
         right.set_ylabel("error of the period / %")
 
     checks = (
-        Check(
-            f"period, cell {cells[2] / MICRO:g} µm",
-            "2L √(ρ (1 − ν²)/E), corrected for the motion across",
-            period / 1e-9,
-            results[2][2] / 1e-9,
-            0.01,
-            "free ends are blurred over a cell, a sixtieth of the length",
-            unit="ns",
-        ),
-        Check(
-            "order of the period",
-            "quadratic B-splines",
-            2.0,
-            order(cells, errors),
-            0.7,
-            "errors under 0.2 %, of which the reading of the crossings is a part",
-            absolute=True,
-        ),
-    )
+        Check(f"period, cell {cells[2] / MICRO:g} µm",
+              "2L √(ρ (1 − ν²)/E), corrected for the motion across", period / 1e-9,
+              results[2][2] / 1e-9, 0.01,
+              "free ends are blurred over a cell, a sixtieth of the length", unit="ns"),
+        Check("order of the period", "quadratic B-splines", 2.0, order(cells, errors), 0.7,
+              "errors under 0.2 %, of which the reading of the crossings is a part",
+              absolute=True),
+    )  # fmt: skip
     return Case("vibration", "A vibrating strip", checks, draw)
 
 

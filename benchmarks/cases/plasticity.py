@@ -104,23 +104,12 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
 
     rise = (expected[1] - 293.0, float(results[-1][2][-1]) - 293.0)
     checks = (
-        Check(
-            "plastic strain at a shear of 1",
-            "ordinary differential equation",
-            expected[0],
-            float(results[-1][1][-1]),
-            1e-3,
-            "1000 steps, first order in the step",
-        ),
-        Check(
-            "temperature rise at a shear of 1",
-            "ordinary differential equation",
-            *rise,
-            5e-3,
-            "1000 steps, first order in the step; heat capacity from a table of whole kelvins",
-            unit="K",
-        ),
-    )
+        Check("plastic strain at a shear of 1", "ordinary differential equation", expected[0],
+              float(results[-1][1][-1]), 1e-3, "1000 steps, first order in the step"),
+        Check("temperature rise at a shear of 1", "ordinary differential equation", *rise, 5e-3,
+              "1000 steps, first order in the step; heat capacity from a table of whole kelvins",
+              unit="K"),
+    )  # fmt: skip
     return Case("shear", "Adiabatic shear", checks, draw)
 
 
@@ -159,23 +148,11 @@ def friction(coefficients=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)):
         axes.legend()
 
     checks = (
-        Check(
-            "tangential over normal force, less μ: largest of 9",
-            "Coulomb",
-            0.0,
-            float(np.abs(ratios - coefficients).max()),
-            1e-9,
-            "rounding: the impulses are μ times the normal ones, point by point",
-            absolute=True,
-        ),
-        Check(
-            "tangential force at μ = 1, flow stress 30 MPa",
-            "area · σ/√3",
-            limit / 1e3,
-            largest / 1e3,
-            1e-9,
-            "rounding: every point of the face is at the limit",
-            unit="N/mm",
-        ),
-    )
+        Check("tangential over normal force, less μ: largest of 9", "Coulomb", 0.0,
+              float(np.abs(ratios - coefficients).max()), 1e-9,
+              "rounding: the impulses are μ times the normal ones, point by point", absolute=True),
+        Check("tangential force at μ = 1, flow stress 30 MPa", "area · σ/√3", limit / 1e3,
+              largest / 1e3, 1e-9, "rounding: every point of the face is at the limit",
+              unit="N/mm"),
+    )  # fmt: skip
     return Case("friction", "A block on the rake face", checks, draw)

@@ -133,17 +133,10 @@ def published_checks():
          float(bar.temperature[0].mean()) - 293.15, 0.02, 1.5, "K"),
     )  # fmt: skip
     return tuple(
-        Check(
-            f"peer, round bar: {what}",
-            "Abaqus, in Pantalé (2020)",
-            known,
-            computed,
-            tolerance,
-            f"the two published codes differ by {apart:g} %",
-            unit,
-        )
+        Check(f"peer, round bar: {what}", "Abaqus, in Pantalé (2020)", known, computed, tolerance,
+              f"the two published codes differ by {apart:g} %", unit)
         for what, known, computed, tolerance, apart, unit in rows
-    )
+    )  # fmt: skip
 
 
 def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
@@ -198,18 +191,11 @@ def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
          "1 % of the half width"),
     )  # fmt: skip
     checks = tuple(
-        Check(
-            f"plate at 180 m/s: {what}, cell {cells[-1] / MILLI:.2f} mm",
-            "finite elements",
-            expected / MILLI,
-            computed / MILLI,
-            tolerance,
-            reason,
-            "mm",
-            absolute=expected == 0.0,
-        )
+        Check(f"plate at 180 m/s: {what}, cell {cells[-1] / MILLI:.2f} mm", "finite elements",
+              expected / MILLI, computed / MILLI, tolerance, reason, "mm",
+              absolute=expected == 0.0)
         for what, expected, computed, tolerance, reason in rows
-    )
+    )  # fmt: skip
     return Case("taylor", "Taylor's impact", published_checks() + checks, draw, 5.0)
 
 

@@ -77,23 +77,14 @@ def rough_plates(cells=(25e-6, 20e-6, 12.5e-6, 10e-6)):
         right.set_xlabel("cell / µm")
         right.legend(loc="lower right")
 
+    straight = "a straight line through four cells; the strip widens by 1 %; "
+    straight += "the formula is an approximation"
     checks = (
-        Check(
-            "mean pressure over 2k, extrapolated to no cell",
-            "Prandtl, 3/4 + w/(4h)",
-            PRANDTL,
-            extrapolated,
-            0.03,
-            "a straight line through four cells; the strip widens by 1 %; the formula is an "
-            "approximation",
-        ),
-        Check(
-            f"the same, cell {cells[-1] / MICRO:g} µm: 10 cells in the half height",
-            "Prandtl, 3/4 + w/(4h)",
-            PRANDTL,
-            limits[-1],
-            0.1,
-            "material slips off the plate within a cell: first order in the cell",
-        ),
-    )
+        Check("mean pressure over 2k, extrapolated to no cell", "Prandtl, 3/4 + w/(4h)", PRANDTL,
+              extrapolated, 0.03,
+              straight),
+        Check(f"the same, cell {cells[-1] / MICRO:g} µm: 10 cells in the half height",
+              "Prandtl, 3/4 + w/(4h)", PRANDTL, limits[-1], 0.1,
+              "material slips off the plate within a cell: first order in the cell"),
+    )  # fmt: skip
     return Case("upsetting", "A strip between rough plates", checks, draw)
