@@ -120,8 +120,7 @@ def thick_cylinder(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
         rank = np.argsort(finest.radius)
         middle.plot(finest.radius[rank] / MICRO, finest.exact_strain[rank], "k--", linewidth=0.9)
         middle.set(xlabel="radius / µm", ylabel="plastic strain")
-        convergence(right, cells, [np.array(growth) * 100], [None], [BLUE])
-        right.set_ylabel("error of the growth / %")
+        convergence(right, cells, [np.array(growth) * 100], "error of the growth / %")
 
     limits = (
         ("limit pressure (plastic work over swept area), cell 6.7 µm", finest, 0.01),
