@@ -17,7 +17,6 @@ from chipglow.io.sources.triangles import rasterise
 from chipglow.scene import Raster
 
 RASTER = Raster(left=0.0, top=810e-6, spacing=1e-6, rows=810, columns=900)
-REPEATS = 7
 
 
 def mesh_of(columns, rows):
@@ -39,13 +38,13 @@ def linear(points):
     return 300.0 + 1.234567e6 * points[..., 0] + 0.7654321e6 * points[..., 1]
 
 
-def times_of(action, repeats=REPEATS):
+def times_of(action, repeats=7):
     """Least and median time in ms; the first run, which may compile, does not count."""
     times = [1e3 * timed(action)[1] for _ in range(repeats + 1)][1:]
     return min(times), statistics.median(times)
 
 
-def row(name, action, repeats=REPEATS):
+def row(name, action, repeats=7):
     """Print times, and the largest error of the samples."""
     found = action()
     expected = linear(np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1))
@@ -73,12 +72,8 @@ def surface(points, triangles):
 def probe(points, triangles, values):
     mesh = surface(points, triangles)
     mesh.point_data["t"] = values
-    grid = pyvista.ImageData(
-        dimensions=(RASTER.columns, RASTER.rows, 1),
-        spacing=(RASTER.spacing, RASTER.spacing, 1.0),
-        origin=(RASTER.x[0], RASTER.y[-1], 0.0),
-    )
-    sampled = grid.sample(mesh)
+    size, spacing = (RASTER.columns, RASTER.rows, 1), (RASTER.spacing, RASTER.spacing, 1.0)
+    sampled = pyvista.ImageData(size, spacing, (RASTER.x[0], RASTER.y[-1], 0.0)).sample(mesh)
     found = np.where(sampled.point_data["vtkValidPointMask"], sampled.point_data["t"], np.nan)
     return found.reshape(RASTER.shape)[::-1].astype(np.float32)
 

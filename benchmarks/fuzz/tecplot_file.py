@@ -3,7 +3,6 @@
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,16 +37,7 @@ class ZoneOfFile:
     remarks: dict[str, str] = field(default_factory=dict)
 
 
-def write_tecplot(
-    path: Path,
-    names: Sequence[str],
-    zones: Sequence[ZoneOfFile],
-    *,
-    version: int = 112,
-    order: str = "<",
-    extras: bytes = b"",
-    file_type: int = 0,
-) -> Path:
+def write_tecplot(path, names, zones, *, version=112, order="<", extras=b"", file_type=0):
     """Write zones; extras are whole records of the header beside the zones."""
     words = _Words(order)
     words.raw(f"#!TDV{version}".encode())
@@ -68,7 +58,7 @@ def write_tecplot(
     return path
 
 
-def extras_of_header(order: str = "<") -> bytes:
+def extras_of_header(order="<"):
     """A line, a circle, a text, labels, a record and remarks: nothing of zones."""
     words = _Words(order)
     for shape, rest in ((0, ("2i6f", 1, 3, *[0.0] * 6)), (3, ("d", 1.0))):
@@ -84,16 +74,14 @@ def extras_of_header(order: str = "<") -> bytes:
     words.text("")
     words.put("i", 0)
     words.text("a text")
-    words.put("f", 599.0)
-    words.put("i", 2)
+    words.put("fi", 599.0, 2)
     words.text("one")
     words.text("two")
     words.put("f", 699.0)
     words.text("a record")
     words.put("f", 799.0)
     words.remark("Made.By", "hand")
-    words.put("f", 899.0)
-    words.put("i", 0)
+    words.put("fi", 899.0, 0)
     words.remark("Unit", "m")
     return bytes(words.content)
 
