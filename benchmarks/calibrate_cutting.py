@@ -12,6 +12,7 @@ place with its differences, its uncertainty, and the principal axes of the covar
 """
 
 import os
+from collections import namedtuple
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from math import exp, isnan, log, sqrt
@@ -68,7 +69,6 @@ STRESSES = ("athermal_stress", "thermal_stress", "hardening")
 
 
 def simulation(experiment, place):
-    """Return a cut at a place of the design."""
     strength, onset, d3, loss, energy, friction, edge = (
         one.at(part) for one, part in zip(RANGES, place, strict=True)
     )
@@ -86,7 +86,6 @@ def simulation(experiment, place):
 
 
 def compute(task):
-    """Return the means of a cut at a place, stored or computed."""
     experiment, place = task
     return means_of(simulation(experiment, place), f"fit-{experiment.name}")
 
@@ -97,14 +96,8 @@ def design():
     return [(0.0,) * len(RANGES), *(tuple(sign * axis) for axis in axes for sign in (-1, 1))]
 
 
-@dataclass(frozen=True)
-class Observation:
-    """A cut's quantity, its measured value and relative standard uncertainty."""
-
-    cut: str
-    quantity: str
-    value: float
-    uncertainty: float
+Observation = namedtuple("Observation", "cut quantity value uncertainty")
+"""A cut's quantity, its measured value and relative standard uncertainty."""
 
 
 def observations(experiments):
@@ -127,11 +120,11 @@ def terms(places):
 class Fit:
     """Quadratic surfaces through the logarithms of what is observed, without products of numbers.
 
-    `weights` has the shape (terms, observations); `scatter` is the standard deviation of each.
+    `scatter` is the standard deviation of each observation.
     """
 
-    observed: list[Observation]
-    weights: np.ndarray
+    observed: list
+    weights: np.ndarray  # (terms, observations)
     scatter: np.ndarray
 
     @classmethod
@@ -148,7 +141,6 @@ class Fit:
         return cls(observed, np.transpose(weights), np.array(scatter))
 
     def logs(self, place):
-        """Return the logarithms of the quantities at a place."""
         return terms(place[None])[0] @ self.weights
 
     def differences(self, place):

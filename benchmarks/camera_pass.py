@@ -68,8 +68,6 @@ LIMITS = {"temperature": (293.0, 1100.0), "plastic_strain": (0.0, 3.0)}
 
 
 class GivenSurface(Surface):
-    """A surface with given emissivities."""
-
     def __init__(self, values, times):
         self.values, self.times = values, times
 
@@ -144,7 +142,6 @@ def read_once(arrays):
 
 
 def study(scene, instants):
-    """Measure both chips at instants over a scene, as in the paper's study."""
     camera = Camera.paper()
     fields = [camera.prepare(chip, scene) for chip in (CHIP_1, CHIP_2)]
     starts = spread_starts(scene, camera.integration_time, instants)
@@ -153,7 +150,6 @@ def study(scene, instants):
 
 
 def main():
-    """Print the tables."""
     given = arguments(__doc__, rounds=7, instants=9, sub_frames=50, scene=Path)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.nc"
@@ -166,7 +162,6 @@ def main():
 
 
 def compare_frames(path, rounds, sub_frames):
-    """Time one frame and return its exposure."""
     stored = open_scene(path)
     arrays = {n: np.stack([stored.field(n, i) for i in range(sub_frames)]) for n in NEEDED}
     times = stored.times[:sub_frames]
@@ -211,7 +206,6 @@ def compare_frames(path, rounds, sub_frames):
 
 
 def compare_studies(path, instants, rounds):
-    """Time all frames of the paper's study."""
     kept = open_scene(path)
     size = f"{kept.raster.rows} x {kept.raster.columns}"
     print(f"\n{instants} instants x 2 chips, {len(kept)} frames of {size}")

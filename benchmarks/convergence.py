@@ -77,7 +77,6 @@ def rise_width(profile):
 
 
 def row(cell, length, workpiece):
-    """Run one cut and return its row of the table."""
     conditions, numerics = CuttingConditions(cutting_length=length), Numerics(cell=cell * 1e-6)
     simulation = CuttingSimulation(conditions, workpiece=workpiece, numerics=numerics)
     fields = Fields(simulation.tool)

@@ -72,7 +72,6 @@ class DotTarget(View):
 
     @cached_property
     def infrared(self):
-        """Radiance, holes bright, warmer on the left."""
         raster, pitch = self.raster, self.raster.spacing / _FINER
         x = raster.left + (np.arange(raster.columns * _FINER) + 0.5) * pitch
         y = raster.top - (np.arange(raster.rows * _FINER) + 0.5) * pitch
@@ -104,7 +103,6 @@ class DotTarget(View):
 
 
 def main():
-    """Register targets of fresh seeds and print a table."""
     given = arguments(__doc__, first=300, count=20)
     print("seed holes match  error  stated  inside  warnings   (in infrared pixels)", flush=True)
     within = tried = 0

@@ -105,7 +105,6 @@ class DualSpectrum(View):
 
     @cached_property
     def infrared(self):
-        """Measurement of the infrared camera, with noise."""
         optics = Camera(pitch=PITCH, psf=GaussianPSF(12e-6), shape=(ROWS, COLUMNS))
         clean = optics.measure(self.scene, replace(CHIP_1, follow="mean"), 0.0)
         generator = np.random.default_rng([self.seed, 1])
@@ -135,7 +134,6 @@ class DualSpectrum(View):
 
     @cached_property
     def scene(self):
-        """One frame of the true scene."""
         place = np.stack(np.meshgrid(FINE.x, FINE.y), axis=-1)
         chip, work, tool, phase = shapes(place, self.tool, self.band_spacing)
         depth = self.tool.signed_distance(place[..., 0], place[..., 1])

@@ -126,7 +126,6 @@ def in_si(data, units):
 
 
 def read_experiments():
-    """Return sources by their key, and the experiments."""
     data = yaml.safe_load(DATA.read_text(encoding="utf-8"))
     found = []
     for entry in data["experiments"]:
@@ -162,19 +161,10 @@ def compute(simulation):
     }
     time = ("force_time", history.time, {"units": "s"})
     scene = Scene(scene.data.assign_coords(force_time=time).assign(forces))
-    chip = chip_metrics(scene, conditions.feed)
-    return Means(
-        cutting_force=chip.cutting_mean,
-        thrust_force=chip.thrust_mean,
-        thickness=chip.thickness,
-        contact=chip.contact,
-        period=chip.period,
-        segments=chip.segments,
-        degree=chip.degree,
-        drift=drift(history),
-        unaccounted=float(history.energy.closing_error[-1]),
-        seconds=seconds,
-    )
+    chip, unaccounted = chip_metrics(scene, conditions.feed), history.energy.closing_error[-1]
+    names = ("cutting_mean", "thrust_mean", "thickness", "contact", "period", "segments", "degree")
+    seen = (getattr(chip, name) for name in names)
+    return Means(*seen, drift(history), float(unaccounted), seconds)
 
 
 def drift(history):

@@ -58,7 +58,6 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
 
 
 def image(generator, edge, normal, noise, seed, saturation=None):
-    """An edge at some place."""
     place = generator.uniform(-6e-6, 6e-6)
     radiance = edge_radiance(edge, normal, position=place, step=STEP)
     return image_of(radiance, noise * STEP, seed, saturation)

@@ -10,7 +10,7 @@ the movie is refused.
 """
 
 import tempfile
-from dataclasses import dataclass
+from collections import namedtuple
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -39,8 +39,7 @@ class NamedMap(NamedTuple):
     bands: int = 0
 
 
-@dataclass(frozen=True)
-class Codec:
+class Codec(NamedTuple):
     """A way to encode; without an encoder of FFmpeg, a GIF with Pillow's palette."""
 
     name: str
@@ -147,28 +146,13 @@ def with_legend(number, colours, edges):
     return page
 
 
-@dataclass(frozen=True)
-class Reading:
-    """Errors of a movie's values and its stated uncertainty in K.
+Reading = namedtuple("Reading", "stated errors rms held extra missing")
+"""Errors of a movie's values and its stated uncertainty in K.
 
-    `errors` are those of pixels that show material in field and movie; `extra` pixels show it in
-    the movie only, `missing` pixels in the field only.
-    """
-
-    stated: float
-    errors: np.ndarray
-    extra: int
-    missing: int
-
-    @property
-    def rms(self):
-        return float(np.sqrt((self.errors**2).mean()))
-
-    @property
-    def held(self):
-        """Fraction of the shown pixels whose true value is within twice the uncertainty."""
-        within = np.count_nonzero(np.abs(self.errors) <= 2 * self.stated)
-        return within / (self.errors.size + self.extra)
+`errors` are those of pixels that show material in field and movie; `extra` pixels show it in the
+movie only, `missing` pixels in the field only. `held` is the fraction of the shown pixels whose
+true value is within twice the uncertainty.
+"""
 
 
 def read_back(source, shape):
@@ -181,7 +165,9 @@ def read_back(source, shape):
         errors.append((frame.fields["temperature"] - truth)[shown & known])
         extra += np.count_nonzero(shown & ~known)
         missing += np.count_nonzero(known & ~shown)
-    return Reading(stated, np.concatenate(errors), extra, missing)
+    errors = np.concatenate(errors)
+    held = np.count_nonzero(np.abs(errors) <= 2 * stated) / (errors.size + extra)
+    return Reading(stated, errors, float(np.sqrt((errors**2).mean())), held, extra, missing)
 
 
 def read_with_map(path, codec, colours, count, shape=SHAPE):

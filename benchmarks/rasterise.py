@@ -45,7 +45,6 @@ def times_of(action, repeats=7):
 
 
 def row(name, action, repeats=7):
-    """Print times, and the largest error of the samples."""
     found = action()
     expected = linear(np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1))
     error = np.nanmax(np.abs(found - expected))
@@ -54,7 +53,6 @@ def row(name, action, repeats=7):
 
 
 def compare(points, triangles, peer):
-    """Print the table of a mesh."""
     values = linear(points)
     fields = np.stack([values] * 5, axis=1)
     print(f"\n{len(triangles)} triangles on {RASTER.columns} x {RASTER.rows} samples\n")

@@ -34,7 +34,6 @@ FAR, RIVAL = 8.0, 0.8
 
 
 def own(pair, model):
-    """The registration by chipglow."""
     measured = pair.infrared
     return fit_images(measured.radiance[0], measured.raster, pair.visible, model).registration
 
@@ -104,7 +103,6 @@ def outcome_of(method, pair, model):
 
 
 def row(name, outcomes):
-    """A method's row of the table."""
     error, stated, doubtful, seconds = np.array(outcomes).T
     sure = doubtful == 0
     return [

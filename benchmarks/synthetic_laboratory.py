@@ -12,7 +12,7 @@ seconds; its results are kept in build/synthetic-laboratory, so that an interrup
 
 import json
 import sys
-from collections.abc import Callable
+from collections import namedtuple
 from dataclasses import dataclass
 from functools import partial
 from math import cos, pi, radians, sin
@@ -39,7 +39,6 @@ from chipglow.camera import (
     LinearCalibration,
     MeasuredPSF,
     OffsetPattern,
-    PointSpreadFunction,
     ReadNoise,
     Recording,
     ShotNoise,
@@ -115,27 +114,11 @@ QUANTITIES = {
 """Recovered quantities and the unit in which they are printed."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """A result of a procedure, with half the width of its own 95 % interval."""
+Found = namedtuple("Found", "value expanded")
+"""A result of a procedure, with half the width of its own 95 % interval."""
 
-    value: float
-    expanded: float
-
-    @classmethod
-    def of(cls, estimate):
-        return cls(float(estimate.values), float(estimate.expanded_uncertainty()))
-
-
-@dataclass(frozen=True)
-class Optics:
-    """Hidden optics: point spread function, its width, edge-spread and transfer functions."""
-
-    kind: str
-    psf: PointSpreadFunction
-    fwhm: float
-    edge: Callable
-    transfer: Callable
+Optics = namedtuple("Optics", "kind psf fwhm edge transfer")
+"""Hidden optics: point spread function, its width, edge-spread and transfer functions."""
 
 
 def gaussian_transfer(sigma, frequency):
@@ -143,7 +126,6 @@ def gaussian_transfer(sigma, frequency):
 
 
 def gaussian_optics(fwhm):
-    """Return a round Gaussian."""
     transfer = partial(gaussian_transfer, fwhm / FWHM_PER_SIGMA)
     return Optics("gaussian", GaussianPSF(fwhm), fwhm, gaussian_edge(fwhm), transfer)
 
@@ -168,7 +150,6 @@ def tailed_optics(core, fraction, length):
 
 
 def mirror_optics(aperture, obscuration):
-    """Return the diffraction of an annular pupil."""
     psf = AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
     unit = WAVELENGTH / (2 * pi * aperture)
     far, line, energy = annular_line(obscuration)
@@ -181,7 +162,6 @@ def mirror_optics(aperture, obscuration):
 
 
 def hidden_optics(generator):
-    """Draw one of the kinds with a random width."""
     kind = generator.choice(["gaussian", "tail", "mirror"])
     if kind == "gaussian":
         return gaussian_optics(generator.uniform(7e-6, 14e-6))
@@ -221,20 +201,16 @@ class Laboratory:
         self.reading = self.oven + THERMOCOUPLE * generator.standard_normal()
         self.hot = CELSIUS + generator.uniform(450.0, 650.0)
         self.unknown = CELSIUS + generator.uniform(300.0, 600.0)  # a blackbody
-        self.emissivity = self._surface(generator.uniform(0.35, 0.5), generator.uniform(0.5, 0.7))
+        body, shear_band = generator.uniform(0.35, 0.5), generator.uniform(0.5, 0.7)
+        shape = tuple(SAMPLES * count for count in SHAPE)
+        texture = gaussian_filter(generator.standard_normal(shape), 4.0, mode="reflect")
+        emissivity = np.full(shape, body)  # of every sample
+        emissivity[:, SAMPLES * BANDS.start : SAMPLES * BANDS.stop] = shear_band
+        self.emissivity = emissivity + 0.015 * texture / texture.std()
         tilts = generator.uniform(2.0, 9.0, 2) * generator.choice([-1, 1], 2)
         self.normals = tilts + [0.0, 90.0] + 180.0 * generator.integers(0, 2, 2)
 
-    def _surface(self, body, shear_band):
-        """Return the emissivity of every sample, with texture."""
-        shape = tuple(SAMPLES * count for count in SHAPE)
-        texture = gaussian_filter(self._generator.standard_normal(shape), 4.0, mode="reflect")
-        emissivity = np.full(shape, body)
-        emissivity[:, SAMPLES * BANDS.start : SAMPLES * BANDS.stop] = shear_band
-        return emissivity + 0.015 * texture / texture.std()
-
     def reference(self):
-        """Return the true values by `QUANTITIES`."""
         shape = (SHAPE[0], SAMPLES, SHAPE[1], SAMPLES)
         pixels = self.emissivity.reshape(shape).mean(axis=(1, 3))
         body = np.concatenate([pixels[4:44, 1:9], pixels[4:44, 55:63]])
@@ -252,7 +228,6 @@ class Laboratory:
         }
 
     def perform(self, folder):
-        """Write the files and notes of the experiment."""
         lines = ["temperature_degC,file,count_uncertainty,temperature_uncertainty_K"]
         for celsius in BLACK_BODIES:
             error = self.certificate + SETTING * self._generator.standard_normal()
@@ -311,7 +286,6 @@ class Laboratory:
 
 
 def _even(kelvins):
-    """Return the radiance of a blackbody."""
     return np.full(SHAPE, float(BAND.radiance(np.array(kelvins))))
 
 
@@ -326,7 +300,6 @@ class Evaluation:
 
     @property
     def fields(self):
-        """Description of the camera's files."""
         here = self.folder.resolve()
         flat = f"flat_field.low={here / 'cold'}.hcc", f"flat_field.high={here / 'hot'}.hcc"
         return [*flat, "bad_pixels=find", "pitch=6 um"]
@@ -355,7 +328,6 @@ class Evaluation:
         return [load_measurement(path, fields) for path in paths]
 
     def results(self):
-        """Return the results by `QUANTITIES`."""
         calibration = self.calibrated()  # whose file the images need
         heated, chip = self.images("heated-*.hcc"), self.images("chip-*.npy")
         notes = yaml.safe_load((self.folder / "notes.yaml").read_text())
@@ -376,11 +348,11 @@ class Evaluation:
             reflected_temperature(293.0, ROOM),
         )
         return {
-            "blackbody": Found.of(unknown.estimate),
-            "emissivity of the body": Found.of(body.estimate),
-            "emissivity of the shear band": Found.of(shear_band.estimate),
+            "blackbody": found_of(unknown.estimate),
+            "emissivity of the body": found_of(body.estimate),
+            "emissivity of the shear band": found_of(shear_band.estimate),
             **self._spread(),
-            "temperature of the shear band": Found.of(hot.estimate),
+            "temperature of the shear band": found_of(hot.estimate),
         }
 
     def _spread(self):
@@ -397,6 +369,10 @@ class Evaluation:
         }
 
 
+def found_of(estimate):
+    return Found(float(estimate.values), float(estimate.expanded_uncertainty()))
+
+
 def kept(seed, folder=RESULTS):
     """Return truth, value and expanded uncertainty by quantity, computed or as they were kept."""
     path = folder / f"{seed}.json"
@@ -404,10 +380,10 @@ def kept(seed, folder=RESULTS):
         path.parent.mkdir(parents=True, exist_ok=True)
         laboratory = Laboratory(seed)
         reference = laboratory.reference()
-        with TemporaryDirectory() as name:
-            laboratory.perform(Path(name))
-            found = Evaluation(Path(name)).results()
-        rows = {one: (reference[one], found[one].value, found[one].expanded) for one in QUANTITIES}
+        with TemporaryDirectory() as files:
+            laboratory.perform(Path(files))
+            found = Evaluation(Path(files)).results()
+        rows = {name: (reference[name], *found[name]) for name in QUANTITIES}
         path.write_text(json.dumps(rows))
     return {name: tuple(values) for name, values in json.loads(path.read_text()).items()}
 

@@ -9,6 +9,7 @@ is a condition, such as 212.2-0.1 (m/min, mm); cells in um.
 """
 
 import sys
+from collections import namedtuple
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite, nan, radians
@@ -89,12 +90,8 @@ class Condition(NamedTuple):
         return f"{self.m_a_minute} m/min, {self.mm} mm"
 
 
-class Cut(NamedTuple):
-    """Measured values: forces of an unknown width in N, thickness in m."""
-
-    cutting_force: float
-    thrust_force: float
-    thickness: float
+Cut = namedtuple("Cut", "cutting_force thrust_force thickness")
+"""Measured values: forces of an unknown width in N, thickness in m."""
 
 
 def read_trials():
@@ -113,7 +110,6 @@ def repeats(trials):
 
 
 def mean(trials):
-    """Return the mean of the repeats."""
     names = ("cutting_force", "feed_force", "thickness")
     return Cut(*(fmean(getattr(trial, name) for trial in trials) for name in names))
 

@@ -39,7 +39,6 @@ def number(value, unit=""):
 
 
 def row(case, check):
-    """One line of the table."""
     unit = check.unit if check.absolute else ""
     difference, tolerance = (
         number(each, unit) if check.absolute else f"{each * 100:.2g} %"

@@ -1,7 +1,7 @@
 """A thick-walled cylinder that expands plastically, against Hill's limit pressure."""
 
+from collections import namedtuple
 from math import log, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -39,26 +39,17 @@ def rigid_plastic(duration=2e-6):
 
     stop = lambda _, state: state[1]  # noqa: E731
     stop.terminal = True
-    times = np.linspace(0.0, duration, 400)
-    solution = solve_ivp(
-        change, (0.0, duration), [INNER, START], t_eval=times, events=stop, rtol=1e-9
-    )
+    chosen = {"t_eval": np.linspace(0.0, duration, 400), "events": stop, "rtol": 1e-9}
+    solution = solve_ivp(change, (0.0, duration), [INNER, START], **chosen)
     return solution.t, *solution.y
 
 
-class Expansion(NamedTuple):
-    """Time (s) and swept area (m²) of an expansion; radii (m) and strains at its end; pressure.
+Expansion = namedtuple("Expansion", "time swept radius strain exact_strain pressure")
+"""Time (s) and swept area (m²) of an expansion; radii (m) and strains at its end; pressure.
 
-    The swept area is that of the bore, over π. The pressure (Pa) is the plastic work over the area
-    that the bore swept.
-    """
-
-    time: np.ndarray
-    swept: np.ndarray
-    radius: np.ndarray
-    strain: np.ndarray
-    exact_strain: np.ndarray
-    pressure: float
+The swept area is that of the bore, over π. The pressure (Pa) is the plastic work over the area
+that the bore swept.
+"""
 
 
 def expand(cell, duration, samples=40):

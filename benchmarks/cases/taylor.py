@@ -4,8 +4,8 @@ The solver is plane strain, published bars are round. So the peer in `peers/elem
 repeats a published round bar, then computes the plane one that the solver is compared with.
 """
 
+from collections import namedtuple
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator
@@ -41,19 +41,14 @@ def wall(x):
     return upright.surface._replace(x=x + upright.edge_radius, y=-1.0)
 
 
-class Shape(NamedTuple):
-    """A struck plate, in m from the foot: length, largest half width, and its side.
+Shape = namedtuple("Shape", "length foot side")
+"""A struck plate, in m from the foot: length, largest half width, and its side.
 
-    The side is distance from the foot and half width, shape (n, 2), from the foot on.
-    """
-
-    length: float
-    foot: float
-    side: np.ndarray
+The side is distance from the foot and half width, shape (n, 2), from the foot on.
+"""
 
 
 def strike(cell):
-    """The plate after the impact."""
     block = Block(
         (LENGTH, 2 * HALF), cell=cell, material=STEEL, tool=wall(LENGTH), margin=round(4e-3 / cell)
     )
@@ -78,7 +73,6 @@ def shape_of_points(block):
 
 
 def shape_of_nodes(struck):
-    """Shape of the peer's plate."""
     nodes = struck.nodes
     foot = nodes[:, 0, 1].min()
     side = np.stack([nodes[-1, :, 1] - foot, nodes[-1, :, 0]], axis=1)
@@ -104,7 +98,6 @@ def profile_difference(shape, other):
 
 
 def published_checks():
-    """The peer against the published round bar."""
     bar = peer(5, 50, ROUND_SPEED, True)
     shape = shape_of_nodes(bar)
     rows = (
@@ -177,7 +170,6 @@ def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
 
 
 def picture(axes, block, known):
-    """The plate's points by plastic strain, and the peer's outline."""
     p = block.points
     foot = p["x"].max() + block.spacing / 2
     x, y = (foot - p["x"]) / MILLI, (p["y"] - HALF) / MILLI

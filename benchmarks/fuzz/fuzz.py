@@ -42,7 +42,6 @@ NUMBER = re.compile(rb"[0-9][0-9.+\-eE]*")
 
 
 def damaged(content, other, random):
-    """The content with up to four changes."""
     data = bytearray(content)
     for _ in range(random.randint(1, 4)):
         # Headers decide what is allocated: half of the changes are made in the first 512 bytes.
@@ -100,7 +99,6 @@ def outcome_of(source):
 
 
 def fuzz(name, contents, cases, folder, escaped):
-    """Count the outcomes of damaged copies of one file."""
     counts, others = Counter(), list(contents.values())
     source, path = source_of(folder, name), folder / name
     for number in range(cases):
@@ -127,11 +125,8 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         contents = {name: (folder / name).read_bytes() for name in write_seeds(folder)}
-        chosen = [
-            name
-            for name in contents
-            if not given.only or Path(Path(name).parts[0]).suffix in given.only
-        ]
+        kinds = {name: Path(Path(name).parts[0]).suffix for name in contents}
+        chosen = [name for name in contents if not given.only or kinds[name] in given.only]
         print_head("file", *OUTCOMES, "ms a case")
         for name in chosen:
             read(source_of(folder, name))  # compiles what the forks then have

@@ -96,8 +96,16 @@ class _Words:
     def put(self, kinds, *values):
         self.content += struct.pack(self.order + kinds, *values)
 
+    def integers(self, values):
+        for value in values:
+            self.put("i", value)
+
+    def flagged(self, known, values):
+        """A flag, and values if it is set."""
+        self.integers([known, *values] if known else [0])
+
     def text(self, text):
-        self.put(f"{len(text) + 1}i", *text.encode(), 0)
+        self.integers([*text.encode(), 0])
 
     def remark(self, name, value):
         self.text(name)
@@ -116,9 +124,7 @@ def _header(words, zone, version):
     words.put("2idii", -1, zone.strand, zone.time, -1, kind)
     if version < 112:
         words.put("i", 0)  # blocks
-    words.put("i", int(any(zone.centred)))
-    if any(zone.centred):
-        words.put(f"{len(zone.centred)}i", *map(int, zone.centred))
+    words.flagged(any(zone.centred), zone.centred)
     if version >= 108:
         words.put("i", int(zone.raw_neighbours > 0))
     words.put("i", len(zone.neighbours) // 3)
@@ -126,7 +132,7 @@ def _header(words, zone, version):
         words.put("i", 0)
         if kind and version >= 108:
             words.put("i", 0)
-    words.put(f"{len(zone.shape)}i", *zone.shape)
+    words.integers(zone.shape)
     if kind:
         words.put("3i", 0, 0, 0)
     for name, value in zone.remarks.items():
@@ -137,21 +143,13 @@ def _header(words, zone, version):
 
 def _data(words, zone):
     words.put("f", 299.0)
-    count = len(zone.columns)
     stored = [column for column in zone.columns if isinstance(column, np.ndarray)]
-    formats = [
-        _FORMATS[column.dtype.str[1:]] if isinstance(column, np.ndarray) else 1
-        for column in zone.columns
-    ]
-    words.put(f"{count}i", *formats)
-    passive = [int(isinstance(column, str)) for column in zone.columns]
-    words.put("i", int(any(passive)))
-    if any(passive):
-        words.put(f"{count}i", *passive)
+    kinds = (getattr(getattr(column, "dtype", None), "str", "<f4") for column in zone.columns)
+    words.integers(_FORMATS[kind[1:]] for kind in kinds)
+    passive = [isinstance(column, str) for column in zone.columns]
+    words.flagged(any(passive), passive)
     shared = [column[1] if isinstance(column, tuple) else -1 for column in zone.columns]
-    words.put("i", int(max(shared) >= 0))
-    if max(shared) >= 0:
-        words.put(f"{count}i", *shared)
+    words.flagged(max(shared) >= 0, shared)
     words.put("i", zone.cells if isinstance(zone.cells, int) else -1)
     for column in stored:
         words.put("2d", float(column.min()), float(column.max()))
@@ -161,5 +159,5 @@ def _data(words, zone):
         return
     if zone.cells is not None:
         words.array(np.asarray(zone.cells, np.int32))
-    words.put(f"{zone.raw_neighbours}i", *[-1] * zone.raw_neighbours)
-    words.put(f"{len(zone.neighbours)}i", *zone.neighbours)
+    words.integers([-1] * zone.raw_neighbours)
+    words.integers(zone.neighbours)
