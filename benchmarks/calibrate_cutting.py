@@ -2,13 +2,11 @@
 
     python benchmarks/calibrate_cutting.py [--processes 2] [--markdown]
 
-The four cuts of the assessment of machining models whose forces are known, and the paper's, are
-computed at every point of a design; each cut takes minutes, all are kept in build/experiments. The
-edge radius of the four is not stated: it is fitted with them, and stands for rounding and wear.
-
-Quadratic surfaces through the logarithms of the results stand for the solver between the points.
-Forces, period and degree of segmentation are fitted together. Printed are all points, the best
-place with its differences, its uncertainty, and the principal axes of the covariance.
+The four cuts whose forces are known, and the paper's, are computed at every point of a design; each
+takes minutes, all are kept in build/experiments. Quadratic surfaces through the logarithms of the
+results stand for the solver between the points. Forces, period and degree of segmentation are
+fitted together. Printed are all points, the best place with its differences, its uncertainty, and
+the principal axes of the covariance.
 """
 
 import os

@@ -2,22 +2,21 @@
 
 python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--sub-frames 50] [--scene SCENE.nc]
 
-A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels, of three scenes of the same
-splines: temperature and emissivity given in memory; all fields in memory, the emissivity from
-textures and blend; and a file, looked at for the first time and again. Beside them are the bound,
-which is to read once what the pass needs, and the paper's Figure 6 in plain NumPy
-(tests/figure6.py) with a radiance table. The study is the paper's: nine instants, two chips, on the
-same file, or on that of a cut (`chipglow cache list` says where). An image is what a camera makes
-of a kept mean radiance; Pyxel also makes counts, if it is there (``pip install pyxel-sim``).
-
-Frames and studies are timed in turn; the best of the rounds counts. Processor time is that of all
-threads: it can be compared on a machine that others use too.
+A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels: temperature and emissivity
+given in memory, all fields in memory, and a file, looked at for the first time and again. Beside
+them are the bound, which is to read once what the pass needs, and the paper's Figure 6 in plain
+NumPy. The study is the paper's: nine instants, two chips, on the same file, or on that of a cut
+(`chipglow cache list` says where). An image is what a camera makes of a kept mean radiance; Pyxel
+also makes counts, if it is there (``pip install pyxel-sim``). Frames and studies are timed in turn;
+the best of the rounds counts. Processor time, that of all threads, can be compared on a shared
+machine.
 """
 
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from itertools import count, pairwise, product
 from pathlib import Path
@@ -72,10 +71,8 @@ class GivenSurface(Surface):
         self.values, self.times = values, times
 
     def prepare(self, scene, band=None, reflected=None):
-        return EmissivityField(self.of, frozenset())
-
-    def of(self, frame):
-        return self.values[np.argmin(np.abs(self.times - frame.time))]
+        nearest = lambda frame: np.argmin(np.abs(self.times - frame.time))  # noqa: E731
+        return EmissivityField(lambda frame: self.values[nearest(frame)], frozenset())
 
 
 def spline_frame(lattice, time):
@@ -283,14 +280,45 @@ def counted(radiance):
 
     calls = {"counts: chipglow": counts}
     if find_spec("pyxel"):
-        from peers.counts_pyxel import prepared_detector
-
-        kernel = camera.psf.kernel(camera.pitch)
-        digitise = prepared_detector(DETECTOR, DETECTOR.per_radiance(point), kernel)
+        kernel, per_radiance = camera.psf.kernel(camera.pitch), DETECTOR.per_radiance(point)
+        digitise = partial(counts_by_pyxel, per_radiance=per_radiance, kernel=kernel)
         calls["counts: Pyxel"] = lambda: digitise(integrate(radiance, RASTER, sensors, 1.0))
     else:
         print("Pyxel is not installed")
     return calls
+
+
+def counts_by_pyxel(radiance, per_radiance, kernel):
+    """Counts of elements by the models of Pyxel 3, without its runner."""
+    from pyxel.detectors import CMOS, Characteristics, CMOSGeometry, Environment
+    from pyxel.models.charge_collection import simple_collection
+    from pyxel.models.charge_generation import simple_conversion
+    from pyxel.models.charge_measurement import output_node_noise, simple_measurement
+    from pyxel.models.photon_collection import shot_noise
+    from pyxel.models.photon_collection.point_spread_function import apply_psf_2d
+    from pyxel.models.readout_electronics import simple_adc
+
+    rows, columns = radiance.shape
+    volts, efficiency = 1e-6, DETECTOR.response.quantum_efficiency  # volts of an electron
+    device = CMOS(
+        geometry=CMOSGeometry(row=rows, col=columns),
+        environment=Environment(),
+        characteristics=Characteristics(
+            quantum_efficiency=efficiency,
+            adc_bit_resolution=DETECTOR.bits,
+            adc_voltage_range=(0.0, volts * DETECTOR.full_well),
+        ),
+    )
+    device.set_readout(times=[10e-6])
+    photons = apply_psf_2d(radiance * (per_radiance / efficiency), kernel)
+    device.photon.array = photons.clip(min=0.0)  # The transform leaves some under 0.
+    shot_noise(device)
+    simple_conversion(device)
+    simple_collection(device)
+    simple_measurement(device, gain=volts)
+    output_node_noise(device, std_deviation=volts * READ_NOISE)
+    simple_adc(device)
+    return device.image.array
 
 
 def apart(image, expected):

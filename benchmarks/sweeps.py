@@ -3,9 +3,8 @@
     python benchmarks/sweeps.py [--tasks N] [--points N] [--kills N]
 
 Overhead and efficiency: tasks that sleep 0.2 s, so that other programs on the machine do not count.
-Kills: points of a small scene on a scheduler and two workers in processes of their own. At random
-times a worker, the scheduler or the client is killed (SIGKILL) and started again. The files of the
-points are compared with those of a run in one process, and computations are counted.
+Kills: at random times a worker, the scheduler or the client is killed (SIGKILL) and started again.
+The files of the points are compared with those of one process, and computations are counted.
 """
 
 import os

@@ -3,11 +3,10 @@
     python benchmarks/synthetic_laboratory.py [--first 0] [--repeats 100] [--markdown]
     python benchmarks/synthetic_laboratory.py --first 0 --write FOLDER
 
-Of each seed a laboratory with hidden optics, emissivities and detector writes the files of an
-experiment: blackbodies, uniform frames, a heated chip, knife edges, a hot chip. The procedures see
-only the files, and what a person would have noted. What they recover is set beside the truth: it
-shall be in their own 95 % interval in 95 of 100 repeats, and must be in 90. A repeat takes
-seconds; its results are kept in build/synthetic-laboratory, so that an interrupted run goes on.
+A laboratory with hidden optics, emissivities and detector, drawn from a seed, writes the files of
+an experiment. The procedures see only these, and what a person would have noted. What they recover
+shall be in their own 95 % interval in 95 of 100 repeats, and must be in 90. A repeat takes seconds;
+its results are kept in build/synthetic-laboratory, so that an interrupted run goes on.
 """
 
 import json

@@ -2,11 +2,10 @@
 
     python benchmarks/fuzz/fuzz.py [--cases 100000] [--only .vtu .npz]
 
-Files of every format are damaged: cut, bytes changed, numbers made huge, parts repeated, removed or
-exchanged with another file. Each is read in a fork of this process, with limits of memory and time
-as the product sets them. Whatever is no plain refusal is read once more the way the product does,
-in `chipglow.io.sandbox`, and has to end in one `SourceError` there (three of a kind and file).
-After 50 hangs a file is left. The command fails if a case is not contained. Linux only.
+Files of every format are damaged, and each is read in a fork of this process, with limits of memory
+and time as the product sets them. Whatever is no plain refusal is read once more the way the
+product does, in `chipglow.io.sandbox`, and has to end in one `SourceError` there (three of a kind
+and file). After 50 hangs a file is left. The command fails if a case is not contained. Linux only.
 """
 
 import gc
