@@ -70,8 +70,12 @@ def surface(points, triangles):
 def probe(points, triangles, values):
     mesh = surface(points, triangles)
     mesh.point_data["t"] = values
-    size, spacing = (RASTER.columns, RASTER.rows, 1), (RASTER.spacing, RASTER.spacing, 1.0)
-    sampled = pyvista.ImageData(size, spacing, (RASTER.x[0], RASTER.y[-1], 0.0)).sample(mesh)
+    grid = pyvista.ImageData(
+        dimensions=(RASTER.columns, RASTER.rows, 1),
+        spacing=(RASTER.spacing, RASTER.spacing, 1.0),
+        origin=(RASTER.x[0], RASTER.y[-1], 0.0),
+    )
+    sampled = grid.sample(mesh)
     found = np.where(sampled.point_data["vtkValidPointMask"], sampled.point_data["t"], np.nan)
     return found.reshape(RASTER.shape)[::-1].astype(np.float32)
 
