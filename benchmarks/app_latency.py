@@ -4,10 +4,9 @@
 
 Presses keys on the sliders of a page in headless Chromium, as fast as pictures come. Each time is
 from the key's event to the frame of the screen after the new image was there, by the browser's
-clock: the first picture, which of a large scene is a quick look on fewer samples, the curves along
-its lines, which follow its images, and the exact picture where the hand rests. Then how long the
-command took to the first exact picture, in a browser that was open, and the memory of the server
-beside that of the scene's own splines or samples.
+clock: the first picture, which may be a quick look, the curves along its lines, and the exact
+picture where the hand rests. Then how long the command took to the first exact picture, and the
+memory of the server beside that of the scene's own splines or samples.
 """
 
 import os
@@ -21,14 +20,14 @@ import numpy as np
 from common import arguments
 
 CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
-FLAGS = (
+FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
-)  # fmt: skip
-CONTROLS = (
+]  # fmt: skip
+CONTROLS = [
     "Exposure begins", "Band from", "Pixel pitch", "Exposure", "Numerical aperture",
     "Noise (NETD)", "Lower range limit", "Seed",
-)  # fmt: skip
+]  # fmt: skip
 WATCH = """() => {
   const log = (window.chipglowLog = { asked: 0, shown: 0, first: [], lines: [], fresh: false });
   addEventListener("keydown", (event) => { log.asked = event.timeStamp; log.fresh = true; }, true);
@@ -53,14 +52,11 @@ WATCH = """() => {
 
 
 def main():
-    """Print the table."""
-    given = arguments(
-        __doc__, scene=Path, turns=40, controls=list(CONTROLS), chromium=CHROMIUM or str
-    )
+    given = arguments(__doc__, scene=Path, turns=40, controls=CONTROLS, chromium=CHROMIUM or str)
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=given.chromium, args=list(FLAGS))
+        browser = playwright.chromium.launch(executable_path=given.chromium, args=FLAGS)
         scene = [str(given.scene)] if given.scene else []
         command = [sys.executable, "-m", "chipglow", "app", "--no-browser", *scene]
         begun = time.perf_counter()
@@ -115,7 +111,9 @@ def report(times, opened, process, scene):
     first, lines = (np.concatenate([one[part] for one in times.values()]) for part in (0, 1))
     print(f"{'all':26}{row(first, lines)}")
     print(f"opened, with the process: {opened:.1f} s; load {os.getloadavg()[0]:.1f}")
-    print(f"memory: {resident(process) / 1e6:.0f} MB resident; {own(scene)}")
+    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    resident = pages * os.sysconf("SC_PAGE_SIZE")
+    print(f"memory: {resident / 1e6:.0f} MB resident; {own(scene)}")
 
 
 def row(first, lines):
@@ -123,12 +121,6 @@ def row(first, lines):
     middle, late, most = np.percentile(first, (50, 95, 100))
     drawn = f"{np.percentile(lines, 95):.0f}" if len(lines) else "-"
     return f"{len(first):7}{middle:9.0f}{late:9.0f}{most:9.0f}{drawn:>9}"
-
-
-def resident(process):
-    """Bytes of a process that are in memory."""
-    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 def own(path):

@@ -2,32 +2,26 @@
 
     python benchmarks/calibrate_cutting.py [--processes 2] [--markdown]
 
-The four cuts of the assessment of machining models whose forces are known, and the paper's, are
-computed at every point of a design; each cut takes minutes, all are kept in build/experiments. The
-edge radius of the four is not stated: it is fitted with them, and stands for rounding and wear.
-
-Quadratic surfaces through the logarithms of the results stand for the solver between the points.
-Forces, period and degree of segmentation are fitted together. Printed are all points, the best
-place with its differences, its uncertainty, and the principal axes of the covariance.
+The four cuts whose forces are known, and the paper's, are computed at every point of a design; each
+takes minutes, all are kept in build/experiments. Quadratic surfaces through the logarithms of the
+results stand for the solver between the points. Forces, period and degree of segmentation are
+fitted together. Printed are all points, the best place with its differences, its uncertainty, and
+the principal axes of the covariance.
 """
 
-import argparse
 import os
-from collections.abc import Iterable
+from collections import namedtuple
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from math import exp, log, sqrt
+from math import exp, isnan, log, sqrt
 from multiprocessing import get_context
-from typing import TypeAlias
 
 import numpy as np
-from experiments import Experiment, Means, aligned, markdown, means_of, read_experiments
-from numpy.typing import NDArray
+from common import arguments, minus, print_tables
+from experiments import means_of, read_experiments
 from scipy.optimize import minimize
 
-from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation, workpiece
-
-Array: TypeAlias = NDArray[np.float64]
+from chipglow.cutting import AISI_1045, SOLVER_VERSION, workpiece
 
 CELL = 14e-6
 LENGTHS = {"amm-200-0.15": 1.4e-3, "amm-200-0.30": 2.0e-3, "paper": 2.8e-3}
@@ -53,7 +47,7 @@ class Range:
     low: float
     high: float
 
-    def at(self, place: float) -> float:
+    def at(self, place):
         """Return the value in SI at a place from -1 to 1."""
         return self.scale * exp(log(self.low) + 0.5 * (place + 1) * log(self.high / self.low))
 
@@ -72,53 +66,39 @@ BASE = {"d1": 0.006, "d2": 0.08}
 STRESSES = ("athermal_stress", "thermal_stress", "hardening")
 
 
-def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulation:
-    """Return a cut at a place of the design."""
+def simulation(experiment, place):
     strength, onset, d3, loss, energy, friction, edge = (
         one.at(part) for one, part in zip(RANGES, place, strict=True)
     )
     length = next(value for name, value in LENGTHS.items() if experiment.name.startswith(name))
     cut = experiment.simulation(CELL, length)
-    law, damage = LAW, AISI_1045.damage
-    assert damage is not None
-    law = replace(law, **{name: strength * getattr(law, name) for name in STRESSES})
-    damage = replace(
-        damage,
-        **{name: onset * value for name, value in BASE.items()},
-        d3=-d3,
-        loss=loss,
-        fracture_energy=energy,
-    )
-    steel = replace(AISI_1045, flow_stress=law, damage=damage)
-    tool = cut.tool if experiment.name == "paper" else replace(cut.tool, edge_radius=edge)
+    law = replace(LAW, **{name: strength * getattr(LAW, name) for name in STRESSES})
+    changed = {name: onset * value for name, value in BASE.items()}
+    damage = replace(AISI_1045.damage, **changed, d3=-d3, loss=loss, fracture_energy=energy)
     return replace(
-        cut, workpiece=steel, tool=tool, friction=replace(cut.friction, coefficient=friction)
+        cut,
+        workpiece=replace(AISI_1045, flow_stress=law, damage=damage),
+        tool=cut.tool if experiment.name == "paper" else replace(cut.tool, edge_radius=edge),
+        friction=replace(cut.friction, coefficient=friction),
     )
 
 
-def compute(task: tuple[Experiment, tuple[float, ...]]) -> Means:
-    """Return the means of a cut at a place, stored or computed."""
+def compute(task):
     experiment, place = task
     return means_of(simulation(experiment, place), f"fit-{experiment.name}")
 
 
-def design() -> list[tuple[float, ...]]:
+def design():
     """Return the design: the middle, then each number alone below and above it."""
     axes = np.eye(len(RANGES)) * AXIAL
     return [(0.0,) * len(RANGES), *(tuple(sign * axis) for axis in axes for sign in (-1, 1))]
 
 
-@dataclass(frozen=True)
-class Observation:
-    """A cut's quantity, its measured value and relative standard uncertainty."""
-
-    cut: str
-    quantity: str
-    value: float
-    uncertainty: float
+Observation = namedtuple("Observation", "cut quantity value uncertainty")
+"""A cut's quantity, its measured value and relative standard uncertainty."""
 
 
-def observations(experiments: Iterable[Experiment]) -> list[Observation]:
+def observations(experiments):
     """Return the measured forces of the four cuts, period and degree of the paper's."""
     forces = [
         Observation(one.name, entry.quantity, entry.value, UNCERTAINTIES[entry.quantity])
@@ -129,7 +109,7 @@ def observations(experiments: Iterable[Experiment]) -> list[Observation]:
     return [*forces, *(Observation("paper", name, *value) for name, value in PAPER.items())]
 
 
-def terms(places: Array) -> Array:
+def terms(places):
     """Return the terms of a surface: one, each number, each squared; (n, 1 + 2 numbers)."""
     return np.column_stack([np.ones(len(places)), places, places**2])
 
@@ -138,15 +118,15 @@ def terms(places: Array) -> Array:
 class Fit:
     """Quadratic surfaces through the logarithms of what is observed, without products of numbers.
 
-    `weights` has the shape (terms, observations); `scatter` is the standard deviation of each.
+    `scatter` is the standard deviation of each observation.
     """
 
-    observed: list[Observation]
-    weights: Array
-    scatter: Array
+    observed: list
+    weights: np.ndarray  # (terms, observations)
+    scatter: np.ndarray
 
     @classmethod
-    def through(cls, places: Array, values: Array, observed: list[Observation]) -> "Fit":
+    def through(cls, places, values, observed):
         """Fit computed values of shape (places, observations) by least squares."""
         basis, logs = terms(places), np.log(values)
         weights, scatter = [], []
@@ -158,64 +138,48 @@ class Fit:
             scatter.append(np.sqrt((residuals**2).sum() / free))
         return cls(observed, np.transpose(weights), np.array(scatter))
 
-    def logs(self, place: Array) -> Array:
-        """Return the logarithms of the quantities at a place."""
-        return np.asarray(terms(place[None])[0] @ self.weights)
+    def logs(self, place):
+        return terms(place[None])[0] @ self.weights
 
-    def differences(self, place: Array) -> Array:
+    def differences(self, place):
         """Return differences of the logarithms over their uncertainty and the surfaces' scatter."""
         measured = np.log([one.value for one in self.observed])
         widths = np.hypot([one.uncertainty for one in self.observed], self.scatter)
-        return np.asarray((self.logs(place) - measured) / widths)
+        return (self.logs(place) - measured) / widths
 
-    def best_place(self) -> Array:
+    def best_place(self):
         """Return the place of least squares of the differences within the ranges."""
-        results = [
-            minimize(
-                lambda place: float((self.differences(place) ** 2).sum()),
-                np.array(start),
-                bounds=[(-1.0, 1.0)] * len(RANGES),
-            )
-            for start in design()
-        ]
-        return np.asarray(min(results, key=lambda result: result.fun).x)
+        squares = lambda place: float((self.differences(place) ** 2).sum())  # noqa: E731
+        within = [(-1.0, 1.0)] * len(RANGES)
+        results = [minimize(squares, np.array(start), bounds=within) for start in design()]
+        return min(results, key=lambda result: result.fun).x
 
-    def covariance_at(self, place: Array) -> Array:
+    def covariance_at(self, place):
         """Return the covariance of the numbers' logarithms, by observations and ranges.
 
         A range counts as a rectangular distribution: from -1 to 1 its variance is 1/3.
         """
-        step = 1e-4
-        slopes = np.array(
-            [
-                self.differences(place + axis) - self.differences(place - axis)
-                for axis in step * np.eye(len(RANGES))
-            ]
-        ) / (2 * step)
+        axes = 1e-4 * np.eye(len(RANGES))
+        rises = [self.differences(place + one) - self.differences(place - one) for one in axes]
+        slopes = np.array(rises) / 2e-4
         covariance = np.linalg.inv(slopes @ slopes.T + 3.0 * np.eye(len(RANGES)))
         half = np.array([0.5 * log(one.high / one.low) for one in RANGES])
-        return np.asarray(covariance * np.outer(half, half))
+        return covariance * np.outer(half, half)
 
 
-def computed(
-    experiments: list[Experiment], places: list[tuple[float, ...]], processes: int
-) -> list[dict[str, Means]]:
-    """Return the means of every cut at every place; the paper's edge radius is fixed."""
+def computed(experiments, places, processes):
+    """Return the means of every cut by name at every place; the paper's edge radius is fixed."""
     tasks = [
         (one, (*place[:-1], 0.0) if one.name == "paper" else place)
         for place in places
         for one in experiments
     ]
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        means = list(pool.map(compute, tasks))
-    size = len(experiments)
-    return [
-        {one.name: mean for one, mean in zip(experiments, means[k : k + size], strict=True)}
-        for k in range(0, len(means), size)
-    ]
+        means = pool.map(compute, tasks)
+        return [{one.name: next(means) for one in experiments} for _ in places]
 
 
-def best_table(fit: Fit, place: Array) -> list[list[str]]:
+def best_table(fit, place):
     """Return the table of what the surfaces predict at a place, and their scatter."""
     rows = [["cut", "quantity", "predicted over measured / %", "scatter of the surface / %"]]
     for one, value, scatter in zip(fit.observed, fit.logs(place), fit.scatter, strict=True):
@@ -224,57 +188,45 @@ def best_table(fit: Fit, place: Array) -> list[list[str]]:
     return rows
 
 
-def number_table(place: Array, covariance: Array) -> list[list[str]]:
+def number_table(place, covariance):
     """Return the table of fitted numbers, standard uncertainties and correlations."""
     deviations = np.sqrt(np.diag(covariance))
     correlations = covariance / np.outer(deviations, deviations)
     numbers = [str(k + 1) for k in range(len(RANGES))]
     rows = [["number", "range", "best", "standard uncertainty / %", *numbers]]
     for k, one in enumerate(RANGES):
-        rows.append(
-            [
-                f"{one.name} {f'/ {one.unit}' if one.unit else ''}".strip(),
-                f"{one.low:g} to {one.high:g}",
-                f"{one.at(place[k]) / one.scale:.3g}",
-                f"{100 * deviations[k]:.0f}",
-                *(f"{value:+.2f}".replace("-", "−") for value in correlations[k]),
-            ]
-        )
+        name = f"{one.name} / {one.unit}" if one.unit else one.name
+        best = f"{one.at(place[k]) / one.scale:.3g}"
+        row = [name, f"{one.low:g} to {one.high:g}", best, f"{100 * deviations[k]:.0f}"]
+        rows.append([*row, *(minus(f"{value:+.2f}") for value in correlations[k])])
     return rows
 
 
-def valley_table(covariance: Array) -> list[list[str]]:
+def valley_table(covariance):
     """Return the table of the principal axes of the covariance."""
     squares, axes = np.linalg.eigh(covariance)
     rows = [["axis", "standard deviation / %", *(one.name for one in RANGES)]]
     for k in range(len(squares) - 1, -1, -1):
         length = sqrt(squares[k])
-        along = [f"{100 * length * part:+.0f} %".replace("-", "−") for part in axes[:, k]]
+        along = [minus(f"{100 * length * part:+.0f} %") for part in axes[:, k]]
         rows.append([f"{len(squares) - k}", f"{100 * length:.0f}", *along])
     return rows
 
 
-def run_table(
-    places: list[tuple[float, ...]], runs: list[dict[str, Means]], observed: list[Observation]
-) -> list[list[str]]:
+def run_table(places, runs, observed):
     """Return the table of all places: numbers and differences from measured values."""
     heads = [f"{one.cut} {one.quantity.split('_')[0]}" for one in observed]
     rows = [[*(one.name for one in RANGES), *heads, "degree of the paper's / %"]]
     for place, run in zip(places, runs, strict=True):
         numbers = [f"{r.at(p) / r.scale:.3g}" for r, p in zip(RANGES, place, strict=True)]
         here = [getattr(run[one.cut], one.quantity) / one.value - 1 for one in observed]
-        texts = [
-            "–" if value != value else f"{100 * value:+.0f} %".replace("-", "−") for value in here
-        ]
+        texts = ["–" if isnan(value) else minus(f"{100 * value:+.0f} %") for value in here]
         rows.append([*numbers, *texts, f"{100 * run['paper'].degree:.0f}"])
     return rows
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--processes", type=int, default=2, help="cuts at a time, one thread each")
-    parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
-    given = parser.parse_args()
+def main():
+    given = arguments(__doc__, processes=2, markdown=False)
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     experiments = [
         one
@@ -288,12 +240,10 @@ def main() -> None:
     fit = Fit.through(np.array(places), np.array(values, dtype=np.float64), observed)
     best = fit.best_place()
     covariance = fit.covariance_at(best)
-    table = markdown if given.markdown else aligned
-    print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.\n")
-    print(f"{table(run_table(places, runs, observed))}\n")
-    print(f"{table(best_table(fit, best))}\n")
-    print(f"{table(number_table(best, covariance))}\n")
-    print(table(valley_table(covariance)))
+    print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.")
+    tables = run_table(places, runs, observed), best_table(fit, best)
+    tables = *tables, number_table(best, covariance), valley_table(covariance)
+    print_tables(tables, given.markdown)
 
 
 if __name__ == "__main__":

@@ -2,24 +2,21 @@
 
 python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--sub-frames 50] [--scene SCENE.nc]
 
-A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels, of three scenes of the same
-splines, as smooth as those of a cut with cells of 10 um: temperature and emissivity given in
-memory; all fields in memory, the emissivity from textures and blend; and a file, looked at for the
-first time and again. Beside them the bound, which is to read once what the pass needs, and the
-paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table. The study is the paper's:
-nine instants, two chips, on the same file, or on that of a cut (`chipglow cache list` says where).
-An image is what a camera makes of a kept mean radiance, as SciPy does too; Pyxel also makes counts,
-if it is there (``pip install pyxel-sim``).
-
-All are timed in one run, frames and studies in turn, each after a call that is not timed; the best
-of the rounds counts. Processor time is that of all threads: it is what can be compared on a machine
-that others use too.
+A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels: temperature and emissivity
+given in memory, all fields in memory, and a file, looked at for the first time and again. Beside
+them are the bound, which is to read once what the pass needs, and the paper's Figure 6 in plain
+NumPy. The study is the paper's: nine instants, two chips, on the same file, or on that of a cut
+(`chipglow cache list` says where). An image is what a camera makes of a kept mean radiance; Pyxel
+also makes counts, if it is there (``pip install pyxel-sim``). Frames and studies are timed in turn;
+the best of the rounds counts. Processor time, that of all threads, can be compared on a shared
+machine.
 """
 
 import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from itertools import count, pairwise, product
 from pathlib import Path
@@ -65,27 +62,17 @@ DETECTOR = Detector(
     bits=14,
     terms=(ShotNoise(), ReadNoise(standard_deviation=READ_NOISE)),
 )
-BORDER, LEAST = 12, 573.15  # pixels and K: images are compared within and above
+INNER, LEAST = (slice(12, -12),) * 2, 573.15  # pixels, and K: images are compared within and above
 LIMITS = {"temperature": (293.0, 1100.0), "plastic_strain": (0.0, 3.0)}
 
 
 class GivenSurface(Surface):
-    """A surface with given emissivities."""
-
     def __init__(self, values, times):
         self.values, self.times = values, times
 
     def prepare(self, scene, band=None, reflected=None):
-        return EmissivityField(self.of, frozenset())
-
-    def of(self, frame):
-        return self.values[np.argmin(np.abs(self.times - frame.time))]
-
-
-def lattice_of(raster):
-    """Return nodes around a raster, with a tool in its corner."""
-    in_tool = ToolGeometry().signed_distance(*np.meshgrid(raster.x, raster.y)) < 0.0
-    return Lattice.within(raster, (-0.8e-3, -0.6e-3), CELL, in_tool, 293.15)
+        nearest = lambda frame: np.argmin(np.abs(self.times - frame.time))  # noqa: E731
+        return EmissivityField(lambda frame: self.values[nearest(frame)], frozenset())
 
 
 def spline_frame(lattice, time):
@@ -114,8 +101,9 @@ def spline_frame(lattice, time):
 
 
 def stored_scene(path, instants, sub_frames):
-    """Write the file of the scene."""
-    lattice = lattice_of(RASTER)
+    """Write the file of the scene, on nodes around its raster with a tool in its corner."""
+    in_tool = ToolGeometry().signed_distance(*np.meshgrid(RASTER.x, RASTER.y)) < 0.0
+    lattice = Lattice.within(RASTER, (-0.8e-3, -0.6e-3), CELL, in_tool, 293.15)
     with SceneWriter(path, RASTER, ToolGeometry(), lattice=lattice) as writer:
         for index in range(instants * sub_frames):
             time = index * CAMERA.integration_time / sub_frames
@@ -128,25 +116,6 @@ def open_cold(path):
         with path.open("rb") as file:
             os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
     return open_scene(path)
-
-
-def arrays_of(scene, names, sub_frames):
-    """Return fields of the first sub-frames as contiguous arrays."""
-    return {n: np.stack([scene.field(n, i) for i in range(sub_frames)]) for n in names}
-
-
-def table_radiance():
-    """Return Equation 1 by `numpy.interp` in a table of 0.25 K."""
-    nodes = np.arange(250.0, 2000.0, 0.25)
-    values = CAMERA.band.radiance(nodes)
-    return lambda temperature: np.interp(temperature, nodes, values)
-
-
-def scipy_image(radiance, kernel):
-    """Form an image in the optics' order by SciPy: a convolution and means of 9 x 9."""
-    reach = kernel.shape[0] // 2
-    blurred = fftconvolve(np.pad(radiance, reach, mode="edge"), kernel, mode="valid")
-    return blurred.reshape(90, 9, 100, 9).mean(axis=(1, 3))
 
 
 @numba.njit(nogil=True, fastmath=True)
@@ -170,7 +139,6 @@ def read_once(arrays):
 
 
 def study(scene, instants):
-    """Measure both chips at instants over a scene, as in the paper's study."""
     camera = Camera.paper()
     fields = [camera.prepare(chip, scene) for chip in (CHIP_1, CHIP_2)]
     starts = spread_starts(scene, camera.integration_time, instants)
@@ -179,7 +147,6 @@ def study(scene, instants):
 
 
 def main():
-    """Print the tables."""
     given = arguments(__doc__, rounds=7, instants=9, sub_frames=50, scene=Path)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.nc"
@@ -192,9 +159,9 @@ def main():
 
 
 def compare_frames(path, rounds, sub_frames):
-    """Time one frame and return its exposure."""
     stored = open_scene(path)
-    arrays, times = arrays_of(stored, NEEDED, sub_frames), stored.times[:sub_frames]
+    arrays = {n: np.stack([stored.field(n, i) for i in range(sub_frames)]) for n in NEEDED}
+    times = stored.times[:sub_frames]
     whole = Scene.from_fields(RASTER, times, arrays)
     textured = CHIP_1.prepare(stored)
     frames = stored.frames(range(sub_frames), NEEDED)
@@ -202,9 +169,11 @@ def compare_frames(path, rounds, sub_frames):
     given = {name: arrays[name] for name in ("temperature", "material")}
     plain, surface = Scene.from_fields(RASTER, times, given), GivenSurface(emissivity, times)
     kernel = CAMERA.psf.view_kernel(CAMERA.pitch, 90, 100)
-    table = table_radiance()
+    nodes = np.arange(250.0, 2000.0, 0.25)
+    values = CAMERA.band.radiance(nodes)
 
     def literal():
+        table = lambda kelvins: np.interp(kelvins, nodes, values)  # noqa: E731
         fields = arrays["temperature"], emissivity
         return figure_6(*fields, table, CAMERA.band.temperature, kernel)
 
@@ -222,34 +191,32 @@ def compare_frames(path, rounds, sub_frames):
     )
     found = CAMERA.measure(plain, surface, 0.0).radiance_temperature()[0]
     difference = np.nanmax(np.abs(found - literal()))
-    samples = RASTER.rows * RASTER.columns * sub_frames
-    bits = 8 * path.stat().st_size / (RASTER.rows * RASTER.columns * len(stored))
-    print(
-        f"\n{sub_frames} sub-frames of 810 x 900 to 90 x 100; {bits:.2f} bits a sample in the file;"
-    )
+    samples = RASTER.rows * RASTER.columns
+    bits = 8 * path.stat().st_size / samples / len(stored)
+    print(f"\n{sub_frames} sub-frames of 810 x 900 to 90 x 100; ", end="")
+    print(f"{bits:.2f} bits a sample in the file;")
     print(f"Figure 6 differs by {difference * 1e3:.3f} mK\n")
     print(f"{'':50}{'wall ms':>10}{'processor ms':>14}{'ns/sample':>11}")
     for name, (wall, busy) in best.items():
-        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}{busy / samples * 1e9:11.2f}")
+        print_times(name, wall, busy, f"{busy / samples / sub_frames * 1e9:11.2f}")
     return CAMERA.expose(stored, CHIP_1, 0.0)
 
 
 def compare_studies(path, instants, rounds):
-    """Time all frames of the paper's study."""
     kept = open_scene(path)
-    raster = kept.raster
-    print(
-        f"\n{instants} instants x 2 chips, {len(kept)} frames of {raster.rows} x {raster.columns}"
-    )
-    best = best_of(
-        {
-            "study: first look": lambda: study(open_cold(path), instants),
-            "study: again": lambda: study(kept, instants),
-        },
-        min(rounds, 3),
-    )
-    for name, (wall, busy) in best.items():
-        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}")
+    size = f"{kept.raster.rows} x {kept.raster.columns}"
+    print(f"\n{instants} instants x 2 chips, {len(kept)} frames of {size}")
+    calls = {
+        "study: first look": lambda: study(open_cold(path), instants),
+        "study: again": lambda: study(kept, instants),
+    }
+    best = best_of(calls, min(rounds, 3))
+    for name, times in best.items():
+        print_times(name, *times)
+
+
+def print_times(name, wall, busy, more=""):
+    print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}{more}")
 
 
 def compare_images(kept, rounds):
@@ -259,8 +226,7 @@ def compare_images(kept, rounds):
     # Not in turn: of so many point spread functions the oldest would be forgotten.
     print(f"{'':50}{'wall ms':>10}{'processor ms':>14}")
     for name, call in {**new_images(kept), **images, **counts}.items():
-        wall, busy = best_of({name: call}, rounds)[name]
-        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}")
+        print_times(name, *best_of({name: call}, rounds)[name])
     ours, scipy = (call() for call in images.values())
     print("image: SciPy apart in K: rms {:.4f}, most {:.4f}".format(*apart(scipy, ours)))
     if "counts: Pyxel" in counts:
@@ -291,9 +257,15 @@ def same_images(radiance):
     """Return calls that form the image behind a Gaussian on square pixels."""
     camera = replace(CAMERA, psf_order="optics")
     kernel = camera.psf.kernel(RASTER.spacing)
+
+    def by_scipy():
+        padded = np.pad(radiance, kernel.shape[0] // 2, mode="edge")
+        blurred = fftconvolve(padded, kernel, mode="valid")
+        return blurred.reshape(90, 9, 100, 9).mean(axis=(1, 3))
+
     return {
         "image: chipglow": lambda: camera.form_image(radiance, RASTER),
-        "image: SciPy": lambda: scipy_image(radiance, kernel),
+        "image: SciPy": by_scipy,
     }
 
 
@@ -308,30 +280,58 @@ def counted(radiance):
 
     calls = {"counts: chipglow": counts}
     if find_spec("pyxel"):
-        from peers.counts_pyxel import prepared_detector
-
-        kernel = camera.psf.kernel(camera.pitch)
-        digitise = prepared_detector(DETECTOR, DETECTOR.per_radiance(point), kernel)
+        kernel, per_radiance = camera.psf.kernel(camera.pitch), DETECTOR.per_radiance(point)
+        digitise = partial(counts_by_pyxel, per_radiance=per_radiance, kernel=kernel)
         calls["counts: Pyxel"] = lambda: digitise(integrate(radiance, RASTER, sensors, 1.0))
     else:
         print("Pyxel is not installed")
     return calls
 
 
+def counts_by_pyxel(radiance, per_radiance, kernel):
+    """Counts of elements by the models of Pyxel 3, without its runner."""
+    from pyxel.detectors import CMOS, Characteristics, CMOSGeometry, Environment
+    from pyxel.models.charge_collection import simple_collection
+    from pyxel.models.charge_generation import simple_conversion
+    from pyxel.models.charge_measurement import output_node_noise, simple_measurement
+    from pyxel.models.photon_collection import shot_noise
+    from pyxel.models.photon_collection.point_spread_function import apply_psf_2d
+    from pyxel.models.readout_electronics import simple_adc
+
+    rows, columns = radiance.shape
+    volts, efficiency = 1e-6, DETECTOR.response.quantum_efficiency  # volts of an electron
+    device = CMOS(
+        geometry=CMOSGeometry(row=rows, col=columns),
+        environment=Environment(),
+        characteristics=Characteristics(
+            quantum_efficiency=efficiency,
+            adc_bit_resolution=DETECTOR.bits,
+            adc_voltage_range=(0.0, volts * DETECTOR.full_well),
+        ),
+    )
+    device.set_readout(times=[10e-6])
+    photons = apply_psf_2d(radiance * (per_radiance / efficiency), kernel)
+    device.photon.array = photons.clip(min=0.0)  # The transform leaves some under 0.
+    shot_noise(device)
+    simple_conversion(device)
+    simple_collection(device)
+    simple_measurement(device, gain=volts)
+    output_node_noise(device, std_deviation=volts * READ_NOISE)
+    simple_adc(device)
+    return device.image.array
+
+
 def apart(image, expected):
     """Return RMS and largest difference of radiance temperature in K."""
-    inner = (slice(BORDER, -BORDER),) * 2
-    found, ours = (CAMERA.band.temperature(one[inner]) for one in (image, expected))
+    found, ours = (CAMERA.band.temperature(one[INNER]) for one in (image, expected))
     differences = np.abs(found - ours)[ours > LEAST]
     return np.sqrt(np.mean(differences**2)), differences.max()
 
 
 def counts_apart(calls):
     """Return the RMS difference of counts over the standard deviation expected from noise."""
-    inner = (slice(BORDER, -BORDER),) * 2
-    ours, theirs = (
-        calls[f"counts: {name}"]()[inner].astype(float) for name in ("chipglow", "Pyxel")
-    )
+    counts = (calls[f"counts: {name}"]() for name in ("chipglow", "Pyxel"))
+    ours, theirs = (one[INNER].astype(float) for one in counts)
     gain = DETECTOR.conversion_gain
     noise = np.sqrt(2 * (gain * ours + (gain * READ_NOISE) ** 2 + 1 / 12))
     return np.sqrt(np.mean(((theirs + 0.5 - ours) / noise) ** 2))

@@ -6,16 +6,21 @@ from time import perf_counter, process_time
 import numpy as np
 
 
-def arguments(text, **defaults):
+def arguments(text, given=None, /, **defaults):
     """Parse options whose defaults tell their type; a list takes any number of values.
 
-    ``names=None`` takes words without an option, and a type instead of a default has none.
+    ``names=None`` takes words without an option, a tuple such words or numbers, all by default;
+    words have to be of the tuple. A type instead of a default has none.
     """
     parser = ArgumentParser(description=text, formatter_class=RawDescriptionHelpFormatter)
     for name, default in defaults.items():
         option = f"--{name.replace('_', '-')}"
         if default is None:
             parser.add_argument(name, nargs="*")
+        elif isinstance(default, tuple):
+            kind = type(default[0])
+            known = default if kind is str else None
+            parser.add_argument(name, nargs="*", type=kind, choices=known)
         elif isinstance(default, bool):
             parser.add_argument(option, action="store_true")
         elif isinstance(default, list):
@@ -25,7 +30,11 @@ def arguments(text, **defaults):
             parser.add_argument(option, type=default)
         else:
             parser.add_argument(option, type=type(default), default=default)
-    return parser.parse_args()
+    found = parser.parse_args(given)
+    for name, default in defaults.items():
+        if isinstance(default, tuple) and not getattr(found, name):
+            setattr(found, name, default)
+    return found
 
 
 def print_head(*heads):
@@ -39,6 +48,25 @@ def print_row(*cells):
     print(f"| {' | '.join(cells)} |", flush=True)
 
 
+def print_tables(tables, markdown=False):
+    """Print tables whose rows are texts, a head first: as Markdown, or in columns."""
+    for head, *rows in tables:
+        print()
+        if markdown:
+            print_head(*head)
+            for row in rows:
+                print_row(*row)
+            continue
+        widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+        for row in (head, *rows):
+            print("  ".join(map(str.ljust, row, widths)).rstrip())
+
+
+def minus(text):
+    """Return a number with a minus sign in place of the hyphen."""
+    return text.replace("-", "−")
+
+
 def timed(call):
     """Return the result of a call, and its wall and processor time in s."""
     begin, busy = perf_counter(), process_time()
@@ -46,15 +74,13 @@ def timed(call):
     return result, perf_counter() - begin, process_time() - busy
 
 
-def best_of(calls, rounds, prepare=None):
+def best_of(calls, rounds):
     """Return least wall and processor times of calls by name, made in turn.
 
-    A first round, which may compile, does not count; what `prepare` does before each call neither.
+    A first round, which may compile, does not count.
     """
     taken = {name: [] for name in calls}
     for _ in range(rounds + 1):
         for name, call in calls.items():
-            if prepare:
-                prepare(name)
             taken[name].append(timed(call)[1:])
     return {name: np.min(times[1:], axis=0) for name, times in taken.items()}

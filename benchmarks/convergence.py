@@ -8,19 +8,17 @@ the steel has no `NonlocalViscosity`: what fails is then as thin as two cells. P
 table.
 """
 
-import argparse
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from math import isfinite
-from time import perf_counter
 
 import numpy as np
+from common import arguments, print_head, print_row, timed
 
 from chipglow.cutting import AISI_1045, CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.laboratory.chip import NoShearBandError, find_shear_band, segmentation
-from chipglow.scene import Material, Raster, ToolGeometry, sample
+from chipglow.scene import Material, Raster, sample
 
 CELLS = (20.0, 14.0, 10.0, 7.0, 5.0)
-LENGTH = 2e-3
 START = 0.7e-3
 RASTER = Raster(-560e-6, 460e-6, 2e-6, 270, 300)
 
@@ -35,13 +33,11 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass
 class Fields:
     """What the frames of a cut show, gathered as they come."""
 
-    tool: ToolGeometry
-    hottest: list[float] = field(default_factory=list)
-    bands: list[tuple[float, float, float, float]] = field(default_factory=list)
+    def __init__(self, tool):
+        self.tool, self.hottest, self.bands = tool, [], []
 
     def add(self, frame):
         """Take one frame: the hottest thousandth of the chip, and the band's middle if any."""
@@ -81,13 +77,11 @@ def rise_width(profile):
 
 
 def row(cell, length, workpiece):
-    """Run one cut and return its row of the table."""
     conditions, numerics = CuttingConditions(cutting_length=length), Numerics(cell=cell * 1e-6)
     simulation = CuttingSimulation(conditions, workpiece=workpiece, numerics=numerics)
     fields = Fields(simulation.tool)
-    start = perf_counter()
-    history = simulation.run(OutputWindow(START, length, 1e-6, later_bands=0), RASTER, fields.add)
-    seconds = perf_counter() - start
+    window = OutputWindow(START, length, 1e-6, later_bands=0)
+    history, seconds, _ = timed(lambda: simulation.run(window, RASTER, fields.add))
     later = history.time * conditions.speed > START
     segments = segmentation(history.time[later], history.thickness[later], numerics.cell)
     rate, width, temperature_width, temperature = fields.active()
@@ -107,27 +101,22 @@ def row(cell, length, workpiece):
     ]
 
 
-def number(value: float) -> str:
+def number(value):
     """A rounded number; a dash where a chip has none, as it has no segments."""
     return f"{value:.0f}" if isfinite(value) else "–"
 
 
-def deviation(uncertainty: float, scale: float = 1e6) -> str:
+def deviation(uncertainty, scale=1e6):
     """Uncertainty after a mean; nothing for a single value."""
     return f" ± {uncertainty * scale:.0f}" if isfinite(uncertainty) else ""
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("cells", nargs="*", type=float, help="cells in um")
-    parser.add_argument("--local", action="store_true", help="without the nonlocal viscosity")
-    parser.add_argument("--length", type=float, default=1e3 * LENGTH, help="of the cut in mm")
-    given = parser.parse_args()
+    given = arguments(__doc__, cells=CELLS, local=False, length=2.0)
     workpiece = replace(AISI_1045, nonlocal_viscosity=None) if given.local else AISI_1045
-    print("| " + " | ".join(COLUMNS) + " |")
-    print("|---" * len(COLUMNS) + "|")
-    for cell in given.cells or CELLS:
-        print("| " + " | ".join(row(cell, given.length * 1e-3, workpiece)) + " |", flush=True)
+    print_head(*COLUMNS)
+    for cell in given.cells:
+        print_row(*row(cell, given.length * 1e-3, workpiece))
 
 
 if __name__ == "__main__":

@@ -9,12 +9,11 @@ settings from `DotTarget.drawn`, and prints how far off each map is and what it 
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, radians, sin
-from typing import Self
+from math import radians
 
 import numpy as np
 from common import arguments
-from numpy.typing import NDArray
+from dual_spectrum import View
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f as f_distribution
 
@@ -22,19 +21,13 @@ from chipglow.laboratory.registration import fit_dots
 from chipglow.scene import Raster
 
 RASTER = Raster(left=-480e-6, top=360e-6, spacing=6e-6, rows=120, columns=160)
-VISIBLE_SHAPE = (480, 640)
 _FINER = 4
 
 
 @dataclass(frozen=True)
-class DotTarget:
-    """One view of the target; what is random follows the seed.
+class DotTarget(View):
+    """One view of the target; `gaps` are holes that are left out, by number."""
 
-    `matrix` maps a position in m to a visible pixel. `gaps` are holes that are left out, by
-    number.
-    """
-
-    seed: int = 1
     columns: int = 8
     rows: int = 6
     spacing: float = 90e-6
@@ -46,16 +39,10 @@ class DotTarget:
     blur: float = 12e-6
     contrast: float = 0.35
     visible_noise: float = 5.0
-    pitch: float = 1.5e-6
-    turn: float = radians(1.5)
-    stretch: float = 1.02
-    shift: tuple[float, float] = (11.3, -7.6)
     raster: Raster = RASTER
-    visible_shape: tuple[int, int] = VISIBLE_SHAPE
-    perspective: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def drawn(cls, seed: int) -> Self:
+    def drawn(cls, seed):
         """A target whose settings are drawn, with one hole left out."""
         draw = np.random.default_rng([seed, 5]).uniform
         return cls(
@@ -75,33 +62,16 @@ class DotTarget:
         )
 
     @cached_property
-    def holes(self) -> NDArray[np.float64]:
+    def holes(self):
         """Middles of the holes in m, shape (n, 2)."""
         x = (np.arange(self.columns) - (self.columns - 1) / 2) * self.spacing
         y = (np.arange(self.rows) - (self.rows - 1) / 2) * self.spacing
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2) + self.centre
         places += np.random.default_rng([self.seed, 0]).normal(0.0, 1.0, places.shape) * self.jitter
-        return np.asarray(np.delete(places, list(self.gaps), axis=0))
+        return np.delete(places, list(self.gaps), axis=0)
 
     @cached_property
-    def matrix(self) -> NDArray[np.float64]:
-        """Position in m to column and row."""
-        turn = np.array([[cos(self.turn), -sin(self.turn)], [sin(self.turn), cos(self.turn)]])
-        matrix = np.eye(3)
-        matrix[:2, :2] = turn @ np.diag([self.stretch, -1.0]) / self.pitch
-        matrix[2, :2] = self.perspective
-        middle = np.array([self.visible_shape[1], self.visible_shape[0]]) / 2 - 0.5 + self.shift
-        matrix[:2] += np.outer(middle, matrix[2])
-        return matrix
-
-    def pixels(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where positions in m truly are in the visible picture."""
-        whole = np.concatenate([positions, np.ones((len(positions), 1))], axis=1) @ self.matrix.T
-        return np.asarray(whole[:, :2] / whole[:, 2:])
-
-    @cached_property
-    def infrared(self) -> NDArray[np.float64]:
-        """Radiance, holes bright, warmer on the left."""
+    def infrared(self):
         raster, pitch = self.raster, self.raster.spacing / _FINER
         x = raster.left + (np.arange(raster.columns * _FINER) + 0.5) * pitch
         y = raster.top - (np.arange(raster.rows * _FINER) + 0.5) * pitch
@@ -110,35 +80,29 @@ class DotTarget:
         sensors = seen.reshape(raster.rows, _FINER, raster.columns, _FINER).mean(axis=(1, 3))
         sensors *= 1.0 - 0.2 * raster.x / 480e-6
         generator = np.random.default_rng([self.seed, 1])
-        return np.asarray(sensors + generator.normal(0.0, self.noise * 90.0, sensors.shape))
+        return sensors + generator.normal(0.0, self.noise * 90.0, sensors.shape)
 
     @cached_property
-    def visible(self) -> NDArray[np.uint8]:
+    def visible(self):
         """Brightness, holes dark, with grain."""
         shape, part = self.visible_shape, (np.arange(3) - 1) / 3
         rows = (np.arange(shape[0])[:, None] + part).ravel()
         columns = (np.arange(shape[1])[:, None] + part).ravel()
-        pixels = np.stack([*np.meshgrid(columns, rows), np.ones((rows.size, columns.size))], -1)
-        whole = pixels @ np.linalg.inv(self.matrix).T
-        plate = self._plate(whole[..., :2] / whole[..., 2:], 200.0, 200.0 * (1 - self.contrast))
+        plate = self._plate(self.places(columns, rows), 200.0, 200.0 * (1 - self.contrast))
         seen = plate.reshape(shape[0], 3, shape[1], 3).mean(axis=(1, 3))
         generator = np.random.default_rng([self.seed, 2])
         grain = gaussian_filter(generator.standard_normal(shape), 2.0)
-        seen = gaussian_filter(seen * (1.0 + 0.02 * grain / grain.std()), 1.2)
-        seen += generator.normal(0.0, self.visible_noise, shape)
-        return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+        grained = seen * (1.0 + 0.02 * grain / grain.std())
+        return self.photograph(grained, self.visible_noise, generator)
 
-    def _plate(
-        self, place: NDArray[np.float64], surface: float, hole: float
-    ) -> NDArray[np.float64]:
+    def _plate(self, place, surface, hole):
         brightness = np.full(place.shape[:2], surface)
         for x, y in self.holes:
             brightness[np.hypot(place[..., 0] - x, place[..., 1] - y) < self.radius] = hole
         return brightness
 
 
-def main() -> None:
-    """Register targets of fresh seeds and print a table."""
+def main():
     given = arguments(__doc__, first=300, count=20)
     print("seed holes match  error  stated  inside  warnings   (in infrared pixels)", flush=True)
     within = tried = 0
@@ -159,12 +123,9 @@ def main() -> None:
         size = RASTER.spacing / target.pitch
         error = np.sqrt((off**2).sum(axis=1).mean()) / size
         stated = np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) / size
-        print(
-            f"{seed:4d} {len(target.holes):5d} {len(fit.points.pixels):5d} "
-            f"{error:6.3f} {stated:7.3f} {inside.mean():7.2f}  "
-            f"{'; '.join(found.notes.warnings) or '-'}",
-            flush=True,
-        )
+        warned = "; ".join(found.notes.warnings) or "-"
+        print(f"{seed:4d} {len(target.holes):5d} {len(fit.points.pixels):5d} ", end="")
+        print(f"{error:6.3f} {stated:7.3f} {inside.mean():7.2f}  {warned}", flush=True)
     print(f"{within / max(tried, 1):.2f} of the places are within their 95 % region")
 
 

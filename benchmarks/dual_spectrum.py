@@ -1,22 +1,20 @@
 """An infrared image and a visible picture of one chip, with a known map between them.
 
-`registration_libraries.py` registers such pairs. The geometry is NIST's: infrared 160 x 120 pixels
-of 6 um, and a visible camera with finer pixels
-that looks through the same optics (Heigel and Whitenton, 2010). What is bright differs: infrared
-by temperature and emissivity, visible by reflection and texture.
+`registration_libraries.py` registers such pairs. The geometry is NIST's (Heigel and Whitenton,
+2010): infrared 160 x 120 pixels of 6 um, and a visible camera with finer pixels that looks through
+the same optics. What is bright differs: infrared by temperature and emissivity, visible by
+reflection and texture.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, pi, radians, sin
-from typing import Self
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from chipglow.camera import Camera, GaussianPSF, Measurement
-from chipglow.laboratory.registration import Registration
 from chipglow.scene import Material, Raster, Scene, Tool, ToolGeometry
 from chipglow.surface import CHIP_1
 
@@ -24,32 +22,68 @@ ROWS, COLUMNS, PITCH = 120, 160, 6e-6
 VISIBLE_SHAPE = (480, 640)
 FINE = Raster(left=-620e-6, top=520e-6, spacing=2e-6, rows=360, columns=480)
 SHEAR_ANGLE, FEED, CHIP_ANGLE = radians(32.0), 300e-6, radians(14.0)
-
-
 TOOL = ToolGeometry()
 
 
 @dataclass(frozen=True)
-class DualSpectrum:
-    """One experiment; the seed determines all random values.
+class View:
+    """How the visible camera sees what the infrared one does; what is random follows the seed.
 
-    `matrix` maps a position in m to a visible pixel.
+    The place `middle` in m is in the middle of its picture but for the shift in pixels.
     """
 
     seed: int = 1
-    noise: float = 0.005
-    visible_noise: float = 4.0
     pitch: float = 1.5e-6
     turn: float = radians(1.5)
     stretch: float = 1.02
     shift: tuple[float, float] = (11.3, -7.6)
+    perspective: tuple[float, float] = (0.0, 0.0)
+    visible_shape: tuple[int, int] = VISIBLE_SHAPE
+    middle: ClassVar[tuple[float, float]] = (0.0, 0.0)
+
+    @cached_property
+    def matrix(self):
+        """Position in m to column and row of the visible picture."""
+        turn = np.array([[cos(self.turn), -sin(self.turn)], [sin(self.turn), cos(self.turn)]])
+        matrix = np.eye(3)
+        matrix[:2, :2] = turn @ np.diag([self.stretch, -1.0]) / self.pitch
+        matrix[2, :2] = self.perspective
+        centre = np.array(self.visible_shape[::-1]) / 2 - 0.5 + self.shift
+        matrix[:2] += np.outer(centre, matrix[2])
+        matrix[:, 2] -= matrix[:, :2] @ self.middle
+        return matrix
+
+    def pixels(self, positions):
+        """Where positions in m truly are in the visible picture."""
+        whole = np.concatenate([positions, np.ones((len(positions), 1))], axis=1) @ self.matrix.T
+        return whole[:, :2] / whole[:, 2:]
+
+    def places(self, columns, rows):
+        """Positions in m of columns and rows of the visible picture, shape (row, column, 2)."""
+        columns, rows = np.meshgrid(columns, rows)
+        whole = np.stack([columns, rows, np.ones(rows.shape)], -1) @ np.linalg.inv(self.matrix).T
+        return whole[..., :2] / whole[..., 2:]
+
+    def photograph(self, bright, noise, generator):
+        """Visible picture of what is bright, with blur and noise."""
+        seen = gaussian_filter(bright, 1.2) + generator.normal(0.0, noise, bright.shape)
+        return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class DualSpectrum(View):
+    """One experiment; the seed determines all random values."""
+
+    noise: float = 0.005
+    visible_noise: float = 4.0
     chip_brightness: float = 0.75
     grain: float = 0.15
     band_spacing: float = 130e-6
     tool: Tool = TOOL
+    middle = (FINE.left + COLUMNS * PITCH / 2, FINE.top - ROWS * PITCH / 2)
 
     @classmethod
-    def drawn(cls, seed: int) -> Self:
+    def drawn(cls, seed):
         """Draw an experiment with random settings.
 
         The chip's brightness is 0.4 to 1 beside the workpiece's 0.45 and the tool's 0.30.
@@ -70,40 +104,22 @@ class DualSpectrum:
         )
 
     @cached_property
-    def matrix(self) -> NDArray[np.float64]:
-        """Position in m to column and row."""
-        scale = 1 / self.pitch
-        middle = np.array([FINE.left + COLUMNS * PITCH / 2, FINE.top - ROWS * PITCH / 2])
-        turn = np.array([[cos(self.turn), -sin(self.turn)], [sin(self.turn), cos(self.turn)]])
-        linear = scale * turn @ np.diag([self.stretch, -1.0])
-        centre = np.array([VISIBLE_SHAPE[1], VISIBLE_SHAPE[0]]) / 2 - 0.5 + self.shift
-        matrix = np.eye(3)
-        matrix[:2, :2], matrix[:2, 2] = linear, centre - linear @ middle
-        return matrix
-
-    def pixels(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the true visible pixels of positions in m."""
-        return np.asarray(positions @ self.matrix[:2, :2].T + self.matrix[:2, 2])
-
-    @cached_property
-    def infrared(self) -> Measurement:
-        """Measurement of the infrared camera, with noise."""
-        camera = Camera(pitch=PITCH, psf=GaussianPSF(12e-6), shape=(ROWS, COLUMNS))
-        clean = camera.measure(self.scene, replace(CHIP_1, follow="mean"), 0.0)
+    def infrared(self):
+        optics = Camera(pitch=PITCH, psf=GaussianPSF(12e-6), shape=(ROWS, COLUMNS))
+        clean = optics.measure(self.scene, replace(CHIP_1, follow="mean"), 0.0)
         generator = np.random.default_rng([self.seed, 1])
         noise = self.noise * np.percentile(clean.radiance, 98)
         radiance = clean.radiance + generator.normal(0.0, noise, clean.radiance.shape)
-        return Measurement.from_radiance(
-            radiance, clean.band, clean.times, clean.raster, 573.15, attributes=dict(CAMERA)
-        ).with_tool(self.tool)
+        camera = {"integration_time": 10e-6, "frame_rate": 600.0}
+        described = clean.band, clean.times, clean.raster, 573.15
+        measured = Measurement.from_radiance(radiance, *described, attributes=camera)
+        return measured.with_tool(self.tool)
 
     @cached_property
-    def visible(self) -> NDArray[np.uint8]:
+    def visible(self):
         """Visible picture: bright flanks with grain, dark gaps, the tool's edge."""
-        rows, columns = np.indices(VISIBLE_SHAPE)
-        pixels = np.stack([columns, rows], axis=-1)
-        back = np.linalg.inv(self.matrix[:2, :2])
-        place = (pixels - self.matrix[:2, 2]) @ back.T
+        rows, columns = (np.arange(count) for count in VISIBLE_SHAPE)
+        place = self.places(columns, rows)
         chip, work, tool, phase = shapes(place, self.tool, self.band_spacing)
         generator = np.random.default_rng([self.seed, 2])
         lamella = self.chip_brightness * (1.0 - 0.55 * np.exp(-((phase / 0.09) ** 2)))
@@ -114,13 +130,10 @@ class DualSpectrum:
         bright = np.where(chip, lamella * (1.0 + self.grain * grain), bright)
         bright = np.where(tool, 0.30 + 0.06 * scratch, bright)
         light = 1.0 - 0.25 * ((columns / VISIBLE_SHAPE[1]) - 0.4) ** 2
-        seen = gaussian_filter(bright * light, 1.2) * 220.0
-        seen += generator.normal(0.0, self.visible_noise, VISIBLE_SHAPE)
-        return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+        return self.photograph(220.0 * bright * light, self.visible_noise, generator)
 
     @cached_property
-    def scene(self) -> Scene:
-        """One frame of the true scene."""
+    def scene(self):
         place = np.stack(np.meshgrid(FINE.x, FINE.y), axis=-1)
         chip, work, tool, phase = shapes(place, self.tool, self.band_spacing)
         depth = self.tool.signed_distance(place[..., 0], place[..., 1])
@@ -150,12 +163,7 @@ class DualSpectrum:
         return Scene.from_fields(FINE, [0.0, 20e-6], frames, tool=self.tool)
 
 
-CAMERA = {"integration_time": 10e-6, "frame_rate": 600.0}
-
-
-def shapes(
-    place: NDArray[np.float64], tool: Tool, band_spacing: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
+def shapes(place, tool, band_spacing):
     """Return masks of chip, workpiece and tool, and the phase between two shear bands."""
     x, y = place[..., 0], place[..., 1]
     depth = tool.signed_distance(x, y)
@@ -173,23 +181,10 @@ def shapes(
     return chip, work, inside, phase
 
 
-def texture(
-    generator: np.random.Generator, place: NDArray[np.float64], size: float
-) -> NDArray[np.float64]:
+def texture(generator, place, size):
     """Return grain of a size in m, with mean 0 and standard deviation 1."""
     side = 512
     field = gaussian_filter(generator.standard_normal((side, side)), 1.5, mode="wrap")
     field /= field.std()
-    step = size / 3
-    where = np.moveaxis((place + 1e-3) / step, -1, 0)
-    return np.asarray(map_coordinates(field, where % side, order=1, mode="grid-wrap"))
-
-
-def errors(found: Registration, pair: DualSpectrum) -> tuple[float, float]:
-    """Return the RMS over the pixels of the error and of its uncertainty, in pixels."""
-    raster = pair.infrared.raster
-    places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
-    off = found.pixels(places) - pair.pixels(places)
-    error = np.linalg.solve(pair.matrix[:2, :2], off.T) / PITCH
-    stated = np.trace(found.position_covariance(places), axis1=-2, axis2=-1) / PITCH**2
-    return float(np.sqrt((error**2).sum(axis=0).mean())), float(np.sqrt(stated.mean()))
+    where = np.moveaxis((place + 1e-3) / (size / 3), -1, 0)
+    return map_coordinates(field, where % side, order=1, mode="grid-wrap")

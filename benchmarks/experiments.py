@@ -7,26 +7,22 @@ minutes at a cell of 20 um; its means are kept in build/experiments, so that an 
 on with the next cut. Cells in um, lengths of cut in mm.
 """
 
-import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from inspect import getmodule, getsource
 from math import isfinite
 from pathlib import Path
-from time import perf_counter
-from typing import Any, TypeVar
 
 import numpy as np
 import yaml
+from common import arguments, minus, print_tables, timed
 
 from chipglow.cutting import (
     SOLVER_VERSION,
     CuttingConditions,
     CuttingSimulation,
-    ForceHistory,
     Numerics,
     OutputWindow,
     tool_material,
@@ -34,9 +30,9 @@ from chipglow.cutting import (
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import BLUE, GREY, VERMILLION
 from chipglow.io import atomic_path
-from chipglow.laboratory.chip import ChipMetrics, chip_metrics, contact_length, segmentation
+from chipglow.laboratory.chip import chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity
-from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, ToolGeometry
+from chipglow.scene import FIELD_UNITS, Raster, Scene, ToolGeometry
 from chipglow.scene.scene import FORCE_UNITS
 
 DATA = Path(__file__).with_name("experiments.yaml")
@@ -59,14 +55,12 @@ QUANTITIES = {
     "contact": LENGTH,
     "period": Quantity("a time", "s", "us", "90 us"),
 }
-KINDS = ("measured", "correlation", "computed")
 
 STEP = 10e-6  # of cut between two records of the forces
 STEPS_A_FRAME = 2
 BUILD_UP = 0.4  # fraction of the cut before the frames
 SAMPLE = 4e-6
 NOT_READ = "†"
-Entry = TypeVar("Entry")
 METRICS = (chip_metrics, contact_length, segmentation)
 
 
@@ -80,18 +74,6 @@ class Published:
     source: str
     read: bool
     note: str = ""
-
-    @classmethod
-    def of(cls, data: Mapping[str, Any]) -> "Published":
-        check_choices(data, {"quantity": tuple(QUANTITIES), "kind": KINDS})
-        return cls(**{**data, "value": QUANTITIES[data["quantity"]].parse(data["value"])})
-
-
-def check_choices(data: Mapping[str, Any], choices: Mapping[str, tuple[str, ...]]) -> None:
-    """Raise a ValueError if an entry is not one of its choices."""
-    for key, allowed in choices.items():
-        if data.get(key) not in allowed:
-            raise ValueError(f"{key} {data.get(key)!r}, expected one of {', '.join(allowed)}")
 
 
 @dataclass(frozen=True)
@@ -111,15 +93,7 @@ class Experiment:
     assumed: tuple[str, ...]
     published: tuple[Published, ...]
 
-    @classmethod
-    def of(cls, data: Mapping[str, Any]) -> "Experiment":
-        conditions = {name: unit.parse(data[name]) for name, unit in CONDITIONS.items()}
-        published = tuple(Published.of(entry) for entry in data["published"])
-        return cls(
-            **{**data, **conditions, "assumed": tuple(data["assumed"]), "published": published}
-        )
-
-    def simulation(self, cell: float, length: float) -> CuttingSimulation:
+    def simulation(self, cell, length):
         """Return the cut at these conditions with the default material, friction and numerics."""
         return CuttingSimulation(
             conditions=CuttingConditions(self.speed, self.feed, length),
@@ -146,113 +120,65 @@ class Means:
     seconds: float
 
 
-def read_experiments(path: Path = DATA) -> tuple[dict[str, str], list[Experiment]]:
-    """Return sources by their key, and the experiments, checked."""
-    data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    sources = {key: " ".join(text.split()) for key, text in data["sources"].items()}
-
-    def experiment(entry: Mapping[str, Any]) -> Experiment:
-        found = Experiment.of(entry)
-        for source in (found.source, *(value.source for value in found.published)):
-            if source not in sources:
-                raise ValueError(f"source {source!r}, expected one of {list(sources)}")
-        return found
-
-    return sources, read_entries(path, data["experiments"], experiment)
+def in_si(data, units):
+    """Return an entry of a file with its quantities parsed."""
+    return {**data, **{name: unit.parse(data[name]) for name, unit in units.items()}}
 
 
-def read_entries(
-    path: Path, entries: Iterable[Mapping[str, Any]], build: Callable[[Mapping[str, Any]], Entry]
-) -> list[Entry]:
-    """Build entries of a file; a ValueError names file and entry."""
+def read_experiments():
+    data = yaml.safe_load(DATA.read_text(encoding="utf-8"))
     found = []
-    for entry in entries:
-        try:
-            found.append(build(entry))
-        except (KeyError, TypeError, ValueError) as error:
-            name = entry.get("name", "an entry without a name")
-            raise ValueError(f"{path.name}: {name}: {error}") from None
-    return found
+    for entry in data["experiments"]:
+        published = [
+            Published(**in_si(one, {"value": QUANTITIES[one["quantity"]]}))
+            for one in entry["published"]
+        ]
+        changed = {"assumed": tuple(entry["assumed"]), "published": tuple(published)}
+        found.append(Experiment(**{**in_si(entry, CONDITIONS), **changed}))
+    return {key: " ".join(text.split()) for key, text in data["sources"].items()}, found
 
 
-def view(simulation: CuttingSimulation) -> Raster:
+def view(simulation):
     """Return a raster over the chip, from the rake face to the left border."""
     numerics = simulation.numerics
     left, top = -(numerics.upstream - 2 * numerics.cell), numerics.height - 4 * numerics.cell
     return Raster(left, top, SAMPLE, int((top + 1e-4) / SAMPLE), int((1.5e-4 - left) / SAMPLE))
 
 
-def compute(simulation: CuttingSimulation) -> Means:
+def compute(simulation):
     """Run a cut and return its means after the chip's build-up."""
-    length = simulation.conditions.cutting_length
-    window = OutputWindow(
-        BUILD_UP * length, length, STEP / simulation.conditions.speed, later_bands=0
-    )
-    chip, history, seconds = cut(simulation, window)
-    return Means(
-        cutting_force=chip.cutting_mean,
-        thrust_force=chip.thrust_mean,
-        thickness=chip.thickness,
-        contact=chip.contact,
-        period=chip.period,
-        segments=chip.segments,
-        degree=chip.degree,
-        drift=drift(history),
-        unaccounted=float(history.energy.closing_error[-1]),
-        seconds=seconds,
-    )
-
-
-def cut(
-    simulation: CuttingSimulation, window: OutputWindow
-) -> tuple[ChipMetrics, ForceHistory, float]:
-    """Run a cut; return its chip, its forces and the time in s."""
-    frames: list[Frame] = []
-    passed = iter(range(1_000_000))
-
-    def keep(frame: Frame) -> None:
-        if next(passed) % STEPS_A_FRAME == 0:
-            frames.append(frame)
-
-    raster, start = view(simulation), perf_counter()
-    history = simulation.run(window, raster, keep)
-    seconds = perf_counter() - start
-    scene = scene_of(frames, history, raster, simulation.tool)
-    return chip_metrics(scene, simulation.conditions.feed), history, seconds
-
-
-def scene_of(
-    frames: list[Frame], history: ForceHistory, raster: Raster, tool: ToolGeometry
-) -> Scene:
-    """Return frames and forces as a scene."""
+    conditions, raster, frames = simulation.conditions, view(simulation), []
+    length = conditions.cutting_length
+    window = OutputWindow(BUILD_UP * length, length, STEP / conditions.speed, later_bands=0)
+    history, seconds, _ = timed(lambda: simulation.run(window, raster, frames.append))
+    frames = frames[::STEPS_A_FRAME]
     fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in FIELD_UNITS}
-    scene = Scene.from_fields(raster, [frame.time for frame in frames], fields, tool)
+    scene = Scene.from_fields(raster, [one.time for one in frames], fields, simulation.tool)
     values = history.cutting, history.thrust, history.thickness
-    known = zip(FORCE_UNITS.items(), values, strict=True)
-    return Scene(
-        scene.data.assign_coords(force_time=("force_time", history.time, {"units": "s"})).assign(
-            {name: ("force_time", each, {"units": unit}) for (name, unit), each in known}
-        )
-    )
+    forces = {
+        name: ("force_time", each, {"units": unit})
+        for (name, unit), each in zip(FORCE_UNITS.items(), values, strict=True)
+    }
+    time = ("force_time", history.time, {"units": "s"})
+    scene = Scene(scene.data.assign_coords(force_time=time).assign(forces))
+    chip, unaccounted = chip_metrics(scene, conditions.feed), history.energy.closing_error[-1]
+    names = ("cutting_mean", "thrust_mean", "thickness", "contact", "period", "segments", "degree")
+    seen = (getattr(chip, name) for name in names)
+    return Means(*seen, drift(history), float(unaccounted), seconds)
 
 
-def drift(history: ForceHistory) -> float:
+def drift(history):
     """Return the relative change of the mean cutting force between halves after the build-up."""
     steady = history.time > BUILD_UP * history.time[-1] * (1 + 1e-9)
     first, second = np.array_split(history.cutting[steady], 2)
     return float(second.mean() / first.mean() - 1)
 
 
-def result_path(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Path:
-    """Return the file of a cut's means, named by solver, metrics and conditions."""
+def means_of(simulation, name, folder=RESULTS):
+    """Return stored means of a cut, or run it and store them, by solver, metrics and conditions."""
     metrics = [getsource(getmodule(metric)) for metric in METRICS]
     state = repr((SOLVER_VERSION, metrics, STEP, STEPS_A_FRAME, BUILD_UP, SAMPLE, simulation))
-    return folder / f"{name}-{sha256(state.encode()).hexdigest()[:16]}.json"
-
-
-def means_of(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Means:
-    """Return stored means of a cut, or run it and store them."""
-    path = result_path(simulation, name, folder)
+    path = folder / f"{name}-{sha256(state.encode()).hexdigest()[:16]}.json"
     if path.exists():
         return Means(**json.loads(path.read_text(encoding="utf-8")))
     means = compute(simulation)
@@ -262,54 +188,48 @@ def means_of(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -
     return means
 
 
-def comparison(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
+def comparison(computed):
     """Return the table of published and computed numbers, its head first."""
-    head = ["cut", "quantity", "published", "kind", "source", "computed", "difference"]
-    rows = [head]
+    rows = [["cut", "quantity", "published", "kind", "source", "computed", "difference"]]
     for experiment, means in computed:
         for quantity, unit in QUANTITIES.items():
             here = getattr(means, quantity)
-            known = [entry for entry in experiment.published if entry.quantity == quantity]
             label = f"{quantity.replace('_', ' ')} / {'(N/mm)' if unit is FORCE else unit.unit}"
+            known = [entry for entry in experiment.published if entry.quantity == quantity]
             for entry in known or [None]:
-                rows.append([experiment.name, label, *_sides(entry, here, unit)])
+                there, difference = ["–", "–", "–"], "–"
+                if entry:
+                    value = number(entry.value, unit) + mark(entry.read)
+                    there = [value, entry.kind, entry.source]
+                if entry and isfinite(here):
+                    difference = minus(f"{100 * (here / entry.value - 1):+.0f} %")
+                rows.append([experiment.name, label, *there, number(here, unit), difference])
     return rows
 
 
-def _sides(entry: Published | None, here: float, unit: Quantity) -> list[str]:
-    there = (
-        [number(entry.value, unit) + mark(entry.read), entry.kind, entry.source] if entry else []
-    )
-    difference = f"{100 * (here / entry.value - 1):+.0f} %" if entry and isfinite(here) else "–"
-    return [*(there or ["–", "–", "–"]), number(here, unit), difference.replace("-", "−")]
-
-
-def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
+def cuts(computed):
     """Return the table of conditions and quality of each cut, its head first."""
     head = ["cut", "speed / (m/min)", "feed / mm", "rake / °", "conditions from", "assumed"]
     rows = [[*head, "segments", "degree / %", "drift / %", "unaccounted work / %", "time / s"]]
-    for experiment, means in computed:
-        numbers = [
-            number(getattr(experiment, name), CONDITIONS[name]) for name in list(CONDITIONS)[:3]
-        ]
-        rows.append(
-            [
-                experiment.name,
-                *numbers,
-                experiment.source + mark(experiment.read),
-                ", ".join(experiment.assumed) or "–",
-                f"{means.segments}",
-                f"{100 * means.degree:.0f}",
-                f"{100 * means.drift:+.0f}".replace("-", "−"),
-                f"{100 * means.unaccounted:.1f}".replace("-", "−"),
-                f"{means.seconds:.0f}",
-            ]
+    for one, means in computed:
+        conditions = (
+            number(getattr(one, name), CONDITIONS[name]) for name in ("speed", "feed", "rake")
         )
+        assumed = ", ".join(one.assumed) or "–"
+        degree = f"{100 * means.degree:.0f}"
+        row = [one.name, *conditions, one.source + mark(one.read), assumed, f"{means.segments}"]
+        rows.append([*row, degree, *quality(means)])
     return rows
 
 
+def quality(means):
+    """Return drift and unaccounted work in %, and the time in s."""
+    drift, lost = minus(f"{100 * means.drift:+.0f}"), minus(f"{100 * means.unaccounted:.1f}")
+    return drift, lost, f"{means.seconds:.0f}"
+
+
 @style()
-def draw_residuals(computed: Iterable[tuple[Experiment, Means]], path: Path) -> None:
+def draw_residuals(computed, path):
     """Draw the relative difference of computed from published forces; write the figure."""
     rows = [
         (f"{one.name}, {entry.source.partition('-')[0]}", entry, getattr(means, entry.quantity))
@@ -320,11 +240,13 @@ def draw_residuals(computed: Iterable[tuple[Experiment, Means]], path: Path) -> 
     names = list(dict.fromkeys(name for name, _, _ in rows))
     figure = new_figure(0.8 + 0.27 * len(names))
     axes = figure.subplots()
-    for quantity, marker in (("cutting_force", "o"), ("thrust_force", "s")):
+    for quantity, marker, colour in (
+        ("cutting_force", "o", BLUE),
+        ("thrust_force", "s", VERMILLION),
+    ):
         chosen = [row for row in rows if row[1].quantity == quantity]
         residuals = [100 * (here / entry.value - 1) for _, entry, here in chosen]
         places = [names.index(name) for name, _, _ in chosen]
-        colour = BLUE if marker == "o" else VERMILLION
         axes.plot(residuals, places, marker, color=colour, label=quantity.replace("_", " "))
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     axes.set_yticks(range(len(names)), names)
@@ -335,61 +257,33 @@ def draw_residuals(computed: Iterable[tuple[Experiment, Means]], path: Path) -> 
         figure.savefig(temporary, format="png")
 
 
-def number(value: float, unit: Quantity) -> str:
+def number(value, unit):
     """Return three digits in the quantity's unit; a dash for NaN."""
     if not isfinite(value):
         return "–"
     scaled = value / unit.parse(f"1 {unit.unit}")
-    digits = f"{scaled:.0f}" if abs(scaled) >= 100 else f"{scaled:.3g}"
-    return digits.replace("-", "−")
+    return minus(f"{scaled:.0f}" if abs(scaled) >= 100 else f"{scaled:.3g}")
 
 
-def mark(read: bool) -> str:
+def mark(read):
     return "" if read else f" {NOT_READ}"
 
 
-def markdown(rows: list[list[str]]) -> str:
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
-
-
-def aligned(rows: list[list[str]]) -> str:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    padded = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
-    return "\n".join("  ".join(row).rstrip() for row in padded)
-
-
-def parsed(parser: argparse.ArgumentParser, names: list[str], cell: float) -> argparse.Namespace:
-    """Parse the arguments that the programs of published cuts share, and the parser's own."""
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
-    parser.add_argument("--cell", type=float, default=cell, help="side of a cell in um")
-    parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
-    given = parser.parse_args()
-    if unknown := sorted(set(given.names) - set(names)):
-        parser.error(f"no cut {unknown[0]!r}, expected some of {', '.join(names)}")
-    return given
-
-
-def main() -> None:
-    sources, experiments = read_experiments()
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
-    parser.add_argument("--figure", type=Path, help="draw the residuals of the forces, a PNG file")
-    given = parsed(parser, [experiment.name for experiment in experiments], 20.0)
+def main():
+    sources, known = read_experiments()
+    names = tuple(one.name for one in known)
+    given = arguments(__doc__, names=names, cell=20.0, length=2.0, figure=Path, markdown=False)
     computed = []
-    for experiment in experiments:
-        if given.names and experiment.name not in given.names:
-            continue
-        print(experiment.name, file=sys.stderr, flush=True)
-        simulation = experiment.simulation(given.cell * 1e-6, given.length * 1e-3)
-        computed.append((experiment, means_of(simulation, experiment.name)))
+    for one in known:
+        if one.name in given.names:
+            print(one.name, file=sys.stderr, flush=True)
+            simulation = one.simulation(given.cell * 1e-6, given.length * 1e-3)
+            computed.append((one, means_of(simulation, one.name)))
     if given.figure:
         draw_residuals(computed, given.figure)
-    table = markdown if given.markdown else aligned
     print(f"Cell {given.cell:g} um, cutting length {given.length:g} mm, solver {SOLVER_VERSION}.")
     print(f"{NOT_READ}: the source was not read, look the number up before you quote it.")
-    for rows in (comparison(computed), cuts(computed)):
-        print(f"\n{table(rows)}")
+    print_tables((comparison(computed), cuts(computed)), given.markdown)
     used = {key for one, _ in computed for key in (one.source, *(p.source for p in one.published))}
     for key in sorted(used):
         print(f"\n- **{key}**: {sources[key]}" if given.markdown else f"\n{key}: {sources[key]}")

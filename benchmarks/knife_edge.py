@@ -58,7 +58,6 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
 
 
 def image(generator, edge, normal, noise, seed, saturation=None):
-    """An edge at some place."""
     place = generator.uniform(-6e-6, 6e-6)
     radiance = edge_radiance(edge, normal, position=place, step=STEP)
     return image_of(radiance, noise * STEP, seed, saturation)
@@ -92,38 +91,33 @@ def oval(normal):
     return gaussian_edge(np.hypot(OVAL[0] * np.cos(turned), OVAL[1] * np.sin(turned)))
 
 
-def kinds_of_optics(repeats, names):
-    """Print, by kind of optics, how often the width is held, and what the program says of it."""
-    print_head("optics", "width / um", "bias / um", "u / um", "held", "said", "model")
-    for name, edge_of, fwhm, normals in optics():
-        if not name.startswith(names):
-            continue
-        generator = np.random.default_rng(5)
-        errors, uncertainties, said, models = [], [], [], Counter()
-        for seed in range(repeats):
-            tilted = [normal + generator.uniform(3.0, 12.0) for normal in normals]
-            images = [
-                image(generator, edge_of(normal), normal, 0.01, 3 * seed + k)
-                for k, normal in enumerate(tilted)
-            ]
-            found = knife_edge(images)
-            errors.append(found.fwhm - fwhm)
-            round_ = len(normals) == 1
-            uncertainties.append(found.edge_uncertainty if round_ else found.fwhm_uncertainty)
-            said.append(any("No model fits" in warning for warning in found.notes.warnings))
-            models[found.best.model.name] += 1
-        held = np.abs(errors) < 1.96 * np.array(uncertainties)
-        micrometres = [f"{1e6 * fwhm:.2f}", f"{1e6 * np.mean(errors):+.2f}"]
-        micrometres.append(f"{1e6 * np.mean(uncertainties):.2f}")
-        model = models.most_common(1)[0][0]
-        print_row(name, *micrometres, f"{np.mean(held):.0%}", f"{np.mean(said):.0%}", model)
+def kind_of_optics(repeats, name, edge_of, fwhm, normals):
+    """How often the width is held for a kind of optics, and what the program says of it."""
+    generator = np.random.default_rng(5)
+    errors, uncertainties, said, models = [], [], [], Counter()
+    for seed in range(repeats):
+        tilted = [normal + generator.uniform(3.0, 12.0) for normal in normals]
+        images = [
+            image(generator, edge_of(normal), normal, 0.01, 3 * seed + k)
+            for k, normal in enumerate(tilted)
+        ]
+        found = knife_edge(images)
+        errors.append(found.fwhm - fwhm)
+        round_ = len(normals) == 1
+        uncertainties.append(found.edge_uncertainty if round_ else found.fwhm_uncertainty)
+        said.append(any("No model fits" in warning for warning in found.notes.warnings))
+        models[found.best.model.name] += 1
+    held = np.abs(errors) < 1.96 * np.array(uncertainties)
+    bias, uncertainty = f"{1e6 * np.mean(errors):+.2f}", f"{1e6 * np.mean(uncertainties):.2f}"
+    told = f"{np.mean(held):.0%}", f"{np.mean(said):.0%}", models.most_common(1)[0][0]
+    return name, f"{1e6 * fwhm:.2f}", bias, uncertainty, *told
 
 
-def levels_of_noise(repeats, names):
-    """Print rows by noise and clipping."""
+def levels_of_noise():
+    """Optics, noise and clipping: arguments of `coverage`."""
     gauss = (gaussian_edge(10e-6), 10e-6)
     mirror = (annular_edge(WAVELENGTH, *MIRROR), AnnularAperturePSF(WAVELENGTH, *MIRROR).fwhm)
-    rows = (
+    return (
         ("Gaussian", *gauss, 0.01, None, True),
         ("Gaussian", *gauss, 0.1, None, True),
         ("Gaussian, clipped at 90 %", *gauss, 0.01, 6.5, True),
@@ -131,17 +125,18 @@ def levels_of_noise(repeats, names):
         ("diffraction", *mirror, 0.03),
         ("diffraction, clipped at 92 %", *mirror, 0.01, 6.6),
     )
-    for row in rows:
-        if row[0].startswith(names):
-            coverage(repeats, *row)
 
 
 def main():
-    """Print the tables' rows."""
     given = arguments(__doc__, repeats=60, names=None)
     names = tuple(given.names) or ("",)
-    levels_of_noise(given.repeats, names)
-    kinds_of_optics(given.repeats, names)
+    for row in levels_of_noise():
+        if row[0].startswith(names):
+            coverage(given.repeats, *row)
+    print_head("optics", "width / um", "bias / um", "u / um", "held", "said", "model")
+    for row in optics():
+        if row[0].startswith(names):
+            print_row(*kind_of_optics(given.repeats, *row))
 
 
 if __name__ == "__main__":

@@ -2,17 +2,15 @@
 
     python benchmarks/movies.py [--pictures 4] [--tables codecs legends] [--maps NAME ...]
 
-`codecs` gives for each codec and colour map the error of the values, beside the uncertainty that
-chipglow predicts from the movie alone. The field has a boundary to a white background, a hot spot
-and a narrow band, and it moves. `legends` draws a legend beside the field, as finite-element
-programs do, with and without colour bands and element edges, and imports the movie with only the
-values at the ends of the legend given. A row is right if the true value lies within twice the
-stated standard uncertainty in at least 90 % of the pixels, or if the movie is refused.
+`codecs` gives the error of the values beside the uncertainty that chipglow predicts from the movie
+alone. `legends` draws a legend beside the field, with and without colour bands and element edges,
+and imports the movie with only the values at the ends of the legend given. A row is right if the
+true value lies within twice the stated standard uncertainty in at least 90 % of the pixels, or if
+the movie is refused.
 """
 
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import namedtuple
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -41,8 +39,7 @@ class NamedMap(NamedTuple):
     bands: int = 0
 
 
-@dataclass(frozen=True)
-class Codec:
+class Codec(NamedTuple):
     """A way to encode; without an encoder of FFmpeg, a GIF with Pillow's palette."""
 
     name: str
@@ -84,19 +81,16 @@ _PAGE = (200, 215, 235)
 """Colour around the field, which no map of `LEGEND_MAPS` ends in."""
 
 
-def known_field(number: int, shape: tuple[int, int] = SHAPE) -> np.ndarray:
+def known_field(number, shape=SHAPE):
     """Return the temperature of a picture in K, NaN where there is no material."""
-    y, x = np.meshgrid(
-        np.linspace(1, 0, shape[0]), np.linspace(0, 1, shape[1]), indexing="ij"
-    )  # fmt: skip
-    x = x - 0.01 * number
+    y, x = np.linspace(1, 0, shape[0])[:, None], np.linspace(0, 1, shape[1]) - 0.01 * number
     spot = 500 * np.exp(-((x - 0.55) ** 2 + (y - 0.45) ** 2) / 0.02)
     band = 300 * np.exp(-(((y - 0.3 - 0.8 * (x - 0.3)) / 0.03) ** 2))
     field = 310 + 120 * x + spot + band
     return np.where(y < 0.8 + 0.1 * np.sin(9 * x), field, np.nan)
 
 
-def drawn(field: np.ndarray, colours: NamedMap) -> np.ndarray:
+def drawn(field, colours):
     """Draw a field on white, as a plotting program does: (y, x, 3), uint8."""
     fraction = np.clip((field - COLDEST) / (HOTTEST - COLDEST), 0, 1)
     count = colours.bands or 256
@@ -111,7 +105,7 @@ def drawn(field: np.ndarray, colours: NamedMap) -> np.ndarray:
     return picture
 
 
-def encode(path: Path, pictures: Iterator[np.ndarray], codec: Codec, rate: int = 20) -> None:
+def encode(path, pictures, codec, rate=20):
     """Write pictures of shape (y, x, 3) as a movie."""
     if not codec.encoder:
         first, *others = (Image.fromarray(picture) for picture in pictures)
@@ -131,12 +125,14 @@ def encode(path: Path, pictures: Iterator[np.ndarray], codec: Codec, rate: int =
         container.mux(stream.encode(None))
 
 
-def with_legend(number: int, colours: NamedMap, edges: bool) -> np.ndarray:
+def with_legend(number, colours, edges):
     """Draw the field with its legend: (y, x, 3), uint8."""
     field = known_field(number, FIELD_SHAPE)
     shown = drawn(field, colours)
-    if edges:
-        shown[_edges(FIELD_SHAPE)] = 0
+    if edges:  # of oblique elements
+        y, x = np.indices(FIELD_SHAPE)
+        across, up = x + np.round(0.2 * y).astype(int), y + np.round(0.1 * x).astype(int)
+        shown[(across % _ELEMENT == 0) | (up % _ELEMENT == 0)] = 0
     shown[~np.isfinite(field)] = _PAGE
     page = np.full((*PAGE_SHAPE, 3), _PAGE, np.uint8)
     page[: FIELD_SHAPE[0], : FIELD_SHAPE[1]] = shown
@@ -150,38 +146,16 @@ def with_legend(number: int, colours: NamedMap, edges: bool) -> np.ndarray:
     return page
 
 
-def _edges(shape: tuple[int, int]) -> np.ndarray:
-    """Return the pixels on the lines of a mesh of oblique elements."""
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    across, up = x + np.round(0.2 * y).astype(int), y + np.round(0.1 * x).astype(int)
-    return np.asarray((across % _ELEMENT == 0) | (up % _ELEMENT == 0))
+Reading = namedtuple("Reading", "stated errors rms held extra missing")
+"""Errors of a movie's values and its stated uncertainty in K.
+
+`errors` are those of pixels that show material in field and movie; `extra` pixels show it in the
+movie only, `missing` pixels in the field only. `held` is the fraction of the shown pixels whose
+true value is within twice the uncertainty.
+"""
 
 
-@dataclass(frozen=True)
-class Reading:
-    """Errors of a movie's values and its stated uncertainty in K.
-
-    `errors` are those of pixels that show material in field and movie; `extra` pixels show it in
-    the movie only, `missing` pixels in the field only.
-    """
-
-    stated: float
-    errors: np.ndarray
-    extra: int
-    missing: int
-
-    @property
-    def rms(self) -> float:
-        return float(np.sqrt((self.errors**2).mean()))
-
-    @property
-    def held(self) -> float:
-        """Fraction of the shown pixels whose true value is within twice the uncertainty."""
-        within = np.count_nonzero(np.abs(self.errors) <= 2 * self.stated)
-        return within / (self.errors.size + self.extra)
-
-
-def read_back(source: MovieSource, shape: tuple[int, int]) -> Reading:
+def read_back(source, shape):
     """Compare a movie's values with the known field."""
     stated = source.uncertainty()["temperature"].total
     errors, extra, missing = [], 0, 0
@@ -191,31 +165,24 @@ def read_back(source: MovieSource, shape: tuple[int, int]) -> Reading:
         errors.append((frame.fields["temperature"] - truth)[shown & known])
         extra += np.count_nonzero(shown & ~known)
         missing += np.count_nonzero(known & ~shown)
-    return Reading(stated, np.concatenate(errors), extra, missing)
+    errors = np.concatenate(errors)
+    held = np.count_nonzero(np.abs(errors) <= 2 * stated) / (errors.size + extra)
+    return Reading(stated, errors, float(np.sqrt((errors**2).mean())), held, extra, missing)
 
 
-def read_with_map(
-    path: Path, codec: Codec, colours: NamedMap, count: int, shape: tuple[int, int] = SHAPE
-) -> Reading:
+def read_with_map(path, codec, colours, count, shape=SHAPE):
     """Draw, encode and read a movie whose colour map is given."""
     encode(path, (drawn(known_field(n, shape), colours) for n in range(count)), codec)
     movie = FieldMovie(str(path), COLDEST, HOTTEST, *colours)
     return read_back(MovieSource(movie, pixel=PIXEL, origin=(0, shape[0])), shape)
 
 
-def read_with_legend(
-    path: Path, codec: Codec, colours: NamedMap, edges: bool, count: int
-) -> Reading:
+def read_with_legend(path, codec, colours, edges, count):
     """Draw, encode and read a movie whose legend has to be found; SourceError if it is refused."""
     encode(path, (with_legend(number, colours, edges) for number in range(count)), codec)
     rows, columns = FIELD_SHAPE
-    source = MovieSource(
-        FieldMovie(str(path), COLDEST, HOTTEST),
-        pixel=PIXEL,
-        origin=(0.0, rows),
-        crop=(0, 0, columns, rows),
-        interval=1e-6,
-    )
+    movie, crop = FieldMovie(str(path), COLDEST, HOTTEST), (0, 0, columns, rows)
+    source = MovieSource(movie, pixel=PIXEL, origin=(0.0, rows), crop=crop, interval=1e-6)
     return read_back(source, FIELD_SHAPE)
 
 
@@ -239,14 +206,11 @@ def print_codecs(folder, given):
         path = folder / f"movie{codec.suffix}"
         found = read_with_map(path, codec, colours, given.pictures)
         errors, pixels = np.abs(found.errors), given.pictures * SHAPE[0] * SHAPE[1]
-        kilobytes = path.stat().st_size / 1000 / given.pictures
-        bands = f", {colours.bands} bands" if colours.bands else ""
+        name = f"{colours.name}, {colours.bands} bands" if colours.bands else colours.name
+        size = f"{path.stat().st_size / 1000 / given.pictures:.0f}"
         kelvins = f"{found.rms:.1f}", f"{np.percentile(errors, 99):.1f}", f"{errors.max():.0f}"
         wrong = f"{100 * (found.extra + found.missing) / pixels:.2f} %"
-        size = f"{kilobytes:.0f}"
-        print_row(
-            f"{colours.name}{bands}", codec.name, size, *kelvins, f"{found.stated:.1f}", wrong
-        )
+        print_row(name, codec.name, size, *kelvins, f"{found.stated:.1f}", wrong)
 
 
 def print_legends(folder, given):
@@ -256,8 +220,7 @@ def print_legends(folder, given):
     maps, codecs = chosen(given, LEGEND_MAPS, LEGEND_CODECS)
     for colours, edges, codec in product(maps, (False, True), codecs):
         path = folder / f"movie{codec.suffix}"
-        bands = colours.bands or "none"
-        case = colours.name, f"{bands}", "yes" if edges else "no", codec.name
+        case = colours.name, str(colours.bands or "none"), "yes" if edges else "no", codec.name
         try:
             found = read_with_legend(path, codec, colours, edges, given.pictures)
         except SourceError as error:
@@ -272,7 +235,7 @@ def print_legends(folder, given):
 TABLES = {"codecs": print_codecs, "legends": print_legends}
 
 
-def main() -> None:
+def main():
     given = arguments(__doc__, pictures=4, tables=list(TABLES), maps=[], codecs=[])
     with tempfile.TemporaryDirectory() as folder:
         for name in given.tables:

@@ -59,7 +59,7 @@ def prysm_kernel(psf, samples):
 
 def main():
     samples = arguments(__doc__, samples=512).samples
-    peer = find_spec("prysm") is not None
+    peer = find_spec("prysm")
     if not peer:
         print("prysm is not installed")
     print_head("kernel", "difference over peak", "ms", "prysm's ms")

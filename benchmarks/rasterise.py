@@ -17,7 +17,6 @@ from chipglow.io.sources.triangles import rasterise
 from chipglow.scene import Raster
 
 RASTER = Raster(left=0.0, top=810e-6, spacing=1e-6, rows=810, columns=900)
-REPEATS = 7
 
 
 def mesh_of(columns, rows):
@@ -39,14 +38,13 @@ def linear(points):
     return 300.0 + 1.234567e6 * points[..., 0] + 0.7654321e6 * points[..., 1]
 
 
-def times_of(action, repeats=REPEATS):
+def times_of(action, repeats=7):
     """Least and median time in ms; the first run, which may compile, does not count."""
     times = [1e3 * timed(action)[1] for _ in range(repeats + 1)][1:]
     return min(times), statistics.median(times)
 
 
-def row(name, action, repeats=REPEATS):
-    """Print times, and the largest error of the samples."""
+def row(name, action, repeats=7):
     found = action()
     expected = linear(np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1))
     error = np.nanmax(np.abs(found - expected))
@@ -55,7 +53,6 @@ def row(name, action, repeats=REPEATS):
 
 
 def compare(points, triangles, peer):
-    """Print the table of a mesh."""
     values = linear(points)
     fields = np.stack([values] * 5, axis=1)
     print(f"\n{len(triangles)} triangles on {RASTER.columns} x {RASTER.rows} samples\n")

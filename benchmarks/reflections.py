@@ -2,22 +2,20 @@
 
     python benchmarks/reflections.py [--draws 40] [--angles 30 45 60 75] [--study STUDY.yaml]
 
-Measures the hottest square of the row beside the rake face (its Figure 7) in one instant of the
-quick study, or of a study's cut or scene, with the light that rake face and chip's side reflect on
-each other and without. The paper's simulated peak with chip 2 is about 100 °C under the measured
-one: what has to be explained is 100 °C with chip 2, and that and the difference of the chips with
-chip 1. Wedge angle, bulge radius, fraction of mirror-like reflection and the emissivities of chip
-and tool are drawn; the tool is as warm as it was cut, or as the chip that it touches. Minutes.
+Measures the hottest square of the row beside the rake face (the paper's Figure 7) in one instant of
+the quick study, or of a study's cut or scene, with the light that rake face and chip's side reflect
+on each other and without. What has to be explained is 100 °C with chip 2, and that and the
+difference of the chips with chip 1. The wedge and the emissivities of chip and tool are drawn; the
+tool is as warm as it was cut, or as the chip that it touches. Minutes.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import product
 from math import pi, radians
 from pathlib import Path
 
 import numpy as np
-from common import arguments
-from experiments import aligned
+from common import arguments, print_tables
 
 from chipglow.camera import Camera
 from chipglow.io import open_scene
@@ -25,14 +23,7 @@ from chipglow.laboratory.chip import rake_grid
 from chipglow.scene import Material, Scene
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, cut, load_study
-from chipglow.surface import (
-    CHIP_1,
-    CHIP_2,
-    Emissivity,
-    FeatureSurface,
-    Surface,
-    Wedge,
-)
+from chipglow.surface import CHIP_1, CHIP_2, Emissivity, Wedge
 
 MISSING = 100.0
 INSTANT = 0.5
@@ -51,32 +42,26 @@ class Face:
     camera: Camera
 
     @classmethod
-    def of(cls, scene: Scene, camera: Camera, hot_tool: bool) -> "Face":
+    def of(cls, scene, camera, hot_tool):
         """The scene at rest in the middle of its time, with a tool as warm as the chip or not."""
         frame = scene.frame(int(INSTANT * len(scene.times)))
-        temperature = frame.temperature
+        names = ("temperature", "material", "plastic_strain", "plastic_strain_rate")
+        fields = {name: frame.needed(name) for name in names}
         if hot_tool:
-            temperature = with_hot_tool(scene, temperature, frame.material)
-        fields = {
-            "temperature": temperature,
-            "material": frame.material,
-            "plastic_strain": frame.needed("plastic_strain"),
-            "plastic_strain_rate": frame.needed("plastic_strain_rate"),
-        }
+            hot = with_hot_tool(scene, fields["temperature"], fields["material"])
+            fields["temperature"] = hot
         still = {name: values[None] for name, values in fields.items()}
         return cls(Scene.from_fields(scene.raster, [0.0], still, scene.tool), camera)
 
-    def peak(self, surface: Surface) -> float:
+    def peak(self, surface):
         """Hottest radiance temperature of the row of squares beside the face in K."""
         measured = self.camera.measure(self.scene, surface, 0.0)
-        assert measured.tool is not None
         return float(np.nanmax(rake_grid(measured, measured.tool).frame_mean[0]))
 
 
-def with_hot_tool(scene: Scene, temperature: np.ndarray, material: np.ndarray) -> np.ndarray:
+def with_hot_tool(scene, temperature, material):
     """Temperatures with a tool that is as warm as the chip on the other side of its rake face."""
     tool, raster = scene.tool, scene.raster
-    assert tool is not None
     x, y = np.meshgrid(raster.x, raster.y)
     along = (np.stack([x, y], axis=-1) - tool.rake_foot) @ np.array(tool.rake_direction)
     beside = tool.rake_point(along) + raster.spacing * np.array(tool.rake_normal)
@@ -85,7 +70,7 @@ def with_hot_tool(scene: Scene, temperature: np.ndarray, material: np.ndarray) -
     return np.where(changed, nearest(temperature, raster, beside), temperature).astype(np.float32)
 
 
-def flat(chip: FeatureSurface, body: float, tool: float) -> FeatureSurface:
+def flat(chip, body, tool):
     """A chip of even emissivities, which follows no texture."""
     return replace(
         chip,
@@ -97,12 +82,13 @@ def flat(chip: FeatureSurface, body: float, tool: float) -> FeatureSurface:
     )
 
 
-def drawn(mean: float, deviation: float, generator: np.random.Generator) -> float:
+def drawn(emissivity, generator):
     """A number from a normal distribution, within 0.02 to 0.98."""
-    return float(np.clip(generator.normal(mean, deviation), 0.02, 0.98))
+    value = generator.normal(emissivity.mean, emissivity.standard_deviation)
+    return float(np.clip(value, 0.02, 0.98))
 
 
-def differences(face: Face, chip: FeatureSurface, draws: int) -> np.ndarray:
+def differences(face, chip, draws):
     """Peaks without and with reflections for drawn shapes and emissivities, shape (draw, 2)."""
     generator = np.random.default_rng(SEED)
     found = []
@@ -112,20 +98,16 @@ def differences(face: Face, chip: FeatureSurface, draws: int) -> np.ndarray:
             bulge_radius=generator.uniform(*RADII),
             mirror=generator.uniform(0.0, 1.0),
         )
-        bare = flat(
-            chip,
-            drawn(chip.chip.mean, chip.chip.standard_deviation, generator),
-            drawn(chip.tool.mean, chip.tool.standard_deviation, generator),
-        )
+        bare = flat(chip, drawn(chip.chip, generator), drawn(chip.tool, generator))
         found.append((face.peak(bare), face.peak(bare.modified(wedge))))
     return np.array(found)
 
 
-def spread(values: np.ndarray) -> str:
+def spread(values):
     return f"{values.mean():.0f} ± {values.std(ddof=1):.0f}"
 
 
-def explained(faces: dict[str, Face], draws: int) -> list[list[str]]:
+def explained(faces, draws):
     """Table of what reflections add to the peak, and of what has to be explained."""
     rows = [["tool", "chip", "without / °C", "with / °C", "added / K", "range / K", "missing / K"]]
     bare = {name: faces["as cut"].peak(flat(c, c.chip.mean, 0.58)) for name, c in CHIPS.items()}
@@ -133,21 +115,14 @@ def explained(faces: dict[str, Face], draws: int) -> list[list[str]]:
         for name, chip in CHIPS.items():
             without, reflecting = differences(face, chip, draws).T
             added = reflecting - without
-            rows.append(
-                [
-                    tool,
-                    name,
-                    spread(without - 273.15),
-                    spread(reflecting - 273.15),
-                    spread(added),
-                    f"{added.min():.0f} to {added.max():.0f}",
-                    f"{MISSING + bare['chip 2'] - bare[name]:.0f}",
-                ]
-            )
+            peaks = spread(without - 273.15), spread(reflecting - 273.15)
+            more = spread(added), f"{added.min():.0f} to {added.max():.0f}"
+            missing = f"{MISSING + bare['chip 2'] - bare[name]:.0f}"
+            rows.append([tool, name, *peaks, *more, missing])
     return rows
 
 
-def by_shape(faces: dict[str, Face], angles: Iterable[float]) -> list[list[str]]:
+def by_shape(faces, angles):
     """Table of what one wedge adds, by its angle and its kind of reflection."""
     rows = [["angle / °", *(f"{tool}, {name} / K" for tool in faces for name in CHIPS), "mirror"]]
     wedges = [
@@ -157,27 +132,23 @@ def by_shape(faces: dict[str, Face], angles: Iterable[float]) -> list[list[str]]
     ]
     wedges.append(("90, 30 um behind", Wedge(angle=pi / 2, overhang=30e-6)))
     for label, wedge in wedges:
-        added = [_added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()]
-        rows.append([label, *(f"{one:.0f}" for one in added), f"{wedge.mirror:.0f}"])
+        row = [label]
+        for face, chip in product(faces.values(), CHIPS.values()):
+            bare = flat(chip, chip.chip.mean, chip.tool.mean)
+            row.append(f"{face.peak(bare.modified(wedge)) - face.peak(bare):.0f}")
+        rows.append([*row, f"{wedge.mirror:.0f}"])
     return rows
 
 
-def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
-    bare = flat(chip, chip.chip.mean, chip.tool.mean)
-    return face.peak(bare.modified(wedge)) - face.peak(bare)
-
-
-def main() -> None:
+def main():
     given = arguments(__doc__, draws=40, angles=list(SHAPES), study=Path)
     study = Study.quick() if given.study is None else load_study(given.study)
     path = cut(study) if study.scene is None else study.scene
     scene, camera = open_scene(path), study.camera.build()
-    faces = {
-        "as cut": Face.of(scene, camera, hot_tool=False),
-        "as warm as the chip": Face.of(scene, camera, hot_tool=True),
-    }
-    print(aligned(by_shape(faces, given.angles)))
-    print(aligned(explained(faces, given.draws)))
+    tools = {"as cut": False, "as warm as the chip": True}
+    faces = {name: Face.of(scene, camera, hot) for name, hot in tools.items()}
+    print_tables([by_shape(faces, given.angles)])
+    print_tables([explained(faces, given.draws)])
 
 
 if __name__ == "__main__":

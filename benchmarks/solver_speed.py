@@ -1,9 +1,8 @@
 """Million point-steps a second of the cutting solver's step.
 
-A block is sheared to and fro so that about half of its points flow plastically and some fail. The
-points are sorted before each round, outside the time, as a cut does every 20 steps or so (`sort`
-gives the cost). Numbers of threads are timed in turn and have to agree; the best of the rounds
-counts.
+A block is sheared so that about half of its points flow plastically and some fail. The points are
+sorted before each round, outside the time, as a cut does every 20 steps or so (`sort` gives the
+cost). Numbers of threads are timed in turn and have to agree; the best of the rounds counts.
 """
 
 from copy import deepcopy
@@ -62,7 +61,7 @@ def copy(source, target):
 
 
 def copy_bandwidth(threads):
-    """Return bytes read and written a second by a copy larger than the caches."""
+    """Bytes read and written a second by a copy larger than the caches."""
     source, target = np.ones(1 << 25), np.empty(1 << 25)
     set_num_threads(threads)
     return 2 * source.nbytes / min(timed(lambda: copy(source, target))[1] for _ in range(8))
@@ -71,8 +70,8 @@ def copy_bandwidth(threads):
 def measure(side, threads, rounds, bandwidth):
     """Time one number of points and print its rows."""
     start = sheared_block(side)
-    points, plastic = start.points.size, np.mean(start.points["increment"] > 0)
-    failing = np.mean(start.points["damage"] >= 1)
+    points, failing = start.points.size, np.mean(start.points["damage"] >= 1)
+    plastic = np.mean(start.points["increment"] > 0)
     target = np.zeros_like(start.points)
     order = start.points, points, start.grid, FAR, FAR, target, start.starts
     sorting = min(timed(lambda: sort_by_cell(*order))[1] for _ in range(3)) / STEPS / points
@@ -88,8 +87,8 @@ def measure(side, threads, rounds, bandwidth):
     print(f"{'':12}{'threads':>8}{'M/s':>8}{'M/s/core':>10}{'ns':>8}{'bound M/s':>11}")
     for count, taken in seconds.items():
         rate, bound = STEPS * points / min(taken[1:]) / 1e6, bandwidth[count] / BYTES / 1e6
-        times = f"{rate:8.2f}{rate / count:10.2f}{1e3 / rate:8.1f}"
-        print(f"{'chipglow':12}{count:8}{times}{bound:11.0f}")
+        print(f"{'chipglow':12}{count:8}{rate:8.2f}{rate / count:10.2f}", end="")
+        print(f"{1e3 / rate:8.1f}{bound:11.0f}")
 
 
 def main():

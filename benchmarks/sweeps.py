@@ -3,9 +3,8 @@
     python benchmarks/sweeps.py [--tasks N] [--points N] [--kills N]
 
 Overhead and efficiency: tasks that sleep 0.2 s, so that other programs on the machine do not count.
-Kills: points of a small scene on a scheduler and two workers in processes of their own. At random
-times a worker, the scheduler or the client is killed (SIGKILL) and started again. The files of the
-points are compared with those of a run in one process, and computations are counted.
+Kills: at random times a worker, the scheduler or the client is killed (SIGKILL) and started again.
+The files of the points are compared with those of one process, and computations are counted.
 """
 
 import os
@@ -20,7 +19,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from common import arguments, print_head, print_row, timed
+from common import arguments, print_head, print_row, print_tables, timed
 
 from chipglow.io import write_scene
 from chipglow.scene import Raster, Scene
@@ -28,11 +27,10 @@ from chipglow.study import Study, sweep, sweeps
 from chipglow.study.workers import local_client, on_client
 
 DURATION = 0.2
-PAUSE = 1.5
-"""Mean time between two kills in s."""
+PAUSE = 1.5  # s, mean between two kills
 
 
-def main() -> None:
+def main():
     given = arguments(__doc__, tasks=100, points=1000, kills=20, client=[""])
     if given.client[0]:
         run_client(*given.client)
@@ -40,8 +38,7 @@ def main() -> None:
     print_head("workers", "time / s", "ideal / s", "overhead / %")
     for workers in (1, 2):
         with local_client(None, workers, given.tasks) as client:
-            run = partial(run_all, client, workers * 4)
-            run()
+            run_all(client, workers * 4)
             _, wall, _ = timed(partial(run_all, client, given.tasks))
         ideal = DURATION * given.tasks / workers
         over = f"{100 * (wall / ideal - 1):.1f}"
@@ -94,11 +91,6 @@ def swept(folder, points, name, **options):
     return sweep(study_of(folder), vary, folder / name, **options)
 
 
-def is_finished(processes):
-    """Return whether the client has ended without an error."""
-    return "client" in processes and processes["client"].poll() == 0
-
-
 def kill_at_random(folder, points, kills):
     """Print how often points were computed, and whether all files are those of one process."""
     generator = random.Random(1)
@@ -107,52 +99,42 @@ def kill_at_random(folder, points, kills):
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])
     address = f"tcp://127.0.0.1:{port}"
-    module = [sys.executable, "-m"]
-    worker = [*module, "distributed.cli.dask_worker", address, "--nthreads", "1"]
-    scheduler = [*module, "distributed.cli.dask_scheduler", "--port", port]
-    client = [sys.executable, str(Path(__file__).resolve()), "--client"]
+    worker = ["-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
     commands = {
-        "scheduler": [*scheduler, "--no-dashboard"],
-        "worker 1": [*worker, "--no-dashboard"],
-        "worker 2": [*worker, "--no-dashboard"],
-        "client": [*client, address, str(folder), str(points)],
+        "scheduler": ["-m", "distributed.cli.dask_scheduler", "--port", port, "--no-dashboard"],
+        "worker 1": worker,
+        "worker 2": worker,
+        "client": [str(Path(__file__).resolve()), "--client", address, str(folder), str(points)],
     }
     env = {**os.environ, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": env, "cwd": folder}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    quiet |= {"env": env, "cwd": folder, "start_new_session": True}
     killed = dict.fromkeys(("client", "scheduler", "worker"), 0)
     started, processes = time.perf_counter(), {}
-    left = kills
     due = time.perf_counter() + 2 * PAUSE
-    while not is_finished(processes):
+    while "client" not in processes or processes["client"].poll() != 0:
         for name, command in commands.items():
             if name not in processes or processes[name].poll() is not None:
-                processes[name] = subprocess.Popen(command, start_new_session=True, **quiet)
-        if left and time.perf_counter() > due:
+                processes[name] = subprocess.Popen([sys.executable, *command], **quiet)
+        if sum(killed.values()) < kills and time.perf_counter() > due:
             name = generator.choice(list(commands))
             os.killpg(processes[name].pid, signal.SIGKILL)
             processes[name].wait()
             killed[name.partition(" ")[0]] += 1
-            left -= 1
             due = time.perf_counter() + generator.uniform(0.5, 1.5) * PAUSE
         time.sleep(0.05)
     for process in processes.values():
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
-    names = {f"{key}.json" for key in reference.keys}
-    same = sum(
-        (folder / "killed" / "points" / name).read_bytes()
-        == (folder / "serial" / "points" / name).read_bytes()
-        for name in names
-    )
-    counts = [path.stat().st_size for path in (folder / "killed" / "points").glob("*.count")]
-    print()
+    names = [f"{key}.json" for key in reference.keys]
+    again, serial = folder / "killed" / "points", folder / "serial" / "points"
+    same = sum((again / name).read_bytes() == (serial / name).read_bytes() for name in names)
+    counts = [path.stat().st_size for path in again.glob("*.count")]
     heads = "points", "kills", "identical files", "computed again", "time / s", "one process / s"
-    print_head(*heads)
     stated = ", ".join(f"{count} {name}" for name, count in killed.items())
-    took = time.perf_counter() - started
-    print_row(
-        str(points), stated, str(same), str(sum(counts) - points), f"{took:.0f}", f"{wall:.0f}"
-    )
+    seconds = f"{time.perf_counter() - started:.0f}", f"{wall:.0f}"
+    row = str(points), stated, str(same), str(sum(counts) - points), *seconds
+    print_tables([[heads, row]], markdown=True)
 
 
 if __name__ == "__main__":

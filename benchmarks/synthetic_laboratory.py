@@ -3,29 +3,26 @@
     python benchmarks/synthetic_laboratory.py [--first 0] [--repeats 100] [--markdown]
     python benchmarks/synthetic_laboratory.py --first 0 --write FOLDER
 
-Of each seed a laboratory with hidden optics, emissivities and detector writes the files of an
-experiment: blackbodies, uniform frames, a heated chip, knife edges, a hot chip. The procedures see
-only the files, and what a person would have noted. What they recover is set beside the truth: it
-shall be in their own 95 % interval in 95 of 100 repeats, and must be in 90. A repeat takes
-seconds; its results are kept in build/synthetic-laboratory, so that an interrupted run goes on.
+A laboratory with hidden optics, emissivities and detector, drawn from a seed, writes the files of
+an experiment. The procedures see only these, and what a person would have noted. What they recover
+shall be in their own 95 % interval in 95 of 100 repeats, and must be in 90. A repeat takes seconds;
+its results are kept in build/synthetic-laboratory, so that an interrupted run goes on.
 """
 
-import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections import namedtuple
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from math import cos, pi, radians, sin
 from pathlib import Path
 from statistics import NormalDist, median
 from tempfile import TemporaryDirectory
-from typing import Any, Final
 
 import numpy as np
 import tifffile
 import yaml
-from numpy.typing import NDArray
+from common import arguments, print_tables
 from scipy.integrate import trapezoid
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
@@ -36,14 +33,11 @@ from chipglow.camera import (
     DeadElements,
     Detector,
     EnergyResponse,
-    FittedCalibration,
     GainPattern,
     GaussianPSF,
     LinearCalibration,
     MeasuredPSF,
-    Measurement,
     OffsetPattern,
-    PointSpreadFunction,
     ReadNoise,
     Recording,
     ShotNoise,
@@ -69,7 +63,6 @@ from chipglow.laboratory.measurement import (
 from chipglow.laboratory.psf import edge_image, knife_edge
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, areas
-from chipglow.uncertainty import Estimate
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from synthetic_edge import (
@@ -83,21 +76,21 @@ from synthetic_edge import (
     tailed_edge,
 )
 
-RESULTS: Final = Path("build/synthetic-laboratory")
-BAND: Final = Band(3.8e-6, 5.1e-6)
-INTEGRATION_TIME: Final = 10e-6
-SHAPE: Final = (48, 64)
-SAMPLES: Final = 3  # of a scene along a pixel's side
-CELSIUS: Final = 273.15
-IMAGES: Final = 4  # of each object: repetitions
-FRAMES: Final = 8
-EDGE_FRAMES: Final = 16
-UNIFORM_FRAMES: Final = 20
-BLACK_BODIES: Final = (200, 260, 320, 390, 460, 540, 620, 700)  # degC
+RESULTS = Path("build/synthetic-laboratory")
+BAND = Band(3.8e-6, 5.1e-6)
+INTEGRATION_TIME = 10e-6
+SHAPE = (48, 64)
+SAMPLES = 3  # of a scene along a pixel's side
+CELSIUS = 273.15
+IMAGES = 4  # of each object: repetitions
+FRAMES = 8
+EDGE_FRAMES = 16
+UNIFORM_FRAMES = 20
+BLACK_BODIES = (200, 260, 320, 390, 460, 540, 620, 700)  # degC
 
 # What the people of the laboratory know of their instruments: standard uncertainties in K.
 THERMOCOUPLE, ROOM, CERTIFICATE, SETTING = 2.0, 2.0, 0.4, 0.3
-GAIN: Final = 4e-3  # counts of an electron
+GAIN = 4e-3  # counts of an electron
 DRIFT = 0.3  # counts from one recording to the next
 
 REGIONS = """regions:
@@ -120,76 +113,54 @@ QUANTITIES = {
 """Recovered quantities and the unit in which they are printed."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """A result of a procedure, with half the width of its own 95 % interval."""
+Found = namedtuple("Found", "value expanded")
+"""A result of a procedure, with half the width of its own 95 % interval."""
 
-    value: float
-    expanded: float
-
-    @classmethod
-    def of(cls, estimate: Estimate) -> "Found":
-        return cls(float(estimate.values), float(estimate.expanded_uncertainty()))
+Optics = namedtuple("Optics", "kind psf fwhm edge transfer")
+"""Hidden optics: point spread function, its width, edge-spread and transfer functions."""
 
 
-@dataclass(frozen=True)
-class Optics:
-    """Hidden optics: point spread function, its width, edge-spread and transfer functions."""
-
-    kind: str
-    psf: PointSpreadFunction
-    fwhm: float
-    edge: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    transfer: Callable[[float], float]
+def gaussian_transfer(sigma, frequency):
+    return np.exp(-2 * (pi * sigma * frequency) ** 2)
 
 
-def gaussian_optics(fwhm: float) -> Optics:
-    """Return a round Gaussian."""
-    sigma = fwhm / FWHM_PER_SIGMA
-    return Optics(
-        "gaussian",
-        GaussianPSF(fwhm),
-        fwhm,
-        gaussian_edge(fwhm),
-        lambda f: float(np.exp(-2 * (pi * sigma * f) ** 2)),
-    )
+def gaussian_optics(fwhm):
+    transfer = partial(gaussian_transfer, fwhm / FWHM_PER_SIGMA)
+    return Optics("gaussian", GaussianPSF(fwhm), fwhm, gaussian_edge(fwhm), transfer)
 
 
-def tailed_optics(core: float, fraction: float, length: float) -> Optics:
+def tailed_optics(core, fraction, length):
     """Return a Gaussian with a tail exp(-r/L)/(2 pi L^2)."""
     sigma = core / FWHM_PER_SIGMA
 
-    def density(r: Any) -> Any:
+    def density(r):
         gauss = np.exp(-(r**2) / (2 * sigma**2)) / (2 * pi * sigma**2)
         return (1 - fraction) * gauss + fraction * np.exp(-r / length) / (2 * pi * length**2)
 
-    def transfer(f: float) -> float:
+    def transfer(f):
         tail = (1 + (2 * pi * length * f) ** 2) ** -1.5
-        return float((1 - fraction) * np.exp(-2 * (pi * sigma * f) ** 2) + fraction * tail)
+        return (1 - fraction) * gaussian_transfer(sigma, f) + fraction * tail
 
     spacing, reach = 1e-6, 8 * length
     line = spacing * np.arange(-round(reach / spacing), round(reach / spacing) + 1)
     psf = MeasuredPSF(density(np.hypot(line, line[:, None])), spacing)
-    top = float(density(0.0))
-    width = 2 * brentq(lambda r: float(density(r)) - top / 2, 0.0, 2 * core)
+    width = 2 * brentq(lambda r: density(r) - density(0.0) / 2, 0.0, 2 * core)
     return Optics("tail", psf, width, tailed_edge(core, fraction, length), transfer)
 
 
-def mirror_optics(aperture: float, obscuration: float) -> Optics:
-    """Return the diffraction of an annular pupil."""
+def mirror_optics(aperture, obscuration):
     psf = AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
     unit = WAVELENGTH / (2 * pi * aperture)
     far, line, energy = annular_line(obscuration)
 
-    def transfer(f: float) -> float:
-        return 2 * float(trapezoid(np.cos(2 * pi * f * unit * far) * line, far)) / energy
+    def transfer(f):
+        return 2 * trapezoid(np.cos(2 * pi * f * unit * far) * line, far) / energy
 
     edge = annular_edge(WAVELENGTH, aperture, obscuration)
     return Optics("mirror", psf, psf.fwhm, edge, transfer)
 
 
-def hidden_optics(generator: np.random.Generator) -> Optics:
-    """Draw one of the kinds with a random width."""
+def hidden_optics(generator):
     kind = generator.choice(["gaussian", "tail", "mirror"])
     if kind == "gaussian":
         return gaussian_optics(generator.uniform(7e-6, 14e-6))
@@ -201,15 +172,9 @@ def hidden_optics(generator: np.random.Generator) -> Optics:
 
 
 class Laboratory:
-    """A laboratory whose true values are known; `perform` writes its files.
+    """A laboratory whose true values are known; `perform` writes the same files of a seed."""
 
-    Parameters
-    ----------
-    seed : int
-        The same seed makes the same files.
-    """
-
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed):
         self._generator = generator = np.random.default_rng(seed)
         # TIFF is read in a subprocess, whose start takes longer than all the rest.
         self.edge_format = ".tif" if seed % 10 == 0 else ".npy"
@@ -235,56 +200,33 @@ class Laboratory:
         self.reading = self.oven + THERMOCOUPLE * generator.standard_normal()
         self.hot = CELSIUS + generator.uniform(450.0, 650.0)
         self.unknown = CELSIUS + generator.uniform(300.0, 600.0)  # a blackbody
-        self.emissivity = self._surface(generator.uniform(0.35, 0.5), generator.uniform(0.5, 0.7))
+        body, shear_band = generator.uniform(0.35, 0.5), generator.uniform(0.5, 0.7)
+        shape = tuple(SAMPLES * count for count in SHAPE)
+        texture = gaussian_filter(generator.standard_normal(shape), 4.0, mode="reflect")
+        emissivity = np.full(shape, body)  # of every sample
+        emissivity[:, SAMPLES * BANDS.start : SAMPLES * BANDS.stop] = shear_band
+        self.emissivity = emissivity + 0.015 * texture / texture.std()
         tilts = generator.uniform(2.0, 9.0, 2) * generator.choice([-1, 1], 2)
         self.normals = tilts + [0.0, 90.0] + 180.0 * generator.integers(0, 2, 2)
 
-    def _surface(self, body: float, shear_band: float) -> NDArray[np.float64]:
-        """Return the emissivity of every sample, with texture."""
-        shape = tuple(SAMPLES * count for count in SHAPE)
-        texture = gaussian_filter(self._generator.standard_normal(shape), 4.0, mode="reflect")
-        emissivity = np.full(shape, body)
-        emissivity[:, SAMPLES * BANDS.start : SAMPLES * BANDS.stop] = shear_band
-        return np.asarray(emissivity + 0.015 * texture / texture.std())
-
-    def reference(self) -> dict[str, float]:
-        """Return the true values by `QUANTITIES`."""
+    def reference(self):
         shape = (SHAPE[0], SAMPLES, SHAPE[1], SAMPLES)
         pixels = self.emissivity.reshape(shape).mean(axis=(1, 3))
         body = np.concatenate([pixels[4:44, 1:9], pixels[4:44, 55:63]])
+        # Of optics and pixel across the first edge.
+        angle = radians(float(self.normals[0]))
+        across, down = FREQUENCY * PITCH * cos(angle), FREQUENCY * PITCH * sin(angle)
+        transfer = self.optics.transfer(FREQUENCY) * (np.sinc(across) * np.sinc(down))
         return {
             "blackbody": self.unknown,
             "emissivity of the body": float(body.mean()),
             "emissivity of the shear band": float(pixels[16:32, 28:36].mean()),
             "PSF, full width": self.optics.fwhm,
-            "MTF at 31 /mm": self._transfer(),
+            "MTF at 31 /mm": float(transfer),
             "temperature of the shear band": self.hot,
         }
 
-    def _transfer(self) -> float:
-        """Return the transfer function of optics and pixel across the first edge."""
-        angle = radians(float(self.normals[0]))
-        across, down = FREQUENCY * PITCH * cos(angle), FREQUENCY * PITCH * sin(angle)
-        return self.optics.transfer(FREQUENCY) * float(np.sinc(across) * np.sinc(down))
-
-    def perform(self, folder: Path) -> None:
-        """Write the files and notes of the experiment."""
-        self._calibrate(folder)
-        for name, celsius in (("cold", 240.0), ("hot", 640.0)):
-            self._record(folder / f"{name}.hcc", _even(celsius + CELSIUS), UNIFORM_FRAMES)
-        for number in range(1, IMAGES + 1):
-            self._record(folder / f"unknown-{number}.hcc", _even(self.unknown), FRAMES)
-            self._record(folder / f"heated-{number}.hcc", self._seen(self.oven), FRAMES)
-            self._record(folder / f"chip-{number}.npy", self._seen(self._field()), FRAMES)
-        for number, normal in enumerate(self.normals, 1):
-            self._record(
-                folder / f"edge-{number}{self.edge_format}", self._edge(normal), EDGE_FRAMES
-            )
-        (folder / "regions.yaml").write_text(REGIONS)
-        notes = {"thermocouple_degC": round(self.reading - CELSIUS, 2)}
-        (folder / "notes.yaml").write_text(yaml.safe_dump(notes))
-
-    def _calibrate(self, folder: Path) -> None:
+    def perform(self, folder):
         lines = ["temperature_degC,file,count_uncertainty,temperature_uncertainty_K"]
         for celsius in BLACK_BODIES:
             error = self.certificate + SETTING * self._generator.standard_normal()
@@ -292,8 +234,20 @@ class Laboratory:
             self._record(folder / name, _even(celsius + CELSIUS + error), FRAMES)
             lines.append(f"{celsius},{name},{DRIFT},{SETTING}")
         (folder / "points.csv").write_text("\n".join(lines) + "\n")
+        for name, celsius in (("cold", 240.0), ("hot", 640.0)):
+            self._record(folder / f"{name}.hcc", _even(celsius + CELSIUS), UNIFORM_FRAMES)
+        for number in range(1, IMAGES + 1):
+            self._record(folder / f"unknown-{number}.hcc", _even(self.unknown), FRAMES)
+            self._record(folder / f"heated-{number}.hcc", self._seen(self.oven), FRAMES)
+            self._record(folder / f"chip-{number}.npy", self._seen(self._field()), FRAMES)
+        for number, normal in enumerate(self.normals, 1):
+            path = folder / f"edge-{number}{self.edge_format}"
+            self._record(path, self._edge(normal), EDGE_FRAMES)
+        (folder / "regions.yaml").write_text(REGIONS)
+        notes = {"thermocouple_degC": round(self.reading - CELSIUS, 2)}
+        (folder / "notes.yaml").write_text(yaml.safe_dump(notes))
 
-    def _record(self, path: Path, radiance: NDArray[np.float64], count: int) -> None:
+    def _record(self, path, radiance, count):
         """Write counts of an image of radiance in the format of the file's suffix."""
         drift = DRIFT / self.slope * self._generator.standard_normal()
         frames = np.broadcast_to(radiance + drift, (count, *SHAPE))
@@ -303,22 +257,18 @@ class Laboratory:
         elif path.suffix == ".tif":
             tifffile.imwrite(path, counts)
         else:
-            times = np.arange(count) / 600.0
-            saturation = float(self.detector.saturation)
-            write_hcc(
-                path,
-                Recording(counts, "counts", times, "laboratory", INTEGRATION_TIME, saturation),
-            )
+            described = "counts", np.arange(count) / 600.0, "laboratory", INTEGRATION_TIME
+            write_hcc(path, Recording(counts, *described, float(self.detector.saturation)))
 
-    def _field(self) -> NDArray[np.float64]:
+    def _field(self):
         """Return the true temperature of the hot chip, uniform in the middle."""
         rows, columns = self.emissivity.shape
         x = PITCH / SAMPLES * (np.arange(columns) - (columns - 1) / 2)
         y = PITCH / SAMPLES * (np.arange(rows) - (rows - 1) / 2)
         beyond = np.maximum(np.hypot(x, y[:, None]) - PLATEAU, 0.0)
-        return np.asarray(self.hot - 60.0 * (1 - np.exp(-((beyond / 60e-6) ** 2))))
+        return self.hot - 60.0 * (1 - np.exp(-((beyond / 60e-6) ** 2)))
 
-    def _seen(self, kelvins: float | NDArray[np.float64]) -> NDArray[np.float64]:
+    def _seen(self, kelvins):
         """Return the radiance of the chip at every pixel."""
         reflected = float(BAND.radiance(np.array(self.room)))
         own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
@@ -326,23 +276,18 @@ class Laboratory:
         raster = Raster(0.0, 0.0, PITCH / SAMPLES, *radiance.shape)
         return Camera(BAND, PITCH, psf=self.optics.psf).form_image(radiance, raster)
 
-    def _edge(self, normal: float) -> NDArray[np.float64]:
+    def _edge(self, normal):
         """Return each pixel's radiance of a hot plate half behind a warm blade."""
         position = self._generator.uniform(-6e-6, 6e-6)
         blade, plate = self._generator.uniform(230.0, 280.0), self._generator.uniform(520.0, 600.0)
         dark, bright = BAND.radiance(np.array([blade, plate]) + CELSIUS)
-        radiance = edge_radiance(
-            self.optics.edge, normal, SHAPE, position, background=dark, step=bright - dark
-        )
-        return np.asarray(radiance)
+        return edge_radiance(self.optics.edge, normal, SHAPE, position, dark, bright - dark)
 
 
-def _even(kelvins: float) -> NDArray[np.float64]:
-    """Return the radiance of a blackbody."""
+def _even(kelvins):
     return np.full(SHAPE, float(BAND.radiance(np.array(kelvins))))
 
 
-_FLAT = (("low", "cold"), ("high", "hot"))
 STACK_FIELDS = ("unit=counts", "interval=2 ms", "saturation=4094")
 
 
@@ -353,33 +298,27 @@ class Evaluation:
     folder: Path
 
     @property
-    def fields(self) -> list[str]:
-        """Description of the camera's files."""
-        flat = [f"flat_field.{end}={self.folder.resolve() / file}.hcc" for end, file in _FLAT]
+    def fields(self):
+        here = self.folder.resolve()
+        flat = f"flat_field.low={here / 'cold'}.hcc", f"flat_field.high={here / 'hot'}.hcc"
         return [*flat, "bad_pixels=find", "pitch=6 um"]
 
-    @cached_property
-    def calibration(self) -> FittedCalibration:
+    def calibrated(self):
         """Calibration by the blackbodies, as ``chipglow calibrate`` makes it."""
         points = read_calibration_points(
             self.folder / "points.csv",
             lambda file: uniform_counts(self.folder / file, self.fields)[0],
         )
+        measured = points["temperature"], points["counts"], BAND
+        stated = points["count_uncertainty"], points["temperature_uncertainty"], CERTIFICATE
         fit = fit_calibration(
-            LinearCalibration,
-            points["temperature"],
-            points["counts"],
-            BAND,
-            points["count_uncertainty"],
-            points["temperature_uncertainty"],
-            CERTIFICATE,
-            integration_time=INTEGRATION_TIME,
+            LinearCalibration, *measured, *stated, integration_time=INTEGRATION_TIME
         )
         path = self.folder / "calibration.yaml"
         path.write_text(calibration_text(CalibrationDescription.of(fit)))
         return load_calibration(path)
 
-    def images(self, pattern: str) -> list[Measurement]:
+    def images(self, pattern):
         """Return recordings as measurements, as ``chipglow convert`` does."""
         fields = [*self.fields, f"calibration={self.folder.resolve() / 'calibration.yaml'}"]
         paths = sorted(self.folder.glob(pattern))
@@ -387,9 +326,8 @@ class Evaluation:
             fields += STACK_FIELDS
         return [load_measurement(path, fields) for path in paths]
 
-    def results(self) -> dict[str, Found]:
-        """Return the results by `QUANTITIES`."""
-        calibration = self.calibration
+    def results(self):
+        calibration = self.calibrated()  # whose file the images need
         heated, chip = self.images("heated-*.hcc"), self.images("chip-*.npy")
         notes = yaml.safe_load((self.folder / "notes.yaml").read_text())
         heating = Heating(
@@ -409,56 +347,52 @@ class Evaluation:
             reflected_temperature(293.0, ROOM),
         )
         return {
-            "blackbody": Found.of(unknown.estimate),
-            "emissivity of the body": Found.of(body.estimate),
-            "emissivity of the shear band": Found.of(shear_band.estimate),
+            "blackbody": found_of(unknown.estimate),
+            "emissivity of the body": found_of(body.estimate),
+            "emissivity of the shear band": found_of(shear_band.estimate),
             **self._spread(),
-            "temperature of the shear band": Found.of(hot.estimate),
+            "temperature of the shear band": found_of(hot.estimate),
         }
 
-    def _spread(self) -> dict[str, Found]:
+    def _spread(self):
         """Return width and MTF of the optics, as ``chipglow psf`` does."""
         factor = NormalDist().inv_cdf(0.975)
         images = self.images("edge-*")
         result = knife_edge([edge_image(image, f"edge {k}") for k, image in enumerate(images, 1)])
         curves = result.edges[0].curves
         at = int(np.argmin(np.abs(curves["frequency"].values - FREQUENCY)))
+        mtf, uncertainty = (float(curves[name][at]) for name in ("mtf", "mtf_uncertainty"))
         return {
             "PSF, full width": Found(result.fwhm, factor * result.edge_uncertainty),
-            "MTF at 31 /mm": Found(
-                float(curves["mtf"][at]), factor * float(curves["mtf_uncertainty"][at])
-            ),
+            "MTF at 31 /mm": Found(mtf, factor * uncertainty),
         }
 
 
-def repeat(seed: int) -> dict[str, tuple[float, float, float]]:
-    """Return truth, value and expanded uncertainty of each quantity for a seed."""
-    laboratory = Laboratory(seed)
-    reference = laboratory.reference()
-    with TemporaryDirectory() as name:
-        laboratory.perform(Path(name))
-        found = Evaluation(Path(name)).results()
-    return {name: (reference[name], found[name].value, found[name].expanded) for name in QUANTITIES}
+def found_of(estimate):
+    return Found(float(estimate.values), float(estimate.expanded_uncertainty()))
 
 
-Row = dict[str, tuple[float, float, float]]
-
-
-def kept(seed: int, folder: Path = RESULTS) -> Row:
-    """Return the result of a repeat, computed or as it was kept."""
+def kept(seed, folder=RESULTS):
+    """Return truth, value and expanded uncertainty by quantity, computed or as they were kept."""
     path = folder / f"{seed}.json"
     if not path.is_file():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(repeat(seed)))
+        laboratory = Laboratory(seed)
+        reference = laboratory.reference()
+        with TemporaryDirectory() as files:
+            laboratory.perform(Path(files))
+            found = Evaluation(Path(files)).results()
+        rows = {name: (reference[name], *found[name]) for name in QUANTITIES}
+        path.write_text(json.dumps(rows))
     return {name: tuple(values) for name, values in json.loads(path.read_text()).items()}
 
 
-def hits(rows: Sequence[Row], name: str) -> int:
+def hits(rows, name):
     """Count the rows whose interval contains the truth."""
     return sum(abs(row[name][1] - row[name][0]) <= row[name][2] for row in rows)
 
 
-def table(rows: Sequence[Row]) -> Iterable[tuple[str, ...]]:
+def table(rows):
     """Yield quantity, hits, and medians of the error and of the interval's half width."""
     yield "quantity", "within", "median |error|", "median U (95 %)"
     for name, unit in QUANTITIES.items():
@@ -469,28 +403,18 @@ def table(rows: Sequence[Row]) -> Iterable[tuple[str, ...]]:
         yield name, f"{hits(rows, name)} of {len(rows)}", *told
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(given=None):
     """Repeat, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--first", type=int, default=0, help="the first seed")
-    parser.add_argument("--repeats", type=int, default=100, help="how many seeds")
-    parser.add_argument("--markdown", action="store_true", help="print a table for a page")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder of kept repeats")
-    parser.add_argument("--write", type=Path, metavar="FOLDER", help="only write a seed's files")
-    options = parser.parse_args(arguments)
-    if options.write is not None:
-        options.write.mkdir(parents=True, exist_ok=True)
-        Laboratory(options.first).perform(options.write)
+    given = arguments(
+        __doc__, given, first=0, repeats=100, markdown=False, results=RESULTS, write=Path
+    )
+    if given.write:
+        given.write.mkdir(parents=True, exist_ok=True)
+        Laboratory(given.first).perform(given.write)
         return
-    seeds = range(options.first, options.first + options.repeats)
-    rows = [kept(seed, options.results) for seed in seeds]
-    for number, line in enumerate(table(rows)):
-        if options.markdown:
-            print("|", " | ".join(line), "|")
-            if number == 0:
-                print("|---|---|---|---|")
-        else:
-            print(f"{line[0]:28}", *(f"{cell:>16}" for cell in line[1:]))
+    seeds = range(given.first, given.first + given.repeats)
+    rows = [kept(seed, given.results) for seed in seeds]
+    print_tables([table(rows)], given.markdown)
 
 
 if __name__ == "__main__":

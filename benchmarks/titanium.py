@@ -8,30 +8,18 @@ its means are kept in build/titanium, so that an interrupted run goes on with th
 is a condition, such as 212.2-0.1 (m/min, mm); cells in um.
 """
 
-import argparse
 import sys
-from collections.abc import Iterable, Mapping
+from collections import namedtuple
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite, nan, radians
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import yaml
-from experiments import (
-    CONDITIONS,
-    FORCE,
-    LENGTH,
-    Means,
-    aligned,
-    check_choices,
-    markdown,
-    means_of,
-    number,
-    parsed,
-    read_entries,
-)
+from common import arguments, minus, print_tables
+from experiments import CONDITIONS, FORCE, LENGTH, Means, in_si, means_of, number, quality
 
 from chipglow.cutting import (
     SOLVER_VERSION,
@@ -58,7 +46,6 @@ FIELDS = {
     "edge_radius": SMALL_LENGTH,
     "thickness": SMALL_LENGTH,
 }
-ALLOWED = {"wear": ("L", "M"), "status": ("ok", "short")}
 
 RAKES = (0.0, 10.0)  # degrees: no source that was read tells it
 CLEARANCE = 7.0
@@ -80,11 +67,6 @@ class Trial:
     wear: str
     status: str
 
-    @classmethod
-    def of(cls, data: Mapping[str, Any]) -> "Trial":
-        check_choices(data, ALLOWED)
-        return cls(**{**data, **{name: unit.parse(data[name]) for name, unit in FIELDS.items()}})
-
 
 class Condition(NamedTuple):
     """Speed in m/s and feed in m of one or more tests."""
@@ -93,79 +75,66 @@ class Condition(NamedTuple):
     feed: float
 
     @property
-    def m_a_minute(self) -> str:
+    def m_a_minute(self):
         return f"{60 * self.speed:.4g}"
 
     @property
-    def mm(self) -> str:
+    def mm(self):
         return f"{1e3 * self.feed:.3g}"
 
     @property
-    def name(self) -> str:
+    def name(self):
         return f"{self.m_a_minute}-{self.mm}"
 
-    def __str__(self) -> str:
+    def __str__(self):
         return f"{self.m_a_minute} m/min, {self.mm} mm"
 
 
-class Cut(NamedTuple):
-    """Measured values: forces of an unknown width in N, thickness in m."""
-
-    cutting_force: float
-    thrust_force: float
-    thickness: float
+Cut = namedtuple("Cut", "cutting_force thrust_force thickness")
+"""Measured values: forces of an unknown width in N, thickness in m."""
 
 
-def read_trials(path: Path = DATA) -> tuple[str, list[Trial]]:
-    """Return the source of the tests, and the tests, checked."""
-    data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    return " ".join(data["source"].split()), read_entries(path, data["tests"], Trial.of)
+def read_trials():
+    """Return the source of the tests, and the tests."""
+    data = yaml.safe_load(DATA.read_text(encoding="utf-8"))
+    trials = [Trial(**in_si(entry, FIELDS)) for entry in data["tests"]]
+    return " ".join(data["source"].split()), trials
 
 
-def repeats(trials: Iterable[Trial]) -> dict[Condition, list[Trial]]:
+def repeats(trials):
     """Group the tests by condition, in order of feed and speed."""
-    found: dict[Condition, list[Trial]] = {}
+    found = {}
     for trial in sorted(trials, key=lambda one: (one.feed, one.speed)):
         found.setdefault(Condition(trial.speed, trial.feed), []).append(trial)
     return found
 
 
-def mean(trials: list[Trial]) -> Cut:
-    """Return the mean of the repeats."""
-    return Cut(
-        fmean(trial.cutting_force for trial in trials),
-        fmean(trial.feed_force for trial in trials),
-        fmean(trial.thickness for trial in trials),
-    )
+def mean(trials):
+    names = ("cutting_force", "feed_force", "thickness")
+    return Cut(*(fmean(getattr(trial, name) for trial in trials) for name in names))
 
 
-def ratios(cuts: Mapping[Condition, Cut | Means]) -> dict[str, float]:
+def ratios(cuts):
     """Return ratios that do not depend on the width of cut, by their name.
 
     Thrust over cutting force and thickness over feed of every cut, and its cutting force over that
     of the next smaller feed at the same speed and of the next lower speed at the same feed.
     """
     ordered = sorted(cuts, key=lambda at: (at.feed, at.speed))
-    forces = {f"Ff / Fc at {at}": cuts[at].thrust_force / cuts[at].cutting_force for at in ordered}
-    thicknesses = {f"thickness / feed at {at}": cuts[at].thickness / at.feed for at in ordered}
-    by_feed = {
-        f"Fc({high.mm} mm) / Fc({low.mm} mm) at {low.m_a_minute} m/min": (
-            cuts[high].cutting_force / cuts[low].cutting_force
-        )
-        for low, high in pairwise(sorted(cuts))
-        if low.speed == high.speed
-    }
-    by_speed = {
-        f"Fc({fast.m_a_minute} m/min) / Fc({slow.m_a_minute} m/min) at {slow.mm} mm": (
-            cuts[fast].cutting_force / cuts[slow].cutting_force
-        )
-        for slow, fast in pairwise(ordered)
-        if slow.feed == fast.feed
-    }
-    return {**forces, **thicknesses, **by_feed, **by_speed}
+    found = {f"Ff / Fc at {at}": cuts[at].thrust_force / cuts[at].cutting_force for at in ordered}
+    found |= {f"thickness / feed at {at}": cuts[at].thickness / at.feed for at in ordered}
+    for low, high in pairwise(sorted(cuts)):
+        if low.speed == high.speed:
+            name = f"Fc({high.mm} mm) / Fc({low.mm} mm) at {low.m_a_minute} m/min"
+            found[name] = cuts[high].cutting_force / cuts[low].cutting_force
+    for slow, fast in pairwise(ordered):
+        if slow.feed == fast.feed:
+            name = f"Fc({fast.m_a_minute} m/min) / Fc({slow.m_a_minute} m/min) at {slow.mm} mm"
+            found[name] = cuts[fast].cutting_force / cuts[slow].cutting_force
+    return found
 
 
-def simulation(trials: list[Trial], rake: float, cell: float) -> CuttingSimulation:
+def simulation(trials, rake, cell):
     """Return the cut of the tests with the library's materials and default friction."""
     speed, feed = trials[0].speed, trials[0].feed
     edge_radius = fmean(trial.edge_radius for trial in trials)
@@ -178,35 +147,28 @@ def simulation(trials: list[Trial], rake: float, cell: float) -> CuttingSimulati
     )
 
 
-def measurements(tests: Mapping[Condition, list[Trial]]) -> list[list[str]]:
+def measurements(tests):
     """Return the table of measured values, its head first."""
     head = ["speed / (m/min)", "feed / mm", "tests", "wear", "edge radius / µm"]
     rows = [[*head, "Fc / N", "Ff / Fc", "thickness / feed"]]
     for at, trials in tests.items():
-        rows.append(
-            [
-                at.m_a_minute,
-                at.mm,
-                ", ".join(trial.name for trial in trials),
-                "".join(sorted({trial.wear for trial in trials})),
-                spread([1e6 * trial.edge_radius for trial in trials], 1),
-                spread([trial.cutting_force for trial in trials], 1),
-                spread([trial.feed_force / trial.cutting_force for trial in trials], 2),
-                spread([trial.thickness / trial.feed for trial in trials], 2),
-            ]
-        )
+        names, wear = ", ".join(one.name for one in trials), {one.wear for one in trials}
+        radius = spread([1e6 * one.edge_radius for one in trials], 1)
+        force = spread([one.cutting_force for one in trials], 1)
+        ratio = spread([one.feed_force / one.cutting_force for one in trials], 2)
+        thickness = spread([one.thickness / one.feed for one in trials], 2)
+        worn = "".join(sorted(wear))
+        rows.append([at.m_a_minute, at.mm, names, worn, radius, force, ratio, thickness])
     return rows
 
 
-def spread(values: list[float], decimals: int) -> str:
+def spread(values, decimals):
     """Return the mean, with the standard deviation of repeats."""
     deviation = f" ± {stdev(values):.{decimals}f}" if len(values) > 1 else ""
     return f"{fmean(values):.{decimals}f}{deviation}"
 
 
-def comparison(
-    measured: Mapping[str, float], computed: Mapping[float, Mapping[str, float]]
-) -> list[list[str]]:
+def comparison(measured, computed):
     """Return the table of measured ratios and those computed at each rake angle, head first."""
     rows = [["quantity", "measured"]]
     for rake in computed:
@@ -216,14 +178,11 @@ def comparison(
         for here in (side.get(quantity, nan) for side in computed.values()):
             known = isfinite(here)
             row += [f"{here:.2f}", f"{100 * (here / there - 1):+.0f} %"] if known else ["–", "–"]
-        rows.append([cell.replace("-", "−") for cell in row])
+        rows.append([minus(cell) for cell in row])
     return rows
 
 
-def cuts_made(
-    outcomes: Mapping[tuple[Condition, float], Means | SolverError],
-    tests: Mapping[Condition, list[Trial]],
-) -> list[list[str]]:
+def cuts_made(outcomes, tests):
     """Return the table of the quality of each cut, its head first."""
     head = ["speed / (m/min)", "feed / mm", "rake / °", "Fc / (N/mm)", "Ff / (N/mm)"]
     head += ["Fc measured / computed / mm", "segment / µm", "segments", "drift / %"]
@@ -233,68 +192,43 @@ def cuts_made(
         if isinstance(means, SolverError):
             rows.append([*row, str(means), *["–"] * 7])
             continue
-        width = mean(tests[at]).cutting_force / means.cutting_force
-        row += [
-            number(means.cutting_force, FORCE),
-            number(means.thrust_force, FORCE),
-            f"{1e3 * width:.2f}",
-            number(means.period * at.speed, SMALL_LENGTH),
-            f"{means.segments}",
-            f"{100 * means.drift:+.0f}",
-            f"{100 * means.unaccounted:.1f}",
-            f"{means.seconds:.0f}",
-        ]
-        rows.append([cell.replace("-", "−") for cell in row])
+        forces = (number(one, FORCE) for one in (means.cutting_force, means.thrust_force))
+        width = f"{1e3 * mean(tests[at]).cutting_force / means.cutting_force:.2f}"
+        segment = number(means.period * at.speed, SMALL_LENGTH)
+        rows.append([*row, *forces, width, segment, f"{means.segments}", *quality(means)])
     return rows
 
 
-def outcome_of(trials: list[Trial], rake: float, cell: float) -> Means | SolverError:
+def outcome_of(trials, rake, cell):
     """Return the means of the cut, stored or computed, or the error that stopped it."""
-    cut = simulation(trials, rake, cell)
     name = f"{Condition(trials[0].speed, trials[0].feed).name}-{rake:g}"
     print(name, file=sys.stderr, flush=True)
     try:
-        return means_of(cut, name, RESULTS)
+        return means_of(simulation(trials, rake, cell), name, RESULTS)
     except SolverError as error:
         return error
 
 
-def computed_ratios(
-    outcomes: Mapping[tuple[Condition, float], Means | SolverError],
-) -> dict[float, dict[str, float]]:
-    """Return the ratios of completed cuts by rake angle."""
-    return {
-        rake: ratios(
-            {
-                at: means
-                for (at, other), means in outcomes.items()
-                if other == rake and isinstance(means, Means)
-            }
-        )
-        for rake in RAKES
-    }
-
-
-def main() -> None:
+def main():
     source, trials = read_trials()
     tests = repeats(trials)
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    given = parsed(parser, [at.name for at in tests], 10.0)
-    tests = {at: found for at, found in tests.items() if at.name in given.names or not given.names}
+    names = tuple(at.name for at in tests)
+    given = arguments(__doc__, names=names, cell=10.0, markdown=False)
+    tests = {at: found for at, found in tests.items() if at.name in given.names}
     outcomes = {
         (at, rake): outcome_of(found, rake, given.cell / 1e6)
         for at, found in tests.items()
         for rake in RAKES
     }
+    computed = {rake: {} for rake in RAKES}
+    for (at, rake), means in outcomes.items():
+        if isinstance(means, Means):
+            computed[rake][at] = means
     there = ratios({at: mean(found) for at, found in tests.items()})
-    table = markdown if given.markdown else aligned
+    here = {rake: ratios(cuts) for rake, cuts in computed.items()}
     print(f"Cell {given.cell:g} um, solver {SOLVER_VERSION}. Measured: {source}")
-    for rows in (
-        measurements(tests),
-        comparison(there, computed_ratios(outcomes)),
-        cuts_made(outcomes, tests),
-    ):
-        print(f"\n{table(rows)}")
+    tables = measurements(tests), comparison(there, here), cuts_made(outcomes, tests)
+    print_tables(tables, given.markdown)
 
 
 if __name__ == "__main__":

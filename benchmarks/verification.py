@@ -6,12 +6,12 @@ Prints a Markdown table and ends with 1 if a check fails. With a folder it draws
 and writes the table as `table.md` if all cases were asked for. About a minute on one core.
 """
 
-import argparse
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
-from time import perf_counter
 
 from cases import cylinder, expansion, heat, motion, plasticity, surface_heat, taylor, upsetting
+from common import arguments, print_head, print_row, timed
 
 from chipglow.drawing.drawing import new_figure, style
 
@@ -30,11 +30,7 @@ CASES = {
     "taylor": taylor.taylor_impact,
 }
 
-
-HEADER = (
-    "| case | what | known | computed | error | tolerance | reason of the tolerance |",
-    "|---" * 7 + "|",
-)
+HEAD = "case", "what", "known", "computed", "error", "tolerance", "reason of the tolerance"
 
 
 def number(value, unit=""):
@@ -43,52 +39,39 @@ def number(value, unit=""):
 
 
 def row(case, check):
-    """One line of the table."""
     unit = check.unit if check.absolute else ""
-    return " | ".join(
-        [
-            case.title,
-            check.quantity,
-            f"{check.source}: {number(check.expected, check.unit)}",
-            number(check.computed, check.unit),
-            number(check.error, unit) if check.absolute else f"{check.error * 100:.2g} %",
-            number(check.tolerance, unit) if check.absolute else f"{check.tolerance * 100:.2g} %",
-            check.reason if check.holds else f"**FAILS** {check.reason}",
-        ]
+    difference, tolerance = (
+        number(each, unit) if check.absolute else f"{each * 100:.2g} %"
+        for each in (check.error, check.tolerance)
     )
+    known = f"{check.source}: {number(check.expected, check.unit)}"
+    computed = number(check.computed, check.unit)
+    reason = check.reason if check.holds else f"**FAILS** {check.reason}"
+    return case.title, check.quantity, known, computed, difference, tolerance, reason
 
 
-def picture(case, folder):
-    """Write a case's figure."""
-    with style():
-        figure = new_figure(case.height)
-        case.draw(figure)
-        figure.savefig(folder / f"{case.name}.png", dpi=120)
-
-
-def main(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, help="folder for the table and the plots")
-    parser.add_argument("cases", nargs="*", help=f"all by default: {', '.join(CASES)}")
-    given = parser.parse_args(arguments)
-    if unknown := sorted(set(given.cases) - set(CASES)):
-        parser.error(f"case: expected some of {', '.join(CASES)}, got {', '.join(unknown)}")
-    if given.out:
-        given.out.mkdir(parents=True, exist_ok=True)
-    lines, failed = list(HEADER), 0
-    print(*HEADER, sep="\n")
-    for name in given.cases or CASES:
-        start = perf_counter()
-        case = CASES[name]()
-        rows = [f"| {row(case, check)} |" for check in case.checks]
-        failed += sum(not check.holds for check in case.checks)
-        print(*rows, sep="\n", flush=True)
-        lines += rows
+def main(given=None):
+    given = arguments(__doc__, given, cases=tuple(CASES), out=Path)
+    rows, failed = [], 0
+    print_head(*HEAD)
+    for name in given.cases:
+        case, seconds, _ = timed(CASES[name])
+        for check in case.checks:
+            failed += not check.holds
+            rows.append(row(case, check))
+            print_row(*rows[-1])
         if given.out:
-            picture(case, given.out)
-        print(f"{name}: {perf_counter() - start:.1f} s", file=sys.stderr)
-    if given.out and not given.cases:
-        (given.out / "table.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+            given.out.mkdir(parents=True, exist_ok=True)
+            with style():
+                figure = new_figure(case.height)
+                case.draw(figure)
+                figure.savefig(given.out / f"{name}.png", dpi=120)
+        print(f"{name}: {seconds:.1f} s", file=sys.stderr)
+    if given.out and len(given.cases) == len(CASES):
+        with (given.out / "table.md").open("w", encoding="utf-8") as file, redirect_stdout(file):
+            print_head(*HEAD)
+            for line in rows:
+                print_row(*line)
     return 1 if failed else 0
 
 

@@ -1,7 +1,7 @@
 """A thick-walled cylinder that expands plastically, against Hill's limit pressure."""
 
+from collections import namedtuple
 from math import log, pi, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -39,26 +39,17 @@ def rigid_plastic(duration=2e-6):
 
     stop = lambda _, state: state[1]  # noqa: E731
     stop.terminal = True
-    times = np.linspace(0.0, duration, 400)
-    solution = solve_ivp(
-        change, (0.0, duration), [INNER, START], t_eval=times, events=stop, rtol=1e-9
-    )
+    chosen = {"t_eval": np.linspace(0.0, duration, 400), "events": stop, "rtol": 1e-9}
+    solution = solve_ivp(change, (0.0, duration), [INNER, START], **chosen)
     return solution.t, *solution.y
 
 
-class Expansion(NamedTuple):
-    """Time (s) and swept area (m²) of an expansion; radii (m) and strains at its end; pressure.
+Expansion = namedtuple("Expansion", "time swept radius strain exact_strain pressure")
+"""Time (s) and swept area (m²) of an expansion; radii (m) and strains at its end; pressure.
 
-    The swept area is that of the bore, over π. The pressure (Pa) is the plastic work over the area
-    that the bore swept.
-    """
-
-    time: np.ndarray
-    swept: np.ndarray
-    radius: np.ndarray
-    strain: np.ndarray
-    exact_strain: np.ndarray
-    pressure: float
+The swept area is that of the bore, over π. The pressure (Pa) is the plastic work over the area
+that the bore swept.
+"""
 
 
 def expand(cell, duration, samples=40):
@@ -120,8 +111,7 @@ def thick_cylinder(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
         rank = np.argsort(finest.radius)
         middle.plot(finest.radius[rank] / MICRO, finest.exact_strain[rank], "k--", linewidth=0.9)
         middle.set(xlabel="radius / µm", ylabel="plastic strain")
-        convergence(right, cells, [np.array(growth) * 100], [None], [BLUE])
-        right.set_ylabel("error of the growth / %")
+        convergence(right, cells, [np.array(growth) * 100], "error of the growth / %")
 
     limits = (
         ("limit pressure (plastic work over swept area), cell 6.7 µm", finest, 0.01),
@@ -130,15 +120,9 @@ def thick_cylinder(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
     growing = "the transfer dissipates what a cell cannot resolve; elastic strain is 0.2 %"
     checks = (
         *(
-            Check(
-                what,
-                "Hill, 2k ln(b/a), mean over the path",
-                limit_pressure(result.swept[-1]) / 1e6,
-                result.pressure / 1e6,
-                tolerance,
-                "the bore's edge is a stair of cells",
-                "MPa",
-            )
+            Check(what, "Hill, 2k ln(b/a), mean over the path",
+                  limit_pressure(result.swept[-1]) / 1e6, result.pressure / 1e6, tolerance,
+                  "the bore's edge is a stair of cells", "MPa")
             for what, result, tolerance in limits
         ),
         Check("growth of the bore until it stops", "ordinary differential equation",

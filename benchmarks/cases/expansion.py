@@ -98,17 +98,12 @@ def bent(cells=(10e-6, 5e-6)):
     def draw(figure):
         left, right = figure.subplots(1, 2)
         p = blocks[-1].points
-        x, y = (
-            p[f"material_{axis}"] + EXAGGERATED * (p[axis] - p[f"material_{axis}"]) for axis in "xy"
-        )
+        starts = p["material_x"], p["material_y"]
+        x, y = (at + EXAGGERATED * (p[axis] - at) for axis, at in zip("xy", starts, strict=True))
         shown = left.scatter(x / MICRO, y / MICRO, 2, p["temperature"], cmap="viridis")
         figure.colorbar(shown, ax=left, label="temperature / K", shrink=0.7)
-        left.set(
-            aspect="equal",
-            title=f"displacements drawn {EXAGGERATED} times",
-            xlabel="x / µm",
-            ylabel="y / µm",
-        )
+        left.set_title(f"displacements drawn {EXAGGERATED} times")
+        left.set(aspect="equal", xlabel="x / µm", ylabel="y / µm")
         for block, colour in zip(blocks, (VERMILLION, BLUE), strict=True):
             inside = np.abs(places(block)[0]) < 0.3 * LENGTH
             height = block.points["material_y"][inside] / MICRO

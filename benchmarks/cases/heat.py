@@ -36,14 +36,10 @@ def half_spaces(cell):
     return x, block.points["temperature"]
 
 
-def error_of(x, temperature):
-    """Mean error in K."""
-    return float(np.abs(temperature - exact(x, START + DURATION)).mean())
-
-
 def conduction(cells=(20e-6, 10e-6, 5e-6)):
     results = [half_spaces(cell) for cell in cells]
-    errors = [error_of(*result) for result in results]
+    apart = (temperature - exact(x, START + DURATION) for x, temperature in results)
+    errors = [float(np.abs(one).mean()) for one in apart]
 
     def draw(figure):
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1))
@@ -54,28 +50,12 @@ def conduction(cells=(20e-6, 10e-6, 5e-6)):
         left.plot(x / MICRO, temperature, ".", color=BLUE, label="cell 20 µm")
         left.set(xlim=(-200, 200), xlabel="x / µm", ylabel="temperature / K")
         left.legend()
-        convergence(right, cells, [errors], [None], [BLUE])
-        right.set_ylabel("mean error / K")
+        convergence(right, cells, [errors], "mean error / K")
 
     checks = (
-        Check(
-            "order of convergence",
-            "erfc",
-            2.0,
-            order(cells, errors),
-            0.2,
-            "central differences on the grid; three cells only",
-            absolute=True,
-        ),
-        Check(
-            "mean error after 60 µs, cell 10 µm",
-            "erfc",
-            0.0,
-            errors[1],
-            1.0,
-            "a step of 600 K over 90 µm: (10/90)² of a few kelvins",
-            unit="K",
-            absolute=True,
-        ),
-    )
+        Check("order of convergence", "erfc", 2.0, order(cells, errors), 0.2,
+              "central differences on the grid; three cells only", absolute=True),
+        Check("mean error after 60 µs, cell 10 µm", "erfc", 0.0, errors[1], 1.0,
+              "a step of 600 K over 90 µm: (10/90)² of a few kelvins", unit="K", absolute=True),
+    )  # fmt: skip
     return Case("conduction", "Two half-spaces", checks, draw)

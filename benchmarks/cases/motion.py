@@ -53,7 +53,7 @@ def momentum():
     checks = tuple(
         Check(what, "conservation", 0.0, float(np.abs(change).max()), *told, absolute=True)
         for what, change, *told in rows
-    )
+    )  # fmt: skip
     return Case("momentum", "A free, spinning block", checks, draw)
 
 
@@ -123,33 +123,19 @@ def waves(cells=(20e-6, 14e-6, 10e-6, 7e-6)):
         left.plot([], "--", color="black", linewidth=0.9, label="exact")
         left.set(xlim=(360, 850), xlabel="x / µm", ylabel="velocity / (m/s)", ylim=(0, 0.15))
         left.legend(ncols=3, loc="upper center")
-        convergence(right, cells, errors * 100, names, colours)
-        right.set_ylabel("error of the speed / %")
+        convergence(right, cells, errors * 100, "error of the speed / %", names, colours)
 
+    dispersion = "dispersion of a Gaussian of standard deviation 7 cells, "
+    dispersion += "which falls with second order"
     checks = []
     for kind in (0, 1):
         speed = exact_speed(kind)
         checks += [
-            Check(
-                f"speed of the {names[kind]}, cell {cells[-1] / MICRO:g} µm",
-                formulas[kind],
-                speed,
-                speed * results[kind][-1][1],
-                0.01,
-                "dispersion of a Gaussian of standard deviation 7 cells, which falls with second "
-                "order",
-                unit="m/s",
-            ),
-            Check(
-                f"order of the {names[kind]}'s speed",
-                "quadratic B-splines",
-                2.0,
-                order(cells, errors[kind]),
-                0.3,
-                "four cells only",
-                absolute=True,
-            ),
-        ]
+            Check(f"speed of the {names[kind]}, cell {cells[-1] / MICRO:g} µm", formulas[kind],
+                  speed, speed * results[kind][-1][1], 0.01, dispersion, unit="m/s"),
+            Check(f"order of the {names[kind]}'s speed", "quadratic B-splines", 2.0,
+                  order(cells, errors[kind]), 0.3, "four cells only", absolute=True),
+        ]  # fmt: skip
     return Case("waves", "Elastic waves", tuple(checks), draw)
 
 
@@ -197,33 +183,21 @@ def vibrations(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
         left.plot(times / 1e-9, exact, "--", color="black", linewidth=0.9, label="exact")
         left.set(xlabel="time / ns", ylabel="velocity of the mode / start")
         left.legend(ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-        convergence(right, cells, [np.array(errors) * 100], [None], [BLUE])
-        right.set_ylabel("error of the period / %")
+        convergence(right, cells, [np.array(errors) * 100], "error of the period / %")
 
     checks = (
-        Check(
-            f"period, cell {cells[2] / MICRO:g} µm",
-            "2L √(ρ (1 − ν²)/E), corrected for the motion across",
-            period / 1e-9,
-            results[2][2] / 1e-9,
-            0.01,
-            "free ends are blurred over a cell, a sixtieth of the length",
-            unit="ns",
-        ),
-        Check(
-            "order of the period",
-            "quadratic B-splines",
-            2.0,
-            order(cells, errors),
-            0.7,
-            "errors under 0.2 %, of which the reading of the crossings is a part",
-            absolute=True,
-        ),
-    )
+        Check(f"period, cell {cells[2] / MICRO:g} µm",
+              "2L √(ρ (1 − ν²)/E), corrected for the motion across", period / 1e-9,
+              results[2][2] / 1e-9, 0.01,
+              "free ends are blurred over a cell, a sixtieth of the length", unit="ns"),
+        Check("order of the period", "quadratic B-splines", 2.0, order(cells, errors), 0.7,
+              "errors under 0.2 %, of which the reading of the crossings is a part",
+              absolute=True),
+    )  # fmt: skip
     return Case("vibration", "A vibrating strip", checks, draw)
 
 
-def convergence(axes, cells, errors, names, colours):
+def convergence(axes, cells, errors, label, names=(None,), colours=(BLUE,)):
     """Size of errors over the cell on logarithmic axes, and the slope of second order."""
     cells, errors = np.array(cells) / MICRO, np.abs(errors)
     for line, name, colour in zip(errors, names, colours, strict=True):
@@ -231,7 +205,7 @@ def convergence(axes, cells, errors, names, colours):
     slope = np.max(errors) * (cells / cells.max()) ** 2
     axes.loglog(cells, slope, ":", color=GREY, label="second order")
     axes.legend(loc="upper left")
-    axes.set(ylim=(None, 2.5 * np.max(errors)), xlabel="cell / µm")
+    axes.set(ylim=(None, 2.5 * np.max(errors)), xlabel="cell / µm", ylabel=label)
     axes.set_xticks(cells, [f"{cell:.3g}" for cell in cells])
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))

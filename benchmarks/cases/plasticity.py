@@ -82,45 +82,31 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
     def draw(figure):
         left, middle, right = figure.subplots(1, 3)
         shear, _, hot, dxy = results[-1]
-        for axes, values, exact in (
-            (left, dxy / 1e6, stress / 1e6),
-            (middle, hot, temperature),
-        ):
+        for axes, values, exact in ((left, dxy / 1e6, stress / 1e6), (middle, hot, temperature)):
             axes.plot(shear, values, ".", color=BLUE, label="solver")
             axes.plot(total * sqrt(3), exact, "k--", linewidth=0.9, label="integral")
             axes.set_xlabel("shear")
         left.set(ylabel="shear stress / MPa", ylim=(0, None))
         left.legend()
         middle.set_ylabel("temperature / K")
-        right.loglog(np.array(steps) * 1e3, errors, "o-", color=BLUE, markersize=4)
-        slope = errors[0] * np.array(steps) / steps[0]
-        right.loglog(np.array(steps) * 1e3, slope, ":", color=GREY, label="first order")
+        sizes = np.array(steps) * 1e3
+        right.loglog(sizes, errors, "o-", color=BLUE, markersize=4)
+        right.loglog(sizes, errors[0] * sizes / sizes[0], ":", color=GREY, label="first order")
         right.axhline(lower_limit, color=GREEN, linewidth=0.9, label="whole kelvins")
         right.set(xlabel="shear in a step / 10⁻³", ylabel="error of the temperature / K")
-        right.set_xticks(np.array(steps) * 1e3, [f"{step * 1e3:g}" for step in steps])
+        right.set_xticks(sizes, [f"{size:g}" for size in sizes])
         right.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
         right.minorticks_off()
         right.legend()
 
     rise = (expected[1] - 293.0, float(results[-1][2][-1]) - 293.0)
     checks = (
-        Check(
-            "plastic strain at a shear of 1",
-            "ordinary differential equation",
-            expected[0],
-            float(results[-1][1][-1]),
-            1e-3,
-            "1000 steps, first order in the step",
-        ),
-        Check(
-            "temperature rise at a shear of 1",
-            "ordinary differential equation",
-            *rise,
-            5e-3,
-            "1000 steps, first order in the step; heat capacity from a table of whole kelvins",
-            unit="K",
-        ),
-    )
+        Check("plastic strain at a shear of 1", "ordinary differential equation", expected[0],
+              float(results[-1][1][-1]), 1e-3, "1000 steps, first order in the step"),
+        Check("temperature rise at a shear of 1", "ordinary differential equation", *rise, 5e-3,
+              "1000 steps, first order in the step; heat capacity from a table of whole kelvins",
+              unit="K"),
+    )  # fmt: skip
     return Case("shear", "Adiabatic shear", checks, draw)
 
 
@@ -159,23 +145,11 @@ def friction(coefficients=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)):
         axes.legend()
 
     checks = (
-        Check(
-            "tangential over normal force, less μ: largest of 9",
-            "Coulomb",
-            0.0,
-            float(np.abs(ratios - coefficients).max()),
-            1e-9,
-            "rounding: the impulses are μ times the normal ones, point by point",
-            absolute=True,
-        ),
-        Check(
-            "tangential force at μ = 1, flow stress 30 MPa",
-            "area · σ/√3",
-            limit / 1e3,
-            largest / 1e3,
-            1e-9,
-            "rounding: every point of the face is at the limit",
-            unit="N/mm",
-        ),
-    )
+        Check("tangential over normal force, less μ: largest of 9", "Coulomb", 0.0,
+              float(np.abs(ratios - coefficients).max()), 1e-9,
+              "rounding: the impulses are μ times the normal ones, point by point", absolute=True),
+        Check("tangential force at μ = 1, flow stress 30 MPa", "area · σ/√3", limit / 1e3,
+              largest / 1e3, 1e-9, "rounding: every point of the face is at the limit",
+              unit="N/mm"),
+    )  # fmt: skip
     return Case("friction", "A block on the rake face", checks, draw)

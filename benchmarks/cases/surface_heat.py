@@ -84,9 +84,8 @@ def surface_flux():
         left.plot(depth / MICRO, rise, ".", color=BLUE, label="cell 20 µm")
         left.set(xlim=(0, 150), xlabel="depth / µm", ylabel="rise / K")
         left.legend()
-        labels = ["all points", "surface's row"]
-        convergence(right, CELLS, [mean, worst], labels, [BLUE, VERMILLION])
-        right.set_ylabel("mean error / K")
+        names, colours = ("all points", "surface's row"), (BLUE, VERMILLION)
+        convergence(right, CELLS, [mean, worst], "mean error / K", names, colours)
 
     why = "flux at the points, to the nodes by the slopes of their weights; three cells only"
     return Case(
@@ -147,13 +146,10 @@ def moving_source():
         left.plot(fine / MICRO, rises, "k--", linewidth=0.9, label="Jaeger")
         left.plot(results[1][0] / MICRO, results[1][1], ".", color=GREEN, label="cell 10 µm")
         left.axvspan(-HALF_WIDTH / MICRO, HALF_WIDTH / MICRO, color="0.93", zorder=0)
-        left.set(
-            xlabel="place from the middle of the source / µm",
-            ylabel="rise of the surface's row / K",
-        )
+        left.set_xlabel("place from the middle of the source / µm")
+        left.set_ylabel("rise of the surface's row / K")
         left.legend()
-        convergence(right, CELLS, [errors], [None], [GREEN])
-        right.set_ylabel("mean error / highest rise")
+        convergence(right, CELLS, [errors], "mean error / highest rise", colours=(GREEN,))
 
     return Case(
         "moving-source",

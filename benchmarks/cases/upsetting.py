@@ -61,39 +61,28 @@ def rough_plates(cells=(25e-6, 20e-6, 12.5e-6, 10e-6)):
 
     def draw(figure):
         left, right = figure.subplots(1, 2, width_ratios=(1.6, 1), sharey=True)
-        for (way, pressures), cell, colour in zip(
-            results, cells, (GREY, VERMILLION, GREEN, BLUE), strict=True
-        ):
+        colours = (GREY, VERMILLION, GREEN, BLUE)
+        for (way, pressures), cell, colour in zip(results, cells, colours, strict=True):
             left.plot(way / MICRO, pressures, color=colour, label=f"cell {cell / MICRO:g} µm")
         left.axhline(PRANDTL, color="black", linestyle="--", linewidth=0.9, label="Prandtl")
         left.set(ylim=(0, 2.4), xlabel="way of the plate / µm", ylabel="mean pressure / 2k")
         left.legend()
         fine = np.linspace(0, cells[0], 2)
-        right.plot(
-            fine / MICRO, extrapolated + slope * fine, ":", color=GREY, label="straight line"
-        )
+        line = extrapolated + slope * fine
+        right.plot(fine / MICRO, line, ":", color=GREY, label="straight line")
         right.plot(np.array(cells) / MICRO, limits, "o", color=BLUE, label="solver")
         right.plot(0, PRANDTL, "s", color="black", label="Prandtl")
         right.set_xlabel("cell / µm")
         right.legend(loc="lower right")
 
+    straight = "a straight line through four cells; the strip widens by 1 %; "
+    straight += "the formula is an approximation"
     checks = (
-        Check(
-            "mean pressure over 2k, extrapolated to no cell",
-            "Prandtl, 3/4 + w/(4h)",
-            PRANDTL,
-            extrapolated,
-            0.03,
-            "a straight line through four cells; the strip widens by 1 %; the formula is an "
-            "approximation",
-        ),
-        Check(
-            f"the same, cell {cells[-1] / MICRO:g} µm: 10 cells in the half height",
-            "Prandtl, 3/4 + w/(4h)",
-            PRANDTL,
-            limits[-1],
-            0.1,
-            "material slips off the plate within a cell: first order in the cell",
-        ),
-    )
+        Check("mean pressure over 2k, extrapolated to no cell", "Prandtl, 3/4 + w/(4h)", PRANDTL,
+              extrapolated, 0.03,
+              straight),
+        Check(f"the same, cell {cells[-1] / MICRO:g} µm: 10 cells in the half height",
+              "Prandtl, 3/4 + w/(4h)", PRANDTL, limits[-1], 0.1,
+              "material slips off the plate within a cell: first order in the cell"),
+    )  # fmt: skip
     return Case("upsetting", "A strip between rough plates", checks, draw)

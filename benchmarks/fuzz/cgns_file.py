@@ -1,9 +1,5 @@
 """A CGNS file by hand, after the standard's mapping to HDF5: one zone of quadrilaterals."""
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
-
 import h5py
 import numpy as np
 
@@ -11,14 +7,7 @@ _TYPES = {"float32": "R4", "float64": "R8", "int32": "I4", "int8": "C1"}
 _QUAD_4 = 7
 
 
-def write_cgns(
-    path: Path,
-    points: Any,
-    quads: Any,
-    of_nodes: dict[str, Any],
-    of_elements: dict[str, Any],
-    times: Sequence[float] = (),
-) -> None:
+def write_cgns(path, points, quads, of_nodes, of_elements, times=()):
     """Write points (n, 3), quadrilaterals (m, 4), and fields of nodes and of elements.
 
     With times, fields are those of nodes, with a row for each.
@@ -45,7 +34,7 @@ def write_cgns(
             _solution(zone, "AtCellCenter", "CellCenter", of_elements)
 
 
-def _over_time(base: Any, zone: Any, of_nodes: dict[str, Any], times: Sequence[float]) -> None:
+def _over_time(base, zone, of_nodes, times):
     """A solution for each time, as Sandia's programs name them."""
     names = [f"VertexSolutionAtStep{step:05}" for step in range(1, len(times) + 1)]
     for number, name in enumerate(names):
@@ -58,23 +47,23 @@ def _over_time(base: Any, zone: Any, of_nodes: dict[str, Any], times: Sequence[f
     _node(steps, "TimeValues", "DataArray_t", np.asarray(times, np.float64))
 
 
-def _solution(zone: Any, name: str, place: str, fields: dict[str, Any]) -> None:
+def _solution(zone, name, place, fields):
     solution = _node(zone, name, "FlowSolution_t")
     _node(solution, "GridLocation", "GridLocation_t", _text(place))
     for field, values in fields.items():
         _node(solution, field, "DataArray_t", np.asarray(values, np.float64))
 
 
-def _text(text: str) -> Any:
+def _text(text):
     return np.frombuffer(text.encode(), np.int8)
 
 
-def _node(parent: Any, name: str, label: str, data: Any = None) -> Any:
+def _node(parent, name, label, data=None):
     # Nodes are found in the order in which they were made.
     return _mark(parent.create_group(name, track_order=True), name, label, data)
 
 
-def _mark(group: Any, name: str, label: str, data: Any = None) -> Any:
+def _mark(group, name, label, data=None):
     kind = "MT" if data is None else _TYPES[data.dtype.name]
     for key, value, length in (("name", name, 33), ("label", label, 33), ("type", kind, 3)):
         group.attrs.create(key, np.bytes_(value), dtype=h5py.string_dtype("ascii", length))

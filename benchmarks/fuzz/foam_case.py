@@ -9,7 +9,10 @@ PARTS = (
 )  # fmt: skip
 """The files of a case."""
 
-_HEAD = "FoamFile {{ version 2.0; format ascii; class {}; object {}; }}\n"
+
+def write(path, kind, content):
+    head = f"FoamFile {{ version 2.0; format ascii; class {kind}; object {path.name}; }}\n"
+    path.write_text(head + content)
 
 
 def write_foam(folder: Path, sides: str = "type zeroGradient;", velocity: str = "") -> Path:
@@ -44,24 +47,21 @@ def write_foam(folder: Path, sides: str = "type zeroGradient;", velocity: str = 
         "neighbour": ("labelList", [1]),
     }
     for name, (kind, rows) in tables.items():
-        body = f"{len(rows)}\n(\n" + "\n".join(map(str, rows)) + "\n)\n"
-        (mesh / name).write_text(_HEAD.format(kind, name) + body)
+        write(mesh / name, kind, f"{len(rows)}\n(\n" + "\n".join(map(str, rows)) + "\n)\n")
     boundary = "1\n(\nsides { type patch; nFaces 10; startFace 1; }\n)\n"
-    (mesh / "boundary").write_text(_HEAD.format("polyBoundaryMesh", "boundary") + boundary)
+    write(mesh / "boundary", "polyBoundaryMesh", boundary)
     control = "application none; startFrom startTime; startTime 0; stopAt endTime; endTime 1;\n"
     control += "deltaT 0.5; writeControl runTime; writeInterval 0.5;\n"
-    (folder / "system" / "controlDict").write_text(
-        _HEAD.format("dictionary", "controlDict") + control
-    )
+    write(folder / "system" / "controlDict", "dictionary", control)
     for time in ("0", "0.5"):
         (folder / time).mkdir()
         values = f"nonuniform List<scalar> 2({300 + 10 * float(time)} 400)"
         field = f"dimensions [0 0 0 1 0 0 0];\ninternalField {values};\n"
         field += f"boundaryField {{ sides {{ {sides} }} }}\n"
-        (folder / time / "T").write_text(_HEAD.format("volScalarField", "T") + field)
+        write(folder / time / "T", "volScalarField", field)
         if velocity:
             field = f"dimensions [0 1 -1 0 0 0 0];\ninternalField uniform {velocity};\n"
             field += "boundaryField { sides { type zeroGradient; } }\n"
-            (folder / time / "U").write_text(_HEAD.format("volVectorField", "U") + field)
+            write(folder / time / "U", "volVectorField", field)
     (folder / "case.foam").touch()
     return folder / "case.foam"

@@ -2,11 +2,10 @@
 
     python benchmarks/fuzz/fuzz.py [--cases 100000] [--only .vtu .npz]
 
-Files of every format are damaged: cut, bytes changed, numbers made huge, parts repeated, removed or
-exchanged with another file. Each is read in a fork of this process, with limits of memory and time
-as the product sets them. Whatever is no plain refusal is read once more the way the product does,
-in `chipglow.io.sandbox`, and has to end in one `SourceError` there (three of a kind and file).
-After 50 hangs a file is left. The command fails if a case is not contained. Linux only.
+Files of every format are damaged, and each is read in a fork of this process, with limits of memory
+and time as the product sets them. Whatever is no plain refusal is read once more the way the
+product does, in `chipglow.io.sandbox`, and has to end in one `SourceError` there (three of a kind
+and file). After 50 hangs a file is left. The command fails if a case is not contained. Linux only.
 """
 
 import gc
@@ -42,7 +41,6 @@ NUMBER = re.compile(rb"[0-9][0-9.+\-eE]*")
 
 
 def damaged(content, other, random):
-    """The content with up to four changes."""
     data = bytearray(content)
     for _ in range(random.randint(1, 4)):
         # Headers decide what is allocated: half of the changes are made in the first 512 bytes.
@@ -100,7 +98,6 @@ def outcome_of(source):
 
 
 def fuzz(name, contents, cases, folder, escaped):
-    """Count the outcomes of damaged copies of one file."""
     counts, others = Counter(), list(contents.values())
     source, path = source_of(folder, name), folder / name
     for number in range(cases):
@@ -127,11 +124,8 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         contents = {name: (folder / name).read_bytes() for name in write_seeds(folder)}
-        chosen = [
-            name
-            for name in contents
-            if not given.only or Path(Path(name).parts[0]).suffix in given.only
-        ]
+        kinds = {name: Path(Path(name).parts[0]).suffix for name in contents}
+        chosen = [name for name in contents if not given.only or kinds[name] in given.only]
         print_head("file", *OUTCOMES, "ms a case")
         for name in chosen:
             read(source_of(folder, name))  # compiles what the forks then have

@@ -126,17 +126,17 @@ def write_meshes(folder):
     write_cgns(folder / "chip.cgns", points, quads, {"Temperature": temperature}, {})
     write_tecplot_zones(folder / "chip.plt", points, quads, temperature, strain)
     write_d3plot(folder / "d3plot", points, quads, temperature)
-    exodus = vtkExodusIIWriter()
-    exodus.SetFileName(str(folder / "chip.e"))
-    exodus.SetInputData(grid)
-    exodus.Write()
+    written_by(vtkExodusIIWriter(), folder / "chip.e", grid)
     grid.cell_data["BlockId"] = np.ones(grid.n_cells, np.int32)
-    ensight = vtkEnSightWriter()
-    ensight.SetFileName(str(folder / "ensight"))
-    ensight.SetInputData(grid)
-    ensight.Write()
-    ensight.WriteCaseFile(1)
+    written_by(vtkEnSightWriter(), folder / "ensight", grid).WriteCaseFile(1)
     next(folder.glob("ensight*.case")).rename(folder / "chip.case")
+
+
+def written_by(writer, path, grid):
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    writer.Write()
+    return writer
 
 
 def write_tecplot_zones(path, points, quads, temperature, strain):

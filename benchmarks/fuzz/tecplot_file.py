@@ -3,7 +3,6 @@
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,16 +37,7 @@ class ZoneOfFile:
     remarks: dict[str, str] = field(default_factory=dict)
 
 
-def write_tecplot(
-    path: Path,
-    names: Sequence[str],
-    zones: Sequence[ZoneOfFile],
-    *,
-    version: int = 112,
-    order: str = "<",
-    extras: bytes = b"",
-    file_type: int = 0,
-) -> Path:
+def write_tecplot(path, names, zones, *, version=112, order="<", extras=b"", file_type=0):
     """Write zones; extras are whole records of the header beside the zones."""
     words = _Words(order)
     words.raw(f"#!TDV{version}".encode())
@@ -68,7 +58,7 @@ def write_tecplot(
     return path
 
 
-def extras_of_header(order: str = "<") -> bytes:
+def extras_of_header(order="<"):
     """A line, a circle, a text, labels, a record and remarks: nothing of zones."""
     words = _Words(order)
     for shape, rest in ((0, ("2i6f", 1, 3, *[0.0] * 6)), (3, ("d", 1.0))):
@@ -84,16 +74,14 @@ def extras_of_header(order: str = "<") -> bytes:
     words.text("")
     words.put("i", 0)
     words.text("a text")
-    words.put("f", 599.0)
-    words.put("i", 2)
+    words.put("fi", 599.0, 2)
     words.text("one")
     words.text("two")
     words.put("f", 699.0)
     words.text("a record")
     words.put("f", 799.0)
     words.remark("Made.By", "hand")
-    words.put("f", 899.0)
-    words.put("i", 0)
+    words.put("fi", 899.0, 0)
     words.remark("Unit", "m")
     return bytes(words.content)
 
@@ -108,8 +96,16 @@ class _Words:
     def put(self, kinds, *values):
         self.content += struct.pack(self.order + kinds, *values)
 
+    def integers(self, values):
+        for value in values:
+            self.put("i", value)
+
+    def flagged(self, known, values):
+        """A flag, and values if it is set."""
+        self.integers([known, *values] if known else [0])
+
     def text(self, text):
-        self.put(f"{len(text) + 1}i", *text.encode(), 0)
+        self.integers([*text.encode(), 0])
 
     def remark(self, name, value):
         self.text(name)
@@ -128,9 +124,7 @@ def _header(words, zone, version):
     words.put("2idii", -1, zone.strand, zone.time, -1, kind)
     if version < 112:
         words.put("i", 0)  # blocks
-    words.put("i", int(any(zone.centred)))
-    if any(zone.centred):
-        words.put(f"{len(zone.centred)}i", *map(int, zone.centred))
+    words.flagged(any(zone.centred), zone.centred)
     if version >= 108:
         words.put("i", int(zone.raw_neighbours > 0))
     words.put("i", len(zone.neighbours) // 3)
@@ -138,7 +132,7 @@ def _header(words, zone, version):
         words.put("i", 0)
         if kind and version >= 108:
             words.put("i", 0)
-    words.put(f"{len(zone.shape)}i", *zone.shape)
+    words.integers(zone.shape)
     if kind:
         words.put("3i", 0, 0, 0)
     for name, value in zone.remarks.items():
@@ -149,21 +143,13 @@ def _header(words, zone, version):
 
 def _data(words, zone):
     words.put("f", 299.0)
-    count = len(zone.columns)
     stored = [column for column in zone.columns if isinstance(column, np.ndarray)]
-    formats = [
-        _FORMATS[column.dtype.str[1:]] if isinstance(column, np.ndarray) else 1
-        for column in zone.columns
-    ]
-    words.put(f"{count}i", *formats)
-    passive = [int(isinstance(column, str)) for column in zone.columns]
-    words.put("i", int(any(passive)))
-    if any(passive):
-        words.put(f"{count}i", *passive)
+    kinds = (getattr(getattr(column, "dtype", None), "str", "<f4") for column in zone.columns)
+    words.integers(_FORMATS[kind[1:]] for kind in kinds)
+    passive = [isinstance(column, str) for column in zone.columns]
+    words.flagged(any(passive), passive)
     shared = [column[1] if isinstance(column, tuple) else -1 for column in zone.columns]
-    words.put("i", int(max(shared) >= 0))
-    if max(shared) >= 0:
-        words.put(f"{count}i", *shared)
+    words.flagged(max(shared) >= 0, shared)
     words.put("i", zone.cells if isinstance(zone.cells, int) else -1)
     for column in stored:
         words.put("2d", float(column.min()), float(column.max()))
@@ -173,5 +159,5 @@ def _data(words, zone):
         return
     if zone.cells is not None:
         words.array(np.asarray(zone.cells, np.int32))
-    words.put(f"{zone.raw_neighbours}i", *[-1] * zone.raw_neighbours)
-    words.put(f"{len(zone.neighbours)}i", *zone.neighbours)
+    words.integers([-1] * zone.raw_neighbours)
+    words.integers(zone.neighbours)

@@ -6,8 +6,8 @@ left Cauchy-Green tensor, with radial return in it (Simo 1992). The material poi
 regular grid, no mesh, and integrates a rate of stress. The wall is y = 0, without friction.
 """
 
+from collections import namedtuple
 from math import exp, log, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,29 +21,16 @@ BY_U, BY_V = U * (1 + AT_V * V) / 4, V * (1 + AT_U * U) / 4
 """Shape functions at the integration points (points, nodes), and their derivatives."""
 
 
-class Steel(NamedTuple):
-    """Elastic constants (Pa), density, heat capacity, and Johnson and Cook's constants (SI)."""
+Steel = namedtuple(
+    "Steel",
+    "shear_modulus bulk_modulus density heat_capacity taylor_quinney yield_stress hardening "
+    "hardening_exponent rate_sensitivity thermal_exponent melting_temperature "
+    "reference_temperature",
+)
+"""Elastic constants (Pa), density, heat capacity, and Johnson and Cook's constants (SI)."""
 
-    shear_modulus: float
-    bulk_modulus: float
-    density: float
-    heat_capacity: float
-    taylor_quinney: float
-    yield_stress: float
-    hardening: float
-    hardening_exponent: float
-    rate_sensitivity: float
-    thermal_exponent: float
-    melting_temperature: float
-    reference_temperature: float
-
-
-class Struck(NamedTuple):
-    """A bar after its impact: nodes (columns, rows, 2) in m; fields (elements, 4)."""
-
-    nodes: np.ndarray
-    strain: np.ndarray
-    temperature: np.ndarray
+Struck = namedtuple("Struck", "nodes strain temperature")
+"""A bar after its impact: nodes (columns, rows, 2) in m; fields (elements, 4)."""
 
 
 @njit(cache=True)
@@ -172,12 +159,9 @@ def element_forces(
                 temperature[e, k] += s.taylor_quinney * work / (s.density * s.heat_capacity)
             b[0], b[1], b[2], b[3] = isochoric(xx, yy, zz, xy)
             part = gradients(x, k, axial, slopes)
-            sxx, syy, szz, sxy = (
-                2 * s.shear_modulus * xx + pressure,
-                2 * s.shear_modulus * yy + pressure,
-                2 * s.shear_modulus * zz + pressure,
-                2 * s.shear_modulus * xy,
-            )
+            twice = 2 * s.shear_modulus
+            sxx, syy, szz = twice * xx + pressure, twice * yy + pressure, twice * zz + pressure
+            sxy = twice * xy
             for a in range(4):
                 n = slopes[a]
                 forces[elements[e, a], 0] -= part * (n[0] * sxx + n[1] * sxy + n[2] * szz)
