@@ -55,6 +55,11 @@ class Camera(Part):
     The default camera has no lower range limit. Its point spread function is the diffraction of a
     reflecting objective in the camera's band. `paper` returns the paper's camera.
 
+    Raises
+    ------
+    ValueError
+        If a value is out of its limits; the message names field, value and limits.
+
     Warns
     -----
     ChipglowWarning
@@ -309,9 +314,22 @@ class Camera(Part):
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
-        """Measure a scene, a frame for each start of an integration in s, such as `frame_times`.
+        """Measure a scene.
 
-        The measurement has the scene's tool, and attributes of camera and surface.
+        Parameters
+        ----------
+        scene : Scene
+            The true temperatures.
+        surface : Surface
+            The emissivity.
+        start : float or sequence of float
+            Start of each frame's integration in s; `frame_times` returns a sequence at the frame
+            rate.
+
+        Returns
+        -------
+        Measurement
+            One frame for each start, with the scene's tool and attributes of camera and surface.
         """
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)
@@ -331,10 +349,23 @@ class Camera(Part):
         return np.where(fraction < 1 - _ROUNDING, 1 - fraction, 0.0)
 
     def form_image(self, radiance: Array, scene: Raster, gather: Gather = integrate) -> Array:
-        """Return the radiance that pixels display of that of a scene's samples in W/(m² sr).
+        """Form the image of a radiance map on the pixels by optics, PSF and footprint.
 
-        `gather` takes samples, their raster, that of the pixels and the fill factor, and returns
-        what the pixels receive, such as the mean over each square (`integrate`).
+        Parameters
+        ----------
+        radiance : ndarray
+            Mean radiance over the integration time in W/(m² sr), shape `scene.shape`, such as
+            `Exposure.mean_radiance`.
+        scene : Raster
+            Grid of the samples.
+        gather : callable
+            Takes samples, their raster, the raster of the pixels and the fill factor. Returns the
+            values that the pixels receive, such as the mean over each square (`integrate`).
+
+        Returns
+        -------
+        ndarray
+            Pixel radiance in W/(m² sr), shape `pixels(scene).shape`.
         """
         image = np.asarray(radiance, np.float64)
         if image.shape != scene.shape:

@@ -93,8 +93,19 @@ class Surface(Part, ABC):
     ) -> EmissivityField:
         """Lay the surface on a scene; what depends on the whole scene is computed here.
 
-        A surface that is not grey requires the camera's band. `reflected` is the temperature of the
-        surroundings that it reflects in K; None: they are dark.
+        Parameters
+        ----------
+        scene : Scene
+            The scene.
+        band : Band, optional
+            The camera's spectral band, for a surface that is not grey.
+        reflected : float, optional
+            Temperature of the surroundings that the surface reflects in K; None: they are dark.
+
+        Raises
+        ------
+        ValueError
+            If the scene lacks a field, or a surface that is not grey has no band.
         """
 
     @property
@@ -135,9 +146,20 @@ class Modifier(Part, ABC):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """Return the change of a surface's emissivity on a scene; see `Surface.prepare`.
+        """Return the change of the emissivity of a surface on a scene.
 
-        It is 0 in the void and must stay so.
+        Parameters
+        ----------
+        surface : Surface
+            The surface that is modified.
+        scene, band, reflected
+            As for `Surface.prepare`.
+
+        Returns
+        -------
+        callable
+            Takes the surface's emissivity, float32 of shape (y, x), which is 0 in the void and
+            must stay so, and the frame; returns the modified one.
         """
 
     def redrawn(self, number: int) -> Self:

@@ -56,7 +56,12 @@ class DetectorResponse(Part, ABC):
     def electrons(self, point: OperationPoint, capacity: float) -> float:
         """Return the electrons that 1 W/(m² sr) makes in an element in one frame.
 
-        `capacity` are those that fill the detector or its digitiser.
+        Parameters
+        ----------
+        point : OperationPoint
+            How the camera uses the detector.
+        capacity : float
+            Electrons that fill the detector or its digitiser.
         """
 
 

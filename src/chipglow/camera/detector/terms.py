@@ -84,7 +84,20 @@ class DetectorTerm(Part, ABC):
 
     @abstractmethod
     def apply(self, electrons: Array, readout: Readout) -> Array:
-        """Return the electrons after the previous stages, shape (time, y, x), with the effect."""
+        """Return the electrons with the effect.
+
+        Parameters
+        ----------
+        electrons : ndarray
+            Signal of every element and frame after the previous stages, shape (time, y, x).
+        readout : Readout
+            The frames.
+
+        Returns
+        -------
+        ndarray
+            Signal of the same shape.
+        """
 
 
 @DETECTOR_TERMS.part

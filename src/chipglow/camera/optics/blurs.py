@@ -45,7 +45,13 @@ class BlurTerm(Part, ABC):
 
     @abstractmethod
     def transfer(self, across: Array, up: Array) -> Array:
-        """Return the transfer function at frequencies to the right and up in 1/m, broadcast."""
+        """Return the transfer function, 1 at zero frequency.
+
+        Parameters
+        ----------
+        across, up : ndarray
+            Spatial frequencies to the right and up in 1/m, broadcast against each other.
+        """
 
 
 Deviation = Annotated[

@@ -122,6 +122,11 @@ class PupilPSF(PointSpreadFunction):
     band : Band
         Band of the camera, with its response.
 
+    Raises
+    ------
+    ValueError
+        If a value is out of its limits, or the aberrations exceed about 10 wavelengths.
+
     Notes
     -----
     With the pupil coordinate ρ (the sine of the angle over the aperture, for an aplanatic lens),

@@ -32,7 +32,14 @@ class OpticsTerm(Part, ABC):
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         """Return the image on the scene's samples, before the pixels integrate it.
 
-        `blurred` includes the assumption about radiance beyond the scene.
+        Parameters
+        ----------
+        radiance : ndarray
+            Radiance of the samples.
+        scene, pixels : Raster
+            Grids of the samples and of the pixels.
+        blurred : Blur
+            Convolution, which includes the assumption about radiance beyond the scene.
         """
         return radiance
 

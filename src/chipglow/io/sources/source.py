@@ -176,8 +176,29 @@ class Source(ABC):
 
     @abstractmethod
     def survey(self) -> Survey:
-        """Return what the source contains; raise SourceError if it cannot be read."""
+        """Return what the source contains.
+
+        Raises
+        ------
+        SourceError
+            If it cannot be read.
+        OSError
+            If a file is missing or not accessible.
+        """
 
     @abstractmethod
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
-        """Sample the frames from number `start` on; only a few are in memory at a time."""
+        """Sample the frames one by one; only a few are in memory at a time.
+
+        Parameters
+        ----------
+        raster : Raster
+            Positions of the samples.
+        start : int
+            Index of the first frame to sample.
+
+        Raises
+        ------
+        SourceError
+            If a frame cannot be read.
+        """
