@@ -149,6 +149,21 @@ def test_a_failure_is_shown_on_the_page(opened):
     assert sent == [{"kind": "status", "content": shown}]
 
 
+def test_values_answer_the_message_that_caused_them_not_a_later_one(opened):
+    """Otherwise the page would overwrite what the later message has just set."""
+    view, sent, waiting = PageView(opened), [], []
+    view.page._send_msg = sent.append
+    document = SimpleNamespace(
+        add_next_tick_callback=waiting.append, hold=lambda policy: None, unhold=lambda: None
+    )
+    view.start(document)
+    for number in (1, 2):
+        view._receive(SimpleNamespace(data={"n": number, "kind": "step", "content": ""}))
+    for act in waiting:
+        act()
+    assert [one["content"]["n"] for one in sent if one["kind"] == "values"] == [1, 2]
+
+
 def test_the_error_of_the_true_temperature_has_emissivity_as_a_part_of_its_own(model):
     state = model.controls.changed(
         model.controls.initial, {"analysis.reference": "true", "error_image": "emissivity"}

@@ -113,10 +113,11 @@ class View:
     # Messages of the page
 
     def _receive(self, event: Any) -> None:
-        message = event.data
+        self._later(lambda: self._act(event.data))
+
+    def _act(self, message: dict[str, Any]) -> None:
         self._handled = int(message["n"])
-        act = getattr(self, f"_on_{message['kind']}")
-        self._later(lambda: act(message.get("content")))
+        getattr(self, f"_on_{message['kind']}")(message.get("content"))
 
     def _notified(self, kind: str, *content: Any) -> None:
         self._later(lambda: getattr(self, f"_show_{kind}")(*content))
