@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.analysis.cut import spread_starts
+from chipglow.analysis.cut import middle_start
 from chipglow.analysis.images import Array, ExposureImages, reference_temperature
 from chipglow.analysis.places import Place
 from chipglow.camera import UNUSABLE, Camera, Exposure
@@ -149,8 +149,7 @@ def attribute(
     """
     plan = AttributionPlan(tuple(effects), reference, permutations)
     if start is None:
-        starts = spread_starts(scene, camera.frame_duration(scene.raster), 3)
-        start = float(starts[len(starts) // 2])
+        start = middle_start(scene, camera.frame_duration(scene.raster))
     field = camera.prepare(surface, scene)
     model = _Model(camera, _sources(scene, camera, surface, field, start, check), plan, check)
     variables = _divided(model, plan.permutations, seed)

@@ -147,6 +147,12 @@ def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float
     return np.asarray(np.unique(times[nearest_frame]), dtype=np.float64)
 
 
+def middle_start(scene: Scene, duration: float) -> float:
+    """Return the start of an exposure in the middle of the scene's longest part."""
+    starts = spread_starts(scene, duration, 3)
+    return float(starts[len(starts) // 2])
+
+
 def other_starts(scene: Scene, duration: float) -> list[float]:
     """Return starts of the scene's other parts that are as long as an exposure."""
     starts = []

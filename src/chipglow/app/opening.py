@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from chipglow.analysis import spread_starts
-from chipglow.analysis.cut import lacking
+from chipglow.analysis.cut import lacking, middle_start
 from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
 from chipglow.app.pictures import MeasurementModel, Model, SceneModel, with_samples
@@ -39,8 +39,7 @@ def scene_model(scene: Scene, study: Study, name: str, file: str | None) -> Scen
     if "plastic_strain" not in scene.fields and study.surface == Study().surface:
         study = unchecked(study, surface=UniformSurface(0.5))
     duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
-    starts = spread_starts(scene, duration, 3)
-    start, places = starts[len(starts) // 2], _through(scene.raster)
+    start, places = middle_start(scene, duration), _through(scene.raster)
     coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
     if segment := _developed(coarse, duration, study.analysis.exposures):
         start, places = segment.start, _across(segment)
