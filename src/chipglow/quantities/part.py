@@ -237,6 +237,12 @@ class Family:
         found = (getattr(part, "example", "") for part in self.parts.values())
         return "\n".join(f"  {example}" for example in found if example)
 
+    @property
+    def example(self) -> str:
+        """The first example, as errors show it; "a value" without one."""
+        first = self.examples.partition("\n")[0].strip()
+        return f"one such as {first}" if first else "a value"
+
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
@@ -248,8 +254,7 @@ class Family:
             part = self.find(kind)
             if part is None:
                 if not isinstance(value, Mapping):
-                    example = self.examples.split("\n")[0].strip()
-                    raise ValueError(f"{reprlib.repr(value)}, expected one such as {example}")
+                    raise ValueError(f"{reprlib.repr(value)}, expected {self.example}")
                 shown = "is missing" if kind is None else reprlib.repr(kind)
                 raise ValueError(f"kind: {shown}, expected one of {', '.join(self.kinds)}")
             return adapter(part).validate_python(value, context=info.context)
@@ -408,19 +413,17 @@ def _meaning(word: str, part: Any) -> list[str]:
 def _check_complete(data: Mapping[str, Any], part: Any) -> None:
     """Raise a ValidationError with an example if a setting without a default is missing."""
     known = part.defaults().keys() | data.keys()
-    for name, annotation in part._annotations.items():
-        if name in known:
-            continue
-        error = ValueError(f"is missing, expected {_example(annotation)}")
-        line: Any = {"type": "value_error", "loc": (name,), "input": data, "ctx": {"error": error}}
+    if missing := [name for name in part._annotations if name not in known]:
+        error = ValueError(f"is missing, expected {_example(part._annotations[missing[0]])}")
+        place = (missing[0],)
+        line: Any = {"type": "value_error", "loc": place, "input": data, "ctx": {"error": error}}
         raise ValidationError.from_exception_data(part.__name__, [line])
 
 
 def _example(annotation: Any) -> str:
     """Return an example of a setting; "a value" if it declares none."""
-    for family in families(annotation):
-        if family.examples:
-            return f"one such as {family.examples.splitlines()[0].strip()}"
+    if family := next(families(annotation), None):
+        return family.example
     quantity = _parameter(annotation).quantity
     return quantity.expected.removeprefix("expected ") if quantity else "a value"
 
