@@ -262,8 +262,8 @@ def test_the_report_states_the_causes_of_each_main_error(chip_analysis):
     rake, *_ = attribution.sentences(facts)
     assert rake.startswith("Rake face, mid-contact (chip 2): the measured temperature is ")
     values = attribution.contributions(facts)["rake"]
-    assert f"emissivity −{abs(values['emissivity']):.0f} °C" in rake
-    assert f"is {abs(sum(values.values())):.0f} °C below the true temperature" in rake
+    assert f"emissivity −{abs(values['emissivity']):.0f} K" in rake
+    assert f"is {abs(sum(values.values())):.0f} K below the true temperature" in rake
 
 
 def test_a_sentence_describes_one_pixel(scene):
@@ -272,10 +272,10 @@ def test_a_sentence_describes_one_pixel(scene):
     text = attribution.attribution_sentence(data, 20e-6, 0.0)
     one = data.sel(x=20e-6, y=0.0, method="nearest")
     total = float(one.measured - one.reference)
-    assert text.startswith(f"The measured temperature is {abs(total):.0f} °C below")
-    assert f"emissivity −{abs(float(one.contribution.sel(effect='emissivity'))):.0f} °C" in text
+    assert text.startswith(f"The measured temperature is {abs(total):.0f} K below")
+    assert f"emissivity −{abs(float(one.contribution.sel(effect='emissivity'))):.0f} K" in text
     gain = float(one.gain_half_exposure)
-    assert f"halving the exposure would reduce the error by {gain:.0f} °C" in text
+    assert f"halving the exposure would reduce the error by {gain:.0f} K" in text
 
 
 @pytest.mark.parametrize(

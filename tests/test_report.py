@@ -171,7 +171,7 @@ def test_the_page_stands_alone_and_escapes_text(page, result, facts):
         assert value in shown
     rows = all_rows(facts)
     for row in (*rows["errors"], *rows["cut"], *rows["chip"]):
-        causes = () if row.unit != "°C" else row.draws.parts if row.draws else ()
+        causes = () if row.unit != "K" else row.draws.parts if row.draws else ()
         names = ("quantity", "paper", "mean", "interval", "one-draw", *causes)
         assert all(row.cells[name] in shown for name in names) and row.explanation in shown
     headings = [f"{number}:" for number in PAPER_FIGURES.values()] + ["Table 1:", "Table 2:"]
@@ -289,8 +289,8 @@ def test_the_answer_states_interval_and_whether_the_paper_differs(facts):
     sentences = sentences_of(facts)
     error = facts.headlines["rake"].error
     low, high = (f"{-end:.0f}" for end in error.interval[::-1])
-    mean = f"{-error.mean:.0f} ± {error.expanded_uncertainty:.0f} °C too low on average"
-    assert f"{mean}; in a single frame between {low} °C and {high} °C too low" in sentences[0]
+    mean = f"{-error.mean:.0f} ± {error.expanded_uncertainty:.0f} K too low on average"
+    assert f"{mean}; in a single frame between {low} K and {high} K too low" in sentences[0]
     for sentence in sentences[:-1]:
         assert ("lies within the interval" in sentence) != ("lies outside the interval" in sentence)
 
@@ -302,8 +302,8 @@ def test_the_answer_ends_with_the_true_temperature_without_and_with_emissivity(f
     emissivity = float(facts.data.set_emissivity.sel(surface="chip 2"))
     assert 0.74 < emissivity < 0.88
     assert sentences_of(facts)[-1] == (
-        f"At the first of these places (rake face) the reading is {-plain:.0f} °C too low against "
-        f"the true temperature with emissivity 1, and {-corrected:.0f} °C too low with emissivity "
+        f"At the first of these places (rake face) the reading is {-plain:.0f} K too low against "
+        f"the true temperature with emissivity 1, and {-corrected:.0f} K too low with emissivity "
         f"{emissivity:.2f} set in the camera."
     )
     rows = {row.key: row for row in result_rows(facts.analysis)}

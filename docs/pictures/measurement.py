@@ -46,7 +46,7 @@ def main() -> None:
             camera.pixels(scene.raster),
         ),
         (
-            ImagePanel("error", "measured − true / °C", error, (-limit, limit), scales.SIGNED),
+            ImagePanel("error", "measured − true / K", error, (-limit, limit), scales.SIGNED),
             camera.pixels(scene.raster),
         ),
     )

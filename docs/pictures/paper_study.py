@@ -36,7 +36,7 @@ def main() -> None:
 
 
 def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:
-    lines = ["| error | paper / °C | here / °C | one frame / °C | PSF, paper / % | PSF, here / % |"]
+    lines = ["| error | paper / K | here / K | one frame / K | PSF, paper / % | PSF, here / % |"]
     lines.append("|---|---|---|---|---|---|")
     for key, name in NAMES.items():
         fraction = key.replace("_error_degC", "_psf_fraction_percent")
@@ -55,7 +55,7 @@ def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:
 
 def _causes(summary: dict[str, dict[str, dict[str, dict[str, float]]]]) -> str:
     causes = list(summary["causes"]["rake_error_degC"])
-    lines = ["| sd / °C (part of the sum of squares / %) | " + " | ".join(causes) + " |"]
+    lines = ["| sd / K (part of the sum of squares / %) | " + " | ".join(causes) + " |"]
     lines.append("|---" * (1 + len(causes)) + "|")
     for key, name in NAMES.items():
         parts = summary["causes"][key]

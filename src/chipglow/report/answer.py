@@ -63,7 +63,7 @@ def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
         parts.append(f"the point spread function accounts for {percent} of the error")
     if row.paper is not None and row.differs is not None:
         side = "outside" if row.differs else "within"
-        parts.append(f"the paper's {-row.paper:.0f} °C lies {side} the interval of a single frame")
+        parts.append(f"the paper's {-row.paper:.0f} K lies {side} the interval of a single frame")
     if (saturated := _saturated(facts, name)) >= _MANY:
         percent = quantity_text(100 * saturated, "%", 0)
         parts.append(f"{percent} of the pixels there are saturated: a camera shows no temperature")
@@ -115,10 +115,10 @@ def error_text(error: Distribution) -> str:
     low, high = sorted(scale * end for end in error.interval)
     if not isfinite(low):
         return f"{text} (no interval: {error.draws} draws with too few degrees of freedom)"
-    least = quantity_text(abs(low), "°C", 0) + (f" too {other}" if low < 0 else "")
-    most = f"{quantity_text(high, '°C', 0)} too {way}"
+    least = quantity_text(abs(low), "K", 0) + (f" too {other}" if low < 0 else "")
+    most = f"{quantity_text(high, 'K', 0)} too {way}"
     return f"{text} on average; in a single frame between {least} and {most}"
 
 
 def _side(error: float) -> str:
-    return f"{quantity_text(abs(error), '°C', 0)} too {'low' if error < 0 else 'high'}"
+    return f"{quantity_text(abs(error), 'K', 0)} too {'low' if error < 0 else 'high'}"

@@ -76,13 +76,16 @@ def maps(facts: Facts) -> Figure | None:
     shown = every.sel(effect=size > _LEAST)
     if shown.size == 0:
         return None
-    limit = scales.round_limit(shown.values, 99.5, 10.0)
+    limits = {
+        effect: scales.round_limit(shown.sel(effect=effect).values, 99.0, 5.0)
+        for effect in shown.effect.values
+    }
     panels = [
         ImagePanel(
             of_surface(facts, _label(effect), name),
-            "contribution / °C",
+            "contribution / K",
             shown.sel(surface=name, effect=effect).values,
-            (-limit, limit),
+            (-limits[effect], limits[effect]),
             scales.SIGNED,
         )
         for effect in shown.effect.values
@@ -107,7 +110,7 @@ def profiles(facts: Facts) -> Figure | None:
         _stack(axes, along, one.attribution_line.values, [*map(_label, data.effect.values)])
         axes.set(title=line_title(facts, str(name)))
         axes.set_xlabel(f"distance / {unit}")
-        axes.set_ylabel("contribution / °C")
+        axes.set_ylabel("contribution / K")
     for axes in list(grid):
         axes.remove()
     handles, labels = figure.axes[0].get_legend_handles_labels()
@@ -144,16 +147,16 @@ def _sentence(
         return f"{subject} is not known: nothing radiates there."
     ordered = sorted(contributions.items(), key=lambda item: -abs(item[1]))
     parts = [
-        f"{_label(name)} {quantity_text(value, '°C', 0, '+')}"
+        f"{_label(name)} {quantity_text(value, 'K', 0, '+')}"
         for name, value in ordered
         if abs(value) >= _LEAST
     ]
     way = "below" if error < 0 else "above"
     truth = "true temperature" if reference == "true" else "largest radiance temperature"
-    text = f"{subject} is {quantity_text(abs(error), '°C', 0)} {way} the {truth}"
+    text = f"{subject} is {quantity_text(abs(error), 'K', 0)} {way} the {truth}"
     text += f": {', '.join(parts)}" if parts else ""
     if np.isfinite(gain) and abs(gain) >= _LEAST:
         change = "reduce" if gain > 0 else "increase"
-        amount = quantity_text(abs(gain), "°C", 0)
+        amount = quantity_text(abs(gain), "K", 0)
         text += f"; halving the exposure would {change} the error by {amount}"
     return f"{text}."

@@ -77,6 +77,7 @@ def rake_profiles(facts: Facts) -> Figure | None:
                 grid.along * 1e6,
                 grid.frame_mean[row] - KELVIN,
                 yerr=grid.frame_standard_deviation[row],
+                errorevery=(row, grid.depth.size),  # the bars of the depths would overlap
                 color=colour,
                 linewidth=1.4,
                 elinewidth=0.8,
@@ -171,7 +172,7 @@ def bands(facts: Facts) -> Figure | None:
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for letter, axes, (moved, chart) in zip("ab", panels, facts.band_charts, strict=True):
         _draw_chart(axes, chart)
-        axes.set_title(f"{letter}) travel of {1e6 * moved:.0f} µm in an exposure")
+        axes.set_title(f"{letter}) bands moving {1e6 * moved:.0f} µm in an exposure")
         axes.set_xlabel("width of the temperature profile / µm")
     ours = np.array([(1e6 * band.width, band.rise) for band in facts.bands])
     panels[0].plot(*ours.T, "o", color="black", label="segments of this study")

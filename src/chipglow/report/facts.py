@@ -202,7 +202,7 @@ class Facts:
         return low, max(high, low + 50.0)
 
     def series(self, reading: str, unit: str) -> Array | None:
-        """Return error in °C or fraction of the PSF in % over the PSF widths; None if unknown."""
+        """Return error in K or fraction of the PSF in % over the PSF widths; None if unknown."""
         if "psf_width" not in self.data or reading not in self.data.reading:
             return None
         order = self.analysis.camera.psf_order

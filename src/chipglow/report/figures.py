@@ -1,7 +1,7 @@
 """Figures of any analysis: scene, measurement, errors as images, along lines and over time."""
 
 from collections.abc import Callable, Iterable
-from itertools import groupby
+from itertools import cycle, groupby
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -141,7 +141,7 @@ def error_images(facts: Facts) -> Figure:
             raster = analysis.measurements[name].raster
             ImagePanel(
                 of_surface(facts, title, name),
-                f"{title} / °C",
+                f"{title} / K",
                 images.sel(surface=name).values,
                 (-limit, limit),
                 scales.SIGNED,
@@ -178,7 +178,7 @@ def error_lines(facts: Facts) -> Figure | None:
         if facts.is_compared:
             _draw_published(right, str(name))
         left.set(title=line_title(facts, str(name)), ylabel="radiance temperature / °C")
-        right.set_ylabel("error / °C")
+        right.set_ylabel("error / K")
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
             axes.set_xlabel(_LINE_LABELS.get(name, f"distance / {unit}"))
@@ -202,17 +202,19 @@ def over_time(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(3.4)
     panels = figure.subplots(1, len(surfaces), sharex=True, sharey=True, squeeze=False)[0]
     factor, unit = drawing.time_unit(float(starts[-1]))
+    colours = dict(zip(first, cycle(scales.COLOURS)))
     for axes, (surface, keys) in zip(panels, surfaces.items(), strict=True):
         for key in [one for one in first if one in keys][:_MAX_CURVES]:
             label, found = first[key]
             values = found.error.values.reshape(len(starts), -1)
             bars: Any = {"marker": "o", "markersize": 3, "capsize": 2, "label": label}
+            bars["color"] = colours[key]
             axes.errorbar(starts * factor, values.mean(axis=1), values.std(axis=1), **bars)
         axes.axhline(0.0, color=GREY, linewidth=0.6)
         axes.set(
             title=of_surface(facts, "error", surface), xlabel=f"start of the exposure / {unit}"
         )
-    panels[0].set_ylabel("error / °C")
+    panels[0].set_ylabel("error / K")
     _legend(figure, list(panels), columns=2)
     return figure
 
@@ -245,7 +247,7 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
                 own_width, colour = psf.fwhm * 1e6, _ORDERS[order][0]
                 _draw_point(axes, own_width, scale * draws.mean, colour, "PSF of this camera")
             place = data.place.sel(reading=name).item()
-            axes.set(title=place, ylabel=f"{title} / {'%' if scale == 100 else '°C'}")
+            axes.set(title=place, ylabel=f"{title} / {'%' if scale == 100 else 'K'}")
     for axes in grid[-1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
     _legend(figure, grid.flat, columns=2)

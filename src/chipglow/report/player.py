@@ -166,4 +166,5 @@ def _views(facts: Facts) -> Iterator[View]:
             ("Error", error, (-largest, largest), scales.SIGNED, "error, blue where negative"),
         ):
             frames = images.sel(surface=name).values.astype(np.float64)
-            yield View(f"{title}{of}", frames, limits, colours, f"Image of the {alt}{of}.")
+            unit = "K" if title == "Error" else "°C"
+            yield View(f"{title}{of}", frames, limits, colours, f"Image of the {alt}{of}.", unit)

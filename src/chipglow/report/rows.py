@@ -85,7 +85,7 @@ class Row:
             "interval": f"{' to '.join(ends)} {self.unit}".strip() if isfinite(low) else "–",
             "one-draw": quantity_text(self.one_draw, self.unit, self.decimals),
             "differs": {None: "–", True: "yes", False: "no"}[self.differs],
-            "reference": draws_text(self.reference),
+            "reference": draws_text(self.reference, unit="°C"),
             "error": draws_text(draws),
             **{name: draws_text(part) for name, part in self.parts.items()},
             **{
@@ -247,11 +247,11 @@ def known(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
-def draws_text(draws: Distribution | None, scale: float = 1.0) -> str:
-    """Return mean and its expanded uncertainty in °C, with a decimal for small numbers."""
+def draws_text(draws: Distribution | None, scale: float = 1.0, unit: str = "K") -> str:
+    """Return mean and its expanded uncertainty, with a decimal for small numbers."""
     if draws is None:
         return "–"
-    return spread_text(scale * draws.mean, draws.expanded_uncertainty, "°C", _decimals(draws))
+    return spread_text(scale * draws.mean, draws.expanded_uncertainty, unit, _decimals(draws))
 
 
 def _decimals(draws: Distribution) -> int:
