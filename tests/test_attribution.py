@@ -115,7 +115,7 @@ def test_sampled_values_close_and_lie_within_their_standard_errors():
 @pytest.mark.parametrize("reference", ["true", "maximum"])
 def test_contributions_and_waterfall_add_up_to_the_error_of_every_pixel(scene, reference):
     data = attribute(scene, CAMERA, UniformSurface(0.6), reference=reference)
-    names = ["exposure", "psf", "footprint", "noise", "range limit"]
+    names = ["exposure", "psf", "footprint", "detector", "range limit"]
     expected = ["emissivity", "reflection", *names] if reference == "true" else names
     assert list(data.effect.values) == expected
     for name in ("contribution", "waterfall"):

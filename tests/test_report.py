@@ -451,7 +451,7 @@ def test_numbers_are_printed_with_sign_unit_and_dash():
 
     assert cells(row) == ("−42 °C", "−35 ± 3 °C", "–", "–", "yes")
     assert replace(row, uncertainty=3.4).differs is False
-    assert replace(row, freedom=None).cells["mean"] == "−35 ± 2 °C"
+    assert replace(row, freedom=None).cells["mean"] == "−35 °C (sd 2 K)"
     rate = Row("rate_per_s", "Rate", "1/s", 123456.0, -3)
     assert cells(rate) == ("–", "123 000 1/s", "–", "–", "–")
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)

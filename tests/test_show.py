@@ -160,6 +160,16 @@ def test_the_command_prints_flags_tool_forces_and_provenance(tmp_path, monkeypat
     assert "interval" not in text
 
 
+def test_the_command_prints_the_parts_of_a_scene_with_a_gap(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = AnalyticChip().scene()
+    kept = [*range(10), *range(20, 25)]
+    write_scene(Scene(whole.data.isel(time=kept)), "scene.nc")
+    _, text = show("scene.nc")
+    times = [f"{1e6 * whole.times[index]:.7g} µs" for index in (0, 9, 20, 24)]
+    assert f"{times[0]} to {times[1]}, {times[2]} to {times[3]}" in text
+
+
 def test_the_command_draws(path):
     code, text = show("scene.nc", "--plot", "scene.png")
     assert code == 0, text

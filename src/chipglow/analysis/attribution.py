@@ -29,7 +29,7 @@ EFFECTS: Final = (
     "psf",
     "optics",
     "footprint",
-    "noise",
+    "detector",
     "range limit",
 )
 """Effects in the order of the light, from the surface to the camera's range."""
@@ -344,7 +344,7 @@ class _Model:
             "reflection": self.sources.reflects,
             "psf": psf is not None,
             "optics": bool(camera.optics),
-            "noise": camera.detector is not None,
+            "detector": camera.detector is not None,
             "range limit": camera.lower_limit is not None,
         }
         groups: dict[str, _Coalition] = {}
@@ -361,7 +361,7 @@ class _Model:
         if not on - {"range limit"} - self.contained:
             return self.reference, usable
         camera = self._switched(on)
-        image = self._image(on - {"range limit", "noise"} - self.noises)
+        image = self._image(on - {"range limit", "detector"} - self.noises)
         radiance, flags = camera.read(image[None], np.array([self.start]))
         kelvins = np.asarray(camera.band.temperature(radiance[0]), np.float64)
         return kelvins, usable if flags is None else flags[0] & UNUSABLE != 0
@@ -385,8 +385,8 @@ class _Model:
 
         optics = tuple(one for one in camera.optics if is_on(one.kind, "optics"))
         if detector is not None:
-            terms = tuple(one for one in detector.terms if is_on(one.kind, "noise"))
-            detector = replace(detector, terms=terms) if terms or "noise" in on else None
+            terms = tuple(one for one in detector.terms if is_on(one.kind, "detector"))
+            detector = replace(detector, terms=terms) if terms or "detector" in on else None
         psf = camera.psf if "psf" in on else None
         order = camera.psf_order if psf else "optics"
         return replace(camera, psf=psf, psf_order=order, optics=optics, detector=detector)

@@ -94,6 +94,10 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
 def _scene_facts(scene: StoredScene, path: Path) -> _Rows:
     raster, times, data = scene.raster, scene.times, scene.data
     yield from _where_and_when("samples", raster, times)
+    if len(scene.blocks) > 1:
+        ends = (times[[one[0], one[-1]]] for one in scene.blocks)
+        spans = (f"{microseconds(first)} to {microseconds(last)}" for first, last in ends)
+        yield "parts without gap", ", ".join(spans)
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
     if "force_time" in data:

@@ -76,7 +76,8 @@ class Row:
         spread = self.expanded_uncertainty if has_draws else self.uncertainty
         low, high = draws.interval if draws and not self.is_least else (nan, nan)
         ends = (quantity_text(known(end), "", self.decimals) for end in (low, high))
-        mean = spread_text(self.here, None if self.is_least else spread, self.unit, self.decimals)
+        written = spread_text if has_draws else deviation_text
+        mean = written(self.here, None if self.is_least else spread, self.unit, self.decimals)
         causes = draws.parts if draws else {}
         return {
             "quantity": self.quantity,
@@ -264,10 +265,21 @@ def _decimals(draws: Distribution) -> int:
 def spread_text(
     value: float | None, spread: float | None, unit: str, decimals: int, sign: str = ""
 ) -> str:
-    """Return a number with its spread, if that is known, and its unit; a dash for None or NaN."""
+    """Return a number ± its uncertainty, if known, and its unit; a dash for None or NaN."""
     if value is None or not isfinite(value):
         return "–"
     if spread is None or not isfinite(spread):
         return quantity_text(value, unit, decimals, sign)
     number = quantity_text(value, "", decimals, sign)
     return f"{number} ± {quantity_text(spread, unit, decimals)}"
+
+
+def deviation_text(
+    value: float | None, deviation: float | None, unit: str, decimals: int, sign: str = ""
+) -> str:
+    """Return a number, and the standard deviation of single values in brackets, if known."""
+    text = spread_text(value, None, unit, decimals, sign)
+    if text == "–" or deviation is None or not isfinite(deviation):
+        return text
+    of_difference = "K" if unit == "°C" else unit
+    return f"{text} (sd {quantity_text(deviation, of_difference, decimals)})"
