@@ -26,7 +26,9 @@ def test_a_feed_of_a_cell_and_a_small_edge_are_named_with_the_cell_that_would_do
         numerics=Numerics(cell=20e-6),
     )
     feed, edge = simulation.resolution_warnings
-    assert feed == "The feed, 20 um, is 1 cell, expected 5 or more: set cutting.numerics.cell to 4 um."
+    assert (
+        feed == "The feed, 20 um, is 1 cell, expected 5 or more: set cutting.numerics.cell to 4 um."
+    )
     assert edge.startswith("The edge radius, 30 um, is 1.5 cells")
 
 
