@@ -87,8 +87,11 @@ html_theme_options = {
 GENERATED.mkdir(exist_ok=True)
 (GENERATED / "study.yaml").write_text(study_text(Study()), encoding="utf-8")
 
-# The page on studies shows the schema's description of every field of the cut.
-(GENERATED / "fields.md").write_text(field_tables(Study().cutting, "cutting"), encoding="utf-8")
+# The page on studies shows the schema's description of every field.
+SECTIONS = [
+    field_tables(getattr(Study(), name), name) for name in ("cutting", "camera", "analysis")
+]
+(GENERATED / "fields.md").write_text("\n".join(SECTIONS), encoding="utf-8")
 
 # So does the page on imports.
 (GENERATED / "import-fields.md").write_text(

@@ -148,7 +148,7 @@ REFUSED = {
     "each pair of": lambda: SpectralTable(((3e-6, 300.0, 0.6), (3e-6, 300.0, 0.7))),
     "emissivities from 1.6": lambda: SpectralTable(((3e-6, 300.0, 1.6),)),
     "covers the rake face": lambda: Wedge(overhang=-40e-6),
-    "does not state its tool": lambda: UniformSurface(0.4).modified(Wedge()).prepare(BARE, BAND),
+    "the scene has no tool": lambda: UniformSurface(0.4).modified(Wedge()).prepare(BARE, BAND),
     "oxide: the scene has no material coordinates": lambda: OXIDISED.prepare(BARE),
     "spectral: no band": lambda: SpectralTable(((3e-6, 300.0, 0.6),)).prepare(BARE),
     "no band is given": lambda: UniformSurface(0.4).modified(Wedge()).prepare(WITH_TOOL),

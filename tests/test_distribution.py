@@ -158,7 +158,7 @@ def test_the_interval_of_a_limited_number_is_within_its_limits(values, limits):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        (np.zeros((0, 1, 1)), "expected one or more draws of each of segment, texture"),
+        (np.zeros((0, 1, 1)), "expected at least one draw of each of segment, texture"),
         (np.zeros((2, 2)), r"values have shape \(2, 2\)"),
         (np.full((1, 1, 1), np.nan), "a value is not finite"),
     ],

@@ -596,7 +596,7 @@ def test_a_legend_that_is_not_of_the_picture_is_refused(tmp_path):
         return with_legend(picture, NamedMap("viridis"))
 
     path = a_movie(tmp_path / "a.avi", colours=NamedMap("jet"), change=with_other_legend)
-    with pytest.raises(SourceError, match=r"a\.avi: legend: .*100, 10, 108, 80.* of what it shows"):
+    with pytest.raises(SourceError, match=r"a\.avi: legend: .*100, 10, 108, 80.* of its pixels"):
         a_source(path, None, crop=(0, 0, 88, SHAPE[0])).survey()
     with pytest.raises(SourceError, match="give the box of the legend, or a named map"):
         a_source(path, (100, 10, 108, 80), crop=(0, 0, 88, SHAPE[0])).survey()

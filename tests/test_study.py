@@ -205,7 +205,7 @@ REFUSED = [
     ),
     (
         "cutting: {tool: {hone: {rake: 40 um, clearance: 20 um}, edge_radius: 5 um}}",
-        "edge_radius: is not used beside hone, give only one of them",
+        "edge_radius: cannot be combined with hone, give only one of them",
     ),
     (
         "cutting: {tool: {outline: none.csv}}",
@@ -373,7 +373,7 @@ def test_a_tool_with_a_prepared_edge_is_built_and_written(tmp_path):
     assert measured.cutting.simulation().tool == read_tool_outline(tmp_path / "edge.csv")
     for study in (chamfered, honed, measured):
         assert load(study_text(study), tmp_path) == study
-    with pytest.raises(DescriptionError, match="rake_angle: is not used beside outline"):
+    with pytest.raises(DescriptionError, match="rake_angle: cannot be combined with outline"):
         load("cutting: {tool: {outline: edge.csv, rake_angle: 5 deg}}", tmp_path)
 
 

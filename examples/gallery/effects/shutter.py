@@ -6,7 +6,7 @@ Rolling shutter
    :alt: Hot segments that move to the right, with a global and a rolling shutter
 
 With a rolling shutter each row's exposure begins later than that of the row above it, by the line
-time :math:`t_l`. What moves at :math:`v` along the rows is skewed by
+time :math:`t_l`. A body moving at :math:`v` along the rows is skewed by
 
 .. math:: \Delta x = v\, t_l
 

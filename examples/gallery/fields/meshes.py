@@ -10,9 +10,9 @@ its centre, in a triangle by its corners' weights,
 
 .. math:: T(x, y) = \sum_{k=1}^{3} \lambda_k(x, y)\, T_k, \qquad \sum_k \lambda_k = 1 .
 
-What you see: PyVista's small beam of 40 hexahedra, cut with the values of its nodes, with those of
-its elements, and its surface as a camera sees it. The numbers in the file are not temperatures, but
-another program wrote it.
+What you see: PyVista's small beam of 40 hexahedra, cut with the values of its nodes and with those
+of its elements, and its surface as a camera sees it. The numbers in the file are not
+temperatures, but another program wrote it.
 
 More: :doc:`/do/import-mesh`.
 """

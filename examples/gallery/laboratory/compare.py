@@ -14,7 +14,7 @@ judged by their uncertainties,
 and up to 1 the two agree.
 
 What you see: an "experiment" whose emissivities lie between those of the paper's two chips, with
-noise and a calibration that is 0.4 % off, beside simulations with either set.
+noise and a calibration that is 0.4 % off, next to simulations with either set.
 
 Source: ISO/IEC 17043 (:math:`E_n`); Figures 7 to 9 of Heigel and Whitenton (2010). More:
 :doc:`/do/compare`.

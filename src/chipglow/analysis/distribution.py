@@ -53,8 +53,8 @@ class Distribution:
     def __post_init__(self) -> None:
         if self.values.ndim != len(self.causes) or self.values.size == 0:
             raise ValueError(
-                f"distribution: values have shape {self.values.shape}, expected one or more draws "
-                f"of each of {', '.join(self.causes)}"
+                f"distribution: values have shape {self.values.shape}, expected at least one "
+                f"draw of each of {', '.join(self.causes)}"
             )
         if not np.isfinite(self.values).all():
             raise ValueError("distribution: a value is not finite, expected numbers alone")

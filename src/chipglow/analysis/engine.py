@@ -573,7 +573,7 @@ def _range_warnings(
 def _filled_warnings(
     scene: Scene, start: float, duration: float, read: Sequence[tuple[str, Place]]
 ) -> Iterator[str]:
-    """Yield a sentence for each place near samples without a temperature of their own."""
+    """Yield a sentence for each place near samples without their own temperature."""
     if QUALITY not in scene.data:
         return
     first, last = (scene.frame_at(time) for time in (start, start + duration))

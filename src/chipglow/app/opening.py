@@ -125,7 +125,7 @@ def _results(folder: Path) -> SceneModel:
     if study.scene is None and not is_cut(study):
         raise ValueError(
             f"{folder}: the scene of its study is not in the cache; set "
-            f"chipglow run {file} --out {folder} was done on this machine, or a scene's file"
+            f"chipglow run {file} --out {folder} was done on this machine, or a scene file"
         )
     scene = open_scene(study.scene or cut(study))
     return scene_model(scene, study, folder.name, study.scene)

@@ -68,8 +68,8 @@ def expose(
 ) -> tuple[Exposure, ...]:
     """Integrate the apparent radiance of views of a scene over a duration, starting at `start`.
 
-    Surfaces and bands that views share are computed once. `delays` in s are those of each row of
-    samples with a rolling shutter. An exception that `check` raises aborts the exposure.
+    Surfaces and bands that views share are computed once. `delays` in s are the delays of the rows
+    of samples with a rolling shutter. An exception that `check` raises aborts the exposure.
 
     Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
     (Equation 2). The void, "undefined" in the paper, has no radiance. L is interpolated in a table

@@ -175,7 +175,7 @@ def figure(draw: "Callable[..., Figure]", *arguments: Any) -> Callable[[Path], N
 
 
 def _write(text: str, stream: TextIO | None = None) -> None:
-    """Print a text; when the reader of a pipe ends, the command goes on and writes its files."""
+    """Print a text; when the reader of a pipe ends, the command continues and writes its files."""
     try:
         print(text, file=stream, flush=True)
     except BrokenPipeError:

@@ -237,7 +237,8 @@ def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:
     """
     return tuple(
         f"The {name}, {length * 1e6:.3g} um, is {_cells(length / cell)}, expected "
-        f"{CELLS_NEEDED:g} or more: set cutting.numerics.cell to {length / CELLS_NEEDED * 1e6:.2g} um."
+        f"{CELLS_NEEDED:g} or more: set cutting.numerics.cell to "
+        f"{length / CELLS_NEEDED * 1e6:.2g} um."
         for name, length in lengths.items()
         if 0.0 < length < CELLS_NEEDED * cell * (1 - 1e-9)
     )

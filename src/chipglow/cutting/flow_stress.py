@@ -1,7 +1,7 @@
 """Flow-stress laws: what a law is, and where the solver finds its numbers and its function.
 
 A law is a part: a frozen dataclass whose fields declare their `Parameter`, with a static method
-`stress`. A material's file names it by its kind::
+`stress`. A material file names it by its kind::
 
     @FLOW_LAWS.part
     @dataclass(frozen=True)

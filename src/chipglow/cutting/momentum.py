@@ -61,7 +61,7 @@ _RATE_OF_SLIDING = 1e4
 
 
 class Step(NamedTuple):
-    """Numbers of a step.
+    """Constants of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume without stress at room temperature
     (m²), time step (s),
@@ -335,8 +335,8 @@ advance = njit(cache=True, parallel=True)(_advance)
 def advance_with(law: Any) -> Any:
     """Return `advance` for the numbers of a flow-stress law.
 
-    Compiled code is kept on disk for the laws that come with chipglow only: for a law of one's own
-    it would not be seen that the law has changed.
+    Compiled code is kept on disk for the laws that come with chipglow only: for other laws
+    a change of the law would go unnoticed.
     """
     return advance if comes_with_chipglow(type(law)) else _advance_afresh
 

@@ -158,9 +158,8 @@ class CuttingSimulation:
     surroundings : Surroundings
         Surroundings to which free surfaces lose heat.
     tool_temperature : float or ToolBody, optional
-        The tool's temperature in K when the cut begins. A body: the temperature of a tool that has
-        been cutting for long, by the flow of heat through this body. None: as cold as the
-        workpiece, as in the paper.
+        Initial temperature of the tool in K. A body: the steady-state temperature of a long cut,
+        by conduction through this body. None: the temperature of the workpiece, as in the paper.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
@@ -231,7 +230,7 @@ class CuttingSimulation:
     def mass_scaling(self) -> float:
         """Factor on the density in the equation of motion.
 
-        That of the numerics if it names one. If not, so much that the momentum of the scaled mass
+        The value in the numerics, if any. If not, so much that the momentum of the scaled mass
         makes 0.45 % of a cutting force of √3 σ times the uncut chip thickness, with the flow
         stress σ at a strain of 1, 10⁴ 1/s and the initial temperature (a cutting force of three
         times the shear flow stress is usual for steel); from 1 to 1000.

@@ -48,8 +48,8 @@ def plastic_increments(b, count, shear_modulus, time_step, viscosity, law, damag
     """Find the plastic strains of a step that take trial stresses back to the flow stress.
 
     Solves trial − 3GΔ = weakening · σ(strain + Δ, Δ/dt, temperature) + 3η(Δ/dt − mean rate) for Δ
-    by Newton's method over ln Δ; weakening, temperature and mean rate are those of the step's
-    beginning. It starts at the last step's Δ or, without one, at the rate-independent Δ.
+    by Newton's method over ln Δ; weakening, temperature and mean rate are taken at the
+    beginning of the step. It starts at the Δ of the last step or else at the rate-independent Δ.
     """
     beyond = 0
     for k in range(count):

@@ -290,7 +290,7 @@ def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
     if not isfinite(highest):
         raise SourceError(
             f"temperature: {survey.found['temperature']} has no number in the frames that were "
-            "looked at, expected some"
+            "looked at, expected at least one"
         )
     view, there = np.reshape(raster.extent, (2, 2)), np.reshape(survey.extent, (2, 2))
     beyond = (there - view) * (-1, 1) > 1e-6 * raster.spacing

@@ -164,7 +164,7 @@ def limit_memory(memory: int) -> None:
     with suppress(ImportError):
         import resource
 
-        with suppress(OSError, IndexError):  # only Linux tells what is in use
+        with suppress(OSError, IndexError):  # only Linux reports the memory in use
             status = Path("/proc/self/status").read_text(encoding="ascii")
             memory += 1024 * int(status.partition("VmData:")[2].split()[0])
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))

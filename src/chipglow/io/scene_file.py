@@ -166,7 +166,7 @@ class SceneWriter:
         if frame.splines is None or frame.splines.nodes.shape != self.lattice.shape:
             raise SceneError(
                 f"scene: the frame at {frame.time:.9g} s has no splines of shape "
-                f"{self.lattice.shape}, expected those of the lattice"
+                f"{self.lattice.shape}, the shape of the lattice"
             )
         kept = spline_file.rounded(frame.splines)
         return [np.asarray(kept[name], np.float32) for name in spline_file.CHUNKED]

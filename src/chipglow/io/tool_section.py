@@ -49,7 +49,7 @@ class ToolSection(Part):
         unused = {"outline": ToolGeometry.declared(), "hone": ["edge_radius"]}.get(given, [])
         for name in unused:
             if getattr(self, name) != getattr(ToolGeometry, name):
-                raise ValueError(f"{name}: is not used beside {given}, give only one of them")
+                raise ValueError(f"{name}: cannot be combined with {given}, give only one of them")
         self.build()
 
     def build(self) -> Tool:

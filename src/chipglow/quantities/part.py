@@ -299,7 +299,7 @@ _EXPECTED: Final = {
     "a valid string": "text",
     "a valid tuple": "a list",
 }
-"""What pydantic expects, in the words of a YAML file."""
+"""Expectations of pydantic, in the words of a YAML file."""
 
 
 def problem(error: ValidationError) -> str:

@@ -11,7 +11,7 @@ from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip import contact_temperatures, rake_grid
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
-from chipglow.report.rows import slug, deviation_text
+from chipglow.report.rows import deviation_text, slug
 
 Spread = tuple[float, float]
 """Mean and standard deviation; NaN where unknown."""

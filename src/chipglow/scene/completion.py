@@ -72,7 +72,7 @@ class Completion(Part):
         Literal["auto", "flow", "none"],
         Parameter(
             "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow "
-            "where there is a strain, a chip or a cutting speed, for what is cut moves."
+            "where there is a strain, a chip or a cutting speed."
         ),
     ] = "auto"
     rate_frames: Annotated[
@@ -316,7 +316,7 @@ def strain_rate_along(
 ) -> NDArray[np.float32]:
     """Return (strain(x) - before(x - v interval)) / interval in 1/s, shape (y, x), 0 or more.
 
-    Strains are NaN without material, where the rate is NaN too; 0 if no material was there before.
+    Strain and rate are NaN without material; the strain before is 0 where it was void.
     """
     rows, columns = np.indices(strain.shape, dtype=np.float32)
     shift = np.float32(interval / spacing)

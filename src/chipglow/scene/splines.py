@@ -61,9 +61,7 @@ class Lattice:
             ("columns", self.across, self.columns),
         ):
             if first.min() < 0 or first.max() + 3 > nodes:
-                raise ValueError(
-                    f"lattice: {nodes} {name} of nodes, expected them to reach beyond the samples"
-                )
+                raise ValueError(f"lattice: {nodes} {name} of nodes must extend beyond the samples")
 
     @classmethod
     def within(

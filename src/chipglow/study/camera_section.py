@@ -55,8 +55,8 @@ class CameraSection(Part):
     response: Annotated[
         FileBeside | None,
         Parameter(
-            "Relative spectral response, a CSV file: its first line wavelength_um,response, then "
-            "a point a line; it counts within the band.",
+            "Relative spectral response within the band: a CSV file with the header "
+            "wavelength_um,response and one point per line.",
             allowed="none, or a file such as response.csv",
         ),
     ] = None

@@ -33,8 +33,8 @@ class Exchange:
     A diffuse element sends (1/2) d(sin φ) of its radiation into the angle dφ to its normal; a
     mirror is one in the cross-section too (Howell, Mengüç, Daun and Siegel, Thermal Radiation Heat
     Transfer, chapters 4 to 6). The irradiation H of element i, as a radiance, is the mean over its
-    rays of what they meet: B of the first element, m times B of the next, and so on, and what is
-    left of the surroundings. B = ε L + (1 − ε)(1 − s) H is the diffuse radiosity, m = (1 − ε) s
+    rays: B of the first element that they meet, m times B of the next, and so on, and the rest of
+    the surroundings. B = ε L + (1 − ε)(1 − s) H is the diffuse radiosity, m = (1 − ε) s
     with the fraction s of the reflected light that mirrors make.
     """
 

@@ -110,8 +110,8 @@ class FeatureSurface(Surface, Part):
         """See `Surface.prepare`; with `follow` "mean", all frames of the scene are read once."""
         if "plastic_strain" not in scene.fields:
             raise ValueError(
-                "surface: the scene has no plastic strain, by which chip and workpiece are told "
-                "apart; expected a surface of another kind, such as {kind: uniform, emissivity: "
+                "surface: the scene has no plastic strain, which distinguishes chip and workpiece; "
+                "set a surface of another kind, such as {kind: uniform, emissivity: "
                 "0.5}"
             )
         needed = {"mean": ("velocity_x", "velocity"), "material": ("material_x", "coordinates")}

@@ -116,8 +116,8 @@ class OxideHistory:
         """Follow the material of a scene; many surfaces share that of the last scene and oxide."""
         if not scene.has_material_coordinates:
             raise ValueError(
-                "oxide: the scene has no material coordinates, expected them, as a point's oxide "
-                "follows from the temperatures that it had"
+                "oxide: the scene has no material coordinates; the oxide of a point depends on its "
+                "earlier temperatures"
             )
         (left, right), (bottom, top) = _reach(scene)
         cell = max(

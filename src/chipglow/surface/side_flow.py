@@ -119,9 +119,9 @@ class SideShape(Modifier):
     Samples seen in the camera's direction have the temperatures of the scene; the rake face has
     that of the tool's side next to it. In each cross-section at right angles to the rake face that
     the chip touches, all bounces are summed as if it continued unchanged (`Exchange`). The apparent
-    radiance is ε L + (1 − ε) times the incident radiance. It is given as an effective emissivity,
-    by which the radiance of the blackbody (less that of the surroundings) is what is seen (less the
-    same): over 1 where more is reflected than the sample would emit as a blackbody.
+    radiance is ε L + (1 − ε) times the incident radiance. It is returned as an effective
+    emissivity: apparent radiance over blackbody radiance, each minus that of the surroundings;
+    above 1 where the sample reflects more than it would emit as a blackbody.
     """
 
     effect = "reflections"
@@ -192,8 +192,8 @@ class SideShape(Modifier):
     ) -> Change:
         if scene.tool is None:
             raise ValueError(
-                "reflections: the scene does not state its tool, expected one, between whose rake "
-                "face and the chip light is reflected"
+                "reflections: the scene has no tool; state the tool whose rake face exchanges "
+                "light with the chip"
             )
         black_in_band, cosines = required_band(self.effect, band).radiance, self.elements.cosines
         surroundings = 0.0 if reflected is None else float(black_in_band(reflected))

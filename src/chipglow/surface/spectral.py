@@ -189,5 +189,5 @@ class Dispersion(Modifier):
 def required_band(name: str, band: Band | None) -> Band:
     """Return the camera's band, which what is not grey requires."""
     if band is None:
-        raise ValueError(f"{name}: no band is given, expected that of a camera")
+        raise ValueError(f"{name}: no band is given, expected a camera's band")
     return band

@@ -31,9 +31,9 @@ class EmissivityField:
     """The emissivity of one scene's samples, frame by frame; made by `Surface.prepare`."""
 
     bare: Callable[[Frame], NDArray[np.float32]]
-    """Of every sample of a frame, shape (y, x), from 0 to 1; 0 in the void."""
+    """Fraction of every sample of a frame, shape (y, x), from 0 to 1; 0 in the void."""
     fields: frozenset[str] | None = None
-    """Fields of a frame that are read beside temperature and material; by default all."""
+    """Fields of a frame that are read besides temperature and material; by default all."""
     changes: tuple[Change, ...] = ()
     """Changes of the bare emissivity by modifiers, in order."""
     max_emissivity: float = 1.0
@@ -127,7 +127,7 @@ class Surface(Part, ABC):
 
 
 class Modifier(Part, ABC):
-    """What modifies a surface: oxide, an angle, a spectrum, reflections. A class adds `change`."""
+    """A modification of a surface: oxide, angle, spectrum, reflections. A class adds `change`."""
 
     effect: ClassVar[str] = "modifier"
     """Name under which a measurement states it."""

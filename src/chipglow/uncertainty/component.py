@@ -37,7 +37,7 @@ class Cause:
 
     def __post_init__(self) -> None:
         rules = {
-            f"its name is {self.name!r}, expected one": self.name.strip(),
+            f"its name is {self.name!r}, expected a name": self.name.strip(),
             f"has {self.errors} errors, expected 1 or more": self.errors >= 1,
             f"degrees of freedom are {self.degrees_of_freedom!r}, expected more than 0": (
                 self.degrees_of_freedom > 0

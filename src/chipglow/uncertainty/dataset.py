@@ -4,7 +4,7 @@ Conventions: obsarray's user guide, "Storing uncertainties" (https://obsarray.re
 variable names its uncertainty variables in ``unc_comps``; each of these states for every dimension
 whether its errors are ``random`` or ``systematic``, and keeps the sign of the effect: the
 covariance of a systematic one is the product of its values. Everything without an attribute in
-obsarray (cause, identity, degrees of freedom, warnings) stands beside in attributes of ours.
+obsarray (cause, identity, degrees of freedom, warnings) is in attributes of ours.
 """
 
 import re
@@ -61,7 +61,7 @@ def from_xarray(data: xr.Dataset, name: str) -> Estimate:
     causes: dict[Cause, dict[int, Any]] = {}
     for label in _texts(variable.attrs.get("unc_comps", ())):
         if label not in data:
-            raise ValueError(f"{name}: its uncertainty {label} is not there, expected it")
+            raise ValueError(f"{name}: its uncertainty {label} is missing")
         cause, error, effects = _read(data, variable, label)
         causes.setdefault(cause, {})[error] = effects
     components = [

@@ -429,7 +429,7 @@ def factor(covariance: Array, name: str) -> Array:
     # Correlations, since the variance of a value in metres is lost in rounding next to kelvins.
     matrix = covariance / np.outer(scale, scale)
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9):
-        raise ValueError(f"component {name}: covariance is not symmetric, expected it so")
+        raise ValueError(f"component {name}: covariance is not symmetric")
     variances, directions = np.linalg.eigh(matrix)
     if variances.min(initial=0.0) < -1e-9:
         raise ValueError(

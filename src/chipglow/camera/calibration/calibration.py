@@ -126,7 +126,7 @@ class FittedCalibration(Calibration):
         if self.parameters.shape != (count,) or self.covariance.shape != (count, count):
             raise ValueError(
                 f"calibration: shapes {self.parameters.shape} and {self.covariance.shape} of "
-                f"parameters and covariance, expected those of {', '.join(self.NAMES)}"
+                f"parameters and covariance, expected the shapes for {', '.join(self.NAMES)}"
             )
         if not (np.isfinite(self.parameters).all() and np.isfinite(self.covariance).all()):
             raise ValueError("calibration: a parameter or covariance is not finite")

@@ -118,7 +118,7 @@ class CalibrationFit(Generic[Kind]):
     def enlargement(self) -> float:
         """Factor on the standard uncertainties of the fit, 1 or more.
 
-        Of stated ones the root of the reduced chi-squared where it is over 1 (R. T. Birge, Physical
+        With stated ones, the root of the reduced chi-squared if it exceeds 1 (R. T. Birge, Physical
         Review 40 (1932) 207). Where the scatter of the points is all that is known, Student's
         factor for 95 % over the normal distribution's (JCGM 100, G.3): with few points it is large,
         and twice the standard uncertainty holds the truth as often as stated.

@@ -99,7 +99,7 @@ class FlatFieldCalibration:
         """Return the noise-equivalent temperature difference in K of a blackbody in K.
 
         Temporal noise of the calibrated radiance, root mean square over the pixels, over dL/dT; at
-        least that of rounding to whole counts. NaN for a blackbody that saturates it.
+        least the noise of rounding to whole counts. NaN for a blackbody that saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
         if seen >= full_light(self.detector, self.point):
@@ -207,7 +207,7 @@ def full_light(detector: Detector, point: OperationPoint) -> float:
 def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
     """Return the lowest radiance temperature in K that a detector measures at its exposure.
 
-    Of the blackbody whose mean signal above the dark level is `least_signal` times its noise, the
+    At this temperature the mean signal above the dark level is `least_signal` times the noise, the
     standard deviation over time or of rounding; 200 K or more, as a band's tables.
     """
 

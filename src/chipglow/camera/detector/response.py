@@ -106,8 +106,8 @@ class PhotonResponse(DetectorResponse):
         relative = 1.0 if band.response is None else float(band.response(np.array([wavelength]))[0])
         if not relative > 0:
             raise ValueError(
-                f"PhotonResponse.wavelength: {1e6 * wavelength:g} um, expected one at which the "
-                "band's response is over 0"
+                f"PhotonResponse.wavelength: {1e6 * wavelength:g} um, expected a wavelength at "
+                "which the band's response is positive"
             )
         cone = self.transmittance * pi / (4 * self.f_number**2)
         seen = cone * point.fill_factor * self.element**2 * point.integration_time

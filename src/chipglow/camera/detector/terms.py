@@ -178,7 +178,7 @@ class DarkCurrent(DetectorTerm):
     """Electrons that come without light: current times integration time (EMVA 1288, 2.3)."""
 
     kind = "dark-current"
-    example = "{kind: dark-current, current: 50 kHz}  electrons a second"
+    example = "{kind: dark-current, current: 50 kHz}  electrons per second"
     stage = Stage.DARK
     current: Annotated[
         float, Parameter("Electrons a second and element.", ELECTRON_RATE, least=0.0)
@@ -318,7 +318,7 @@ class EquivalentNoise(DetectorTerm):
     """Noise as data sheets state it: as a difference of a blackbody's temperature (NETD).
 
     The standard deviation of the radiance is NETD times dL/dT at the stated temperature, at any
-    light. It holds all noise: no other term of noise should stand beside it.
+    light. It holds all noise: do not combine it with other terms of noise.
     """
 
     kind = "netd"

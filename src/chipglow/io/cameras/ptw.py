@@ -186,7 +186,7 @@ class Ptw(CameraFile):
             remarks.append(f"Distance to the object: {header['distance']:g} m.")
         if header["scale"]:
             remarks.append(
-                f"The file has a scale of its own in {text_of(header['scale_unit']) or 'some unit'}"
+                f"The file has its own scale in {text_of(header['scale_unit']) or 'some unit'}"
                 "; it is not applied."
             )
         if lock_in:

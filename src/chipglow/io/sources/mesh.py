@@ -54,7 +54,7 @@ class MeshSource(Source, Part):
 
     Elements are sampled exactly as they are: fields of nodes by the element's own shape, fields of
     elements constant in each. Where there is no element there is no material. Every frame may have
-    a mesh of its own. Where elements overlap the later one in the file is taken. ``files`` are a
+    its own mesh. Where elements overlap the later one in the file is taken. ``files`` are a
     file with one mesh or with meshes over time, an LS-DYNA d3plot, or a pattern such as
     ``chip_*.vtu``; ``times`` in s or an ``interval`` replace the times of the files. ``names`` are
     the file's names of fields by those of a scene: ``velocity`` is a vector along the file's axes,

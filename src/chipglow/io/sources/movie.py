@@ -442,14 +442,14 @@ def _scale(
         )
     if not movie.legend and is_cut(picture, box):
         raise SourceError(
-            f"legend: an end of the one found at {box} cannot be told from what is beside it, "
+            f"legend: an end of the one found at {box} does not differ from the pixels next to it, "
             "expected the box of the legend, or a named map"
         )
     scale = ColourScale.from_legend(legend_pixels(picture, box), ends)
     fraction = explained(picture, box, scale)
     if fraction < LEAST_EXPLAINED:
         raise SourceError(
-            f"legend: the picture has the colours of {box} in {fraction:.0%} of what it shows, "
+            f"legend: the picture has the colours of {box} in {fraction:.0%} of its pixels, "
             f"expected {LEAST_EXPLAINED:.0%} or more; give the box of the legend, or a named map"
         )
     kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"

@@ -76,7 +76,7 @@ class FieldReader:
                 value, apart = place_of(self.scale, colour)
                 if apart < MARK_TOLERANCE:
                     raise SourceError(
-                        f"{name}: {colour} is the colour of {value:.5g} too, expected one that is "
+                        f"{name}: {colour} is also the colour of {value:.5g}; set a colour "
                         f"{MARK_TOLERANCE:g} or more from the scale"
                     )
 
@@ -86,7 +86,7 @@ class FieldReader:
         void, tool = self._marked(picture, distance)
         off_scale = (distance > self.limit) & ~void & ~tool
         lines = off_scale | (dark_lines(picture) & ~void & ~tool)
-        # What is drawn over a field shades into the pixels around.
+        # Drawings over a field shade into the pixels around.
         drawn = maximum_filter(lines.view(np.uint8), 3).view(np.bool_) | self.covered
         seen = ~(drawn | void | tool)
         material = np.full(values.shape, Material.WORKPIECE, np.uint8)

@@ -1,8 +1,8 @@
 """Zones of Tecplot, and its binary files (``.plt``), versions 107 to 112.
 
-They follow the appendix on binary files of Tecplot's Data Format Guide; what differs between
-versions is as Tecplot's own library (TecIO) has it: no kind of packing from 112 on, tables of raw
-face neighbours from 108, the type of the file from 111.
+They follow the appendix on binary files of Tecplot's Data Format Guide; differences
+between versions follow Tecplot's library (TecIO): no kind of packing since 112, tables of raw face
+neighbours since 108, the type of the file since 111.
 """
 
 from collections.abc import Callable, Mapping, Sequence

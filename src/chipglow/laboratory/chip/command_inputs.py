@@ -85,7 +85,7 @@ def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
         return []
     return [
         f"The rake face that shows in the image is {1e6 * offset:.0f} um from that "
-        f"of the tool's file (the file's rake angle is {degrees(given.rake_angle):.1f} deg, the "
+        f"of the tool file (its rake angle is {degrees(given.rake_angle):.1f} deg, the "
         f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.uncertainty.angle):.1f} "
         "deg): the tip, the origin of coordinates, or which way the image is up may be wrong."
     ]

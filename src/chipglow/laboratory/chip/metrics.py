@@ -79,9 +79,9 @@ class ChipMetrics(Segmentation):
     band_width_standard_deviation: float
     """Full width at half maximum of the strain rate across the band, over the same frames."""
     band_rate: float
-    """Greatest median strain rate in 1/s on the band's middle half in a frame."""
+    """Largest median strain rate in 1/s on the band's middle half in a frame."""
     band_strain: float
-    """Greatest plastic strain in the middle half of `valley` that passes `scan`, per segment."""
+    """Largest plastic strain in the middle half of `valley` that passes `scan`, per segment."""
     cutting_mean: float
     cutting_swing: float
     thrust_mean: float

@@ -326,8 +326,8 @@ def _whole(raster: Raster, tool: Tool, size: float, rows: int) -> NDArray[np.boo
         edges = ", ".join(f"{1e6 * edge:.6g}" for edge in raster.extent)
         raise ValueError(
             f"rake grid: no square on the rake face is inside the image; the face begins at x "
-            f"{foot_x:.6g} um, y {foot_y:.6g} um, expected it in the image from left, right, "
-            f"bottom, top {edges} um"
+            f"{foot_x:.6g} um, y {foot_y:.6g} um, outside the image: left, right, bottom, top "
+            f"{edges} um"
         )
     return np.asarray(whole[:, : shown[-1] + 1])
 

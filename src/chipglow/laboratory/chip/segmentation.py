@@ -20,7 +20,7 @@ _SMOOTH: Final = 1e-6
 """Standard deviation in s of the Gaussian that smooths single points of the thickness."""
 
 _STANDING_OUT: Final = 0.25
-"""Least rise of a peak over the range of the thickness: less is a ripple between segments."""
+"""Smallest rise of a peak over the range of the thickness: less is a ripple between segments."""
 
 LARGEST_FRACTION: Final = 0.01
 """Fraction of work or force from which inertia counts as too much."""
@@ -41,7 +41,7 @@ class Segmentation:
     peak_standard_deviation: float
     valley: float
     valley_standard_deviation: float
-    """Mean thickness at peaks and valleys in m; without two peaks the largest and the least."""
+    """Mean thickness at peaks and valleys in m; without two peaks the largest and the smallest."""
     degree: float
     """Degree of segmentation: 1 - valley over the mean of both peaks beside it, mean."""
     degree_uncertainty: float
@@ -127,7 +127,7 @@ def cut_history(scene: Scene) -> CutHistory | None:
 
 
 def resolution(scene: Scene) -> float:
-    """Return the least rise in m that counts as a segment: a cell, or two samples."""
+    """Return the smallest rise in m that counts as a segment: a cell, or two samples."""
     return float(scene.data.attrs.get("cell", 2 * scene.raster.spacing))
 
 
@@ -147,7 +147,7 @@ class Inertia:
     """Inertia of the scaled mass in a cut, after the first build-up of the chip."""
 
     kinetic_fraction: float
-    """Greatest change of the kinetic energy over the work of the drive so far; NaN if unknown."""
+    """Largest change of the kinetic energy over the work of the drive so far; NaN if unknown."""
     force_fraction: float
     """Momentum flow of the scaled mass, ρV² times uncut chip thickness, over the cutting force."""
     mass_scaling: float

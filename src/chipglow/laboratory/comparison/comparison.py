@@ -103,7 +103,7 @@ class Comparison:
     fits: pd.DataFrame
     """Fit of each simulation at each place, one row each. The bias is the mean of simulated minus
     measured; the confidence is the fraction of the draws of all uncertainties in which the
-    simulation has the least root mean square of the place, NaN with one measured frame.
+    simulation has the smallest root mean square of the place, NaN with one measured frame.
     """
     notes: Notes
 
@@ -114,7 +114,7 @@ class Comparison:
 
     @property
     def best(self) -> pd.DataFrame:
-        """Fits with the least root mean square of each place."""
+        """Fits with the smallest root mean square of each place."""
         return self.fits.loc[self.fits.groupby("place", sort=False)["rms_K"].idxmin()]
 
     @property
@@ -228,8 +228,8 @@ def compare(
     -----
     Squares of 3 measured pixels on the rake face are compared, and along the shear band values at
     the same distance from the cutting edge, as means over the frames in which the band is
-    developing or fully developed, as in the paper. The best set has the least root mean square of
-    the differences; its confidence is found by drawing all values from their uncertainties.
+    developing or fully developed, as in the paper. The best set has the smallest root mean
+    square of the differences; its confidence follows from draws of all values.
     """
     if not simulated:
         raise ValueError("comparison: no simulation, expected 1 or more")

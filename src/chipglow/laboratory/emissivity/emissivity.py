@@ -389,8 +389,8 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> Array:
 def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     """Fit a line to an area's emissivity at several temperatures by ordinary least squares.
 
-    Covariances are propagated (JCGM 100:2008, Equation 13); the random error is that of the means,
-    or the scatter about the line if that is larger.
+    Covariances are propagated (JCGM 100:2008, Equation 13); the random error is the error of the
+    means, or the scatter about the line if that is larger.
     """
     if len(areas) == 1:
         return areas[0]

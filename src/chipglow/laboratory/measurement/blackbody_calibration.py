@@ -29,7 +29,7 @@ class BlackbodyCalibration:
     notes: Notes
     """Assumptions, and warnings of the preferred fit."""
     preferred: str
-    """Name of the model with the least information criterion."""
+    """Name of the model with the smallest information criterion."""
 
     def to_frame(self) -> pd.DataFrame:
         """Return every point of each fit; one row each."""

@@ -57,8 +57,8 @@ class CalibrationDescription(Part):
     covariance: Annotated[
         Rows,
         Parameter(
-            "Covariance of offset and gain, or of offset, A, B and C: of the fit, and of what the "
-            "temperatures of the blackbody have in common."
+            "Covariance of offset and gain, or of offset, A, B and C: from the fit and from the "
+            "common error of the blackbody temperatures."
         ),
     ]
     warnings: Annotated[

@@ -63,7 +63,7 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
 def load_recording(description: MeasurementDescription) -> Recording:
     """Read a camera file and apply its description."""
     if description.file is None:
-        raise DescriptionError("file: is missing, expected a camera's file")
+        raise DescriptionError("file: is missing, expected a camera file")
     try:
         return description.applied_to(_read(description, description.file))
     except MissingError as error:

@@ -161,7 +161,7 @@ class MeasurementDescription(Part):
     ] = None
     saturation: Annotated[
         float | None,
-        Parameter("Greatest number in the file that is not saturated; none: as the file says."),
+        Parameter("Largest number in the file that is not saturated; none: as the file says."),
     ] = None
     lower_limit: Annotated[
         float | None,

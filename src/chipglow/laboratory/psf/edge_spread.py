@@ -18,8 +18,8 @@ _FREQUENCIES: Final = 65
 def edge_curves(fit: ModelFit, index: int, pixels: EdgePixels) -> xr.Dataset:
     """Return edge-spread, line-spread and modulation transfer function of an edge, in SI units.
 
-    Bins are a quarter of the pitch. The MTF is that of the fitted model plus the transform of the
-    residuals: a transform of the bins alone would lack what the tails hold beyond the window.
+    Bins are a quarter of the pitch. The MTF of the fitted model is added to the transform of
+    the residuals: a transform of the bins alone would lack what the tails hold beyond the window.
     """
     edge = fit.edges[index]
     every = edge.line.distance(pixels.x, pixels.y)

@@ -84,7 +84,7 @@ def write_psf(
         The file to write, for ``psf: {kind: measured, file: ...}`` of a study's camera and for
         `MeasuredPSF.from_file`.
     psf : MeasuredPSF, optional
-        The kernel to write; by default that of the best model (`psf_kernel`).
+        The kernel to write; by default the kernel of the best model (`psf_kernel`).
 
     Raises
     ------

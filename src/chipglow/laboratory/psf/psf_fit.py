@@ -49,7 +49,7 @@ class EdgePixels:
 
     @cached_property
     def reach(self) -> float:
-        """Greatest distance from the edge in m."""
+        """Largest distance from the edge in m."""
         return float(np.abs(self.line.distance(self.x, self.y)).max()) + 4 * self.pitch
 
 

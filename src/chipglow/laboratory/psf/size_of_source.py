@@ -43,7 +43,7 @@ def aperture_image(measurement: Measurement, diameter: float, name: str) -> Aper
 
 
 def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
-    """Read the pixels within a pitch of the centroid of what is bright in each aperture."""
+    """Read the pixels within a pitch of the centroid of the bright pixels in each aperture."""
     if len({image.diameter for image in images}) < _LEAST_APERTURES:
         raise ValueError(
             f"apertures: {len(images)} images of {len({i.diameter for i in images})} diameters, "

@@ -60,8 +60,8 @@ def match_dots(
     if best is None or best.count < max(_FEWEST, best.contradictions):
         raise ValueError(
             f"dots: {0 if best is None else best.count} of {len(first.pixels)} in the infrared "
-            f"image and {len(second.pixels)} in the visible picture match, expected one target in "
-            "both, not mirrored, turned by up to 30 degrees"
+            f"image and {len(second.pixels)} in the visible picture match; both must show the "
+            "same target, not mirrored, turned by at most 30 degrees"
         )
     return best.pairs, _rivals(best, judged, first.pixels, spacing)
 

@@ -99,7 +99,7 @@ def fit_images(
     over the contrast of its surroundings (after Haber and Modersitzki, Methods Inf. Med. 46 (2007)
     292): mutual information alone is off by pixels where heat spreads beyond the visible edges.
 
-    The covariance is that of a sum over blocks of 16 x 16 pixels (the sandwich of Huber, 1967);
+    The covariance follows from a sum over blocks of 16 x 16 pixels (the sandwich of Huber, 1967);
     half a pixel is added for each parameter, at the image's corner: an edge of heat beside the edge
     that is seen.
     """
@@ -144,7 +144,7 @@ class _Level:
     known: NDArray[np.bool_]
     bin_image: NDArray[np.int64]
     edge_image: Array
-    """Of samples, with their edges along columns and rows."""
+    """Joint histogram of samples, with their edges along columns and rows."""
     places: Array
     """Places of the known ones in units of the frame, shape (n, 2)."""
     blocks: NDArray[np.int64]
@@ -202,7 +202,7 @@ def _level(
     scale = min(visible.shape[0] / raster.rows, visible.shape[1] / raster.columns) * step
     picture = gaussian_filter(visible, _BLUR * scale)
     lines = _edges(picture, scale, _FAINT_VISIBLE * float(visible.std()))
-    # The noise is that of pixels from the median around them.
+    # The noise is the deviation of pixels from the median around them.
     noise = 1.4826 * float(np.median(np.abs(infrared - median_filter(infrared, 3))))
     faint = hypot(_NOISES * noise, _FAINT_INFRARED * float(infrared.std()))
     weight = gaussian_filter(known.astype(float), _BLUR * step)
@@ -235,7 +235,7 @@ def _edges(image: Array, scale: float, faint: float) -> Array:
 
 
 def _binned(image: Array) -> NDArray[np.int64]:
-    """Return bins of equal width from nearly the least to nearly the largest value."""
+    """Return bins of equal width from nearly the smallest to nearly the largest value."""
     low, high = np.percentile(image, _ENDS)
     fraction = (image - low) / max(high - low, np.finfo(float).tiny)
     return np.asarray(np.clip(fraction * _BINS, 0, _BINS - 1), np.int64)

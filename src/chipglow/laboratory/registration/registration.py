@@ -168,7 +168,7 @@ def fit_points(
     -----
     Least squares of the distances in the visible picture, from the direct linear solution in
     normalised coordinates (Hartley and Zisserman, Multiple View Geometry, 2nd ed., 4.1 and 4.4);
-    the uncertainty comes from the residuals, so that one point more than the model needs is least.
+    the uncertainty comes from the residuals, so one point more than the model needs is required.
     A point is misplaced if the F test of its residual against the scatter of the other points
     (the externally studentised residual) is beyond 1 % over all points.
     """
