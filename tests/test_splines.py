@@ -108,7 +108,7 @@ def test_samples_are_those_of_the_b_splines():
 
 
 def test_nodes_that_do_not_reach_the_samples_are_refused():
-    with pytest.raises(ValueError, match=r"lattice: 5 rows of nodes, expected them to reach"):
+    with pytest.raises(ValueError, match=r"lattice: 5 rows of nodes must extend beyond"):
         replace(a_lattice(), rows=5)
     with pytest.raises(ValueError, match=r"lattice: in_tool has shape \(3, 3\), expected \(41, 53"):
         replace(a_lattice(), in_tool=np.zeros((3, 3), bool))

@@ -429,7 +429,7 @@ def test_datasets_of_obsarray_are_read():
     values["u_t"].attrs["err_corr_1_form"] = "ensemble"
     with pytest.raises(ValueError, match="u_t: its errors correlate as ensemble"):
         from_xarray(values, "t")
-    with pytest.raises(ValueError, match="u_t is not there"):
+    with pytest.raises(ValueError, match="u_t is missing"):
         from_xarray(values.drop_vars("u_t"), "t")
     with pytest.raises(ValueError, match="q: there is no such variable"):
         from_xarray(values, "q")

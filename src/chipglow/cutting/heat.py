@@ -426,8 +426,8 @@ def _filled(nodes, fraction, i, j):  # type: ignore[no-untyped-def]
 def lose_heat(nodes, increment, temperature, fraction, tool_heat, loss, grid, duration):  # type: ignore[no-untyped-def]
     """Take the heat that the free surface loses in `duration` (s); return it in J/m.
 
-    `nodes` is as in `conduct`; `increment` (K) of chip and `temperature` (K) of the tool change, both
-    (columns, rows).
+    `nodes` is as in `conduct`. `increment` of the chip and `temperature` of the tool, in K and of
+    shape (columns, rows), change.
     """
     lost = 0.0
     first = max(int(np.ceil((loss.left - grid.left) / grid.cell)), 0)
