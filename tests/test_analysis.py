@@ -91,11 +91,7 @@ def test_nothing_is_measured_over_the_maximum_without_a_psf(seed, pitch, offset,
     assert (measured <= (1 - slivers) * largest + slivers * brightest + 1e-3).all()
 
 
-@given(
-    rounding=st.floats(-1e-4, 1e-4),
-    phase=st.integers(0, 8),
-    seed=st.integers(0, 99),
-)
+@given(rounding=st.floats(-1e-4, 1e-4), phase=st.integers(0, 8), seed=st.integers(0, 99))
 @settings(max_examples=30)
 def test_a_rounded_pitch_adds_no_samples_to_a_pixel(rounding, phase, seed):
     raster = Raster(left=0.0, top=0.0, spacing=2e-6 / 3 * (1 + rounding), rows=189, columns=279)

@@ -18,9 +18,7 @@ from chipglow.io import write_scene
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 COARSEST = "40"  # um: eight cells in the depth of the computed region
-STUDIES = {
-    "reflections.py": ("chip.yaml", "scene: chip.nc"),
-}
+STUDIES = {"reflections.py": ("chip.yaml", "scene: chip.nc")}
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 
 # What each program is called with, and rows of its table with the numbers that each holds at least.
@@ -53,12 +51,7 @@ PROGRAMS = {
     ),
     "movies.py": (
         "--pictures 1 --maps jet --codecs uncompressed GIF",
-        {
-            "| jet | uncompressed": 6,
-            "| jet | none | no": 3,
-            "| jet | 12 | yes": 4,
-            "0 cases": 1,
-        },
+        {"| jet | uncompressed": 6, "| jet | none | no": 3, "| jet | 12 | yes": 4, "0 cases": 1},
     ),
     "optics.py": ("--samples 128", {"| clear |": 1, "| obscuration 0.35, aberrations": 2}),
     "rasterise.py": (
@@ -69,15 +62,9 @@ PROGRAMS = {
         "--draws 2 --angles 45 --study chip.yaml",
         {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
     ),
-    "registration_libraries.py": (
-        "--pairs 1 --only scikit-image",
-        {"| scikit-image |": 5},
-    ),
+    "registration_libraries.py": ("--pairs 1 --only scikit-image", {"| scikit-image |": 5}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
-    "sweeps.py": (
-        "--tasks 4 --points 6 --kills 1",
-        {"| 1 |": 4, "| 2 |": 4, "| 6 | ": 6},
-    ),
+    "sweeps.py": ("--tasks 4 --points 6 --kills 1", {"| 1 |": 4, "| 2 |": 4, "| 6 | ": 6}),
     "titanium.py": (
         f"--cell {COARSEST} 88.9-0.1",
         {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},

@@ -9,10 +9,7 @@ from scipy.constants import Stefan_Boltzmann
 from solver import DENSITY, Block
 from test_cutting_solver import short_cut
 
-from chipglow.cutting import (
-    CARBIDE,
-    Surroundings,
-)
+from chipglow.cutting import CARBIDE, Surroundings
 from chipglow.cutting.heat import (
     SMALLEST_FRACTION,
     HeatLoss,

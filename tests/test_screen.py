@@ -79,10 +79,7 @@ def test_what_json_cannot_say_is_null(capsys):
     screen.say("Two.", {"array": np.array([1.0, np.inf]), "count": np.int64(2)})
     screen.close()
     found = json.loads(capsys.readouterr().out)
-    assert found["tables"]["all"] == [
-        {"name": "a", "value_K": 1.5},
-        {"name": "b", "value_K": None},
-    ]
+    assert found["tables"]["all"] == [{"name": "a", "value_K": 1.5}, {"name": "b", "value_K": None}]
     assert found["values"] == {"array": [1.0, None], "count": 2}
 
 

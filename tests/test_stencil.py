@@ -33,11 +33,7 @@ def test_sums_are_those_of_nested_loops(place):
     part = nodes[i : i + 3, j : j + 3]
     expected = [
         np.einsum("a,b,abv", left, right, part)
-        for left, right in (
-            (wx, wy),
-            (np.multiply(wx, dx), wy),
-            (wx, np.multiply(wy, dy)),
-        )
+        for left, right in ((wx, wy), (np.multiply(wx, dx), wy), (wx, np.multiply(wy, dy)))
     ]
     found = summed(nodes, i, j, wx, wy, dx, dy)
     np.testing.assert_allclose(found, expected, rtol=0, atol=FEW_ROUNDINGS)

@@ -2,14 +2,7 @@
 
 import pytest
 
-from chipglow.quantities import (
-    Part,
-    changed,
-    own_settings,
-    setting_at,
-    settings,
-    value_at,
-)
+from chipglow.quantities import Part, changed, own_settings, setting_at, settings, value_at
 from chipglow.study import Study, study_text
 
 
