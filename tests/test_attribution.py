@@ -74,19 +74,6 @@ def test_the_matrix_gives_the_mean_over_all_orders():
     np.testing.assert_allclose(shapley_matrix(count) @ values, mean, atol=1e-14)
 
 
-def test_shapley_effects_of_a_correlated_linear_gaussian_model_are_those_in_closed_form():
-    # Owen and Prieur (2017), SIAM/ASA J. Uncertainty Quantification 5, 986, Equation 8.
-    (b1, b2), (s1, s2), rho = (1.0, 2.0), (1.5, 0.7), 0.6
-    total = (b1 * s1) ** 2 + 2 * rho * b1 * b2 * s1 * s2 + (b2 * s2) ** 2
-    explained = [0.0, (b1 * s1 + rho * b2 * s2) ** 2, (b2 * s2 + rho * b1 * s1) ** 2, total]
-    half = rho**2 / 2
-    expected = [
-        (b1 * s1) ** 2 * (1 - half) + rho * b1 * b2 * s1 * s2 + (b2 * s2) ** 2 * half,
-        (b2 * s2) ** 2 * (1 - half) + rho * b1 * b2 * s1 * s2 + (b1 * s1) ** 2 * half,
-    ]
-    np.testing.assert_allclose(shapley_matrix(2) @ explained, expected, rtol=1e-12)
-
-
 def test_interactions_are_those_of_the_products_of_a_polynomial():
     # v = 3 a b + 2 a b c: the index of a pair is its coefficient, and half of the triple's.
     values = [3 * a * b + 2 * a * b * c for c in (0, 1) for b in (0, 1) for a in (0, 1)]
@@ -190,13 +177,7 @@ def test_the_default_exposure_is_within_the_longest_part_of_a_scene_with_a_gap(s
     assert late.times[4] < start <= late.times[-1] - 2e-6
 
 
-def test_named_effects_leave_the_others_in_a_group(scene):
-    data = attribute(scene, CAMERA, UniformSurface(0.6), effects=("emissivity", "psf"))
-    assert list(data.effect.values) == ["emissivity", "psf", REST]
-    np.testing.assert_allclose(data.contribution.sum("effect"), error_of(data), atol=ROUNDING)
-
-
-def test_terms_of_optics_and_detector_are_effects_by_their_kind(scene):
+def test_named_effects_and_terms_by_their_kind_leave_the_others_in_a_group(scene):
     camera = replace(CAMERA, optics=(Veil(0.1, 30e-6),), lower_limit=None)
     effects = ("emissivity", "veil", "shot-noise", "read-noise")
     data = attribute(scene, camera, UniformSurface(0.6), effects=effects)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chipglow.cutting import AISI_1045, FittedDamage, MaterialError, workpiece
-from chipglow.cutting.library import FOLDER
+from chipglow.cutting import AISI_1045, FittedDamage, workpiece
 
 NAMES = ("d1", "d2", "loss", "fracture_energy")
 COVARIANCE = (
@@ -40,22 +39,3 @@ def test_the_steel_is_drawn_and_differs_in_its_damage_only():
 def test_a_material_whose_damage_was_not_fitted_is_not_drawn():
     with pytest.raises(ValueError, match="was not fitted"):
         workpiece("al-7075-t6").drawn(np.random.default_rng(1))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("numbers: [d1,", "numbers: [onset,", "fitted_damage: numbers: 'onset', expected one of"),
-        ("numbers: [d1, d2,", "numbers: [d1,", "expected 4 rows of 4 numbers"),
-        ("numbers: [d1,", "numbers: [1,", "fitted_damage.numbers.0: 1, expected text"),
-    ],
-)
-def test_a_wrong_entry_is_one_line(tmp_path, old, new, expected):
-    text = (FOLDER / "workpieces" / "aisi-1045.yaml").read_text(encoding="utf-8")
-    assert old in text
-    path = tmp_path / "steel.yaml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(MaterialError) as error:
-        workpiece(str(path))
-    assert expected in str(error.value)
-    assert str(error.value).startswith("steel.yaml: fitted_damage")

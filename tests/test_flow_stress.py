@@ -44,10 +44,8 @@ def slopes(strain, rate, temperature, law):
 
 
 def test_a_name_is_taken_but_by_the_same_class(own_laws):
-    with pytest.raises(ValueError, match="flow_law: 'tanh' is not a new kind"):
-        FLOW_LAWS.part(type("Mine", (FlowStress,), {"kind": "tanh"}))
-    # Not even by a class that is called the same.
-    with pytest.raises(ValueError, match="is not a new kind"):
+    # Not even by another class that is called the same.
+    with pytest.raises(ValueError, match="flow_law: 'johnson-cook' is not a new kind"):
         FLOW_LAWS.part(type("JohnsonCook", (FlowStress,), {"kind": "johnson-cook"}))
     assert FLOW_LAWS.find("johnson-cook") is JohnsonCook
 

@@ -23,7 +23,3 @@ def test_what_a_page_uses_is_in_the_package_itself(page):
     names = {name.strip() for line in used for name in line.split(",")}
     names |= set(re.findall(r"\bchipglow\.(\w+)", code))
     assert names <= set(chipglow.__all__)
-
-
-def test_a_plan_is_at_hand_for_the_analysis():
-    assert chipglow.Plan(exposures=3).exposures == 3

@@ -70,40 +70,6 @@ def test_where_there_is_no_material_nothing_counts():
     np.testing.assert_allclose(mean[top], 1e5, rtol=1e-5)
 
 
-def flowing(rate, mean, viscosity):
-    """Stress at which a point flows at a rate among others of a mean rate, both in 1/s."""
-    law, harm = AISI_1045.flow_stress.numbers(), Damage.of(None, 1.0)
-    shear, time_step = 80e9, 1e-8
-    rows = np.zeros(stress.BUFFER)
-    strain, temperature = 0.3, 500.0
-    rows[stress.STRAIN], rows[stress.TEMPERATURE], rows[stress.SOFT] = strain, temperature, 1.0
-
-    def increment(trial):
-        rows[stress.TRIAL], rows[stress.INCREMENT], rows[stress.MEAN] = trial, 0.0, mean
-        stress.plastic_increments(rows, 1, shear, time_step, viscosity, law, harm)
-        return rows[stress.INCREMENT]
-
-    low, high = 0.0, 1e10
-    for _ in range(100):
-        middle = (low + high) / 2
-        low, high = (middle, high) if increment(middle) < rate * time_step else (low, middle)
-    return middle - 3 * shear * rate * time_step
-
-
-def test_flow_faster_than_around_it_costs_three_viscosities_of_the_difference():
-    local = flowing(5e4, 0.0, 0.0)
-    # Newton's steps end under 2 %, what is left is of second order: 1e-3 of the stress.
-    assert flowing(5e4, 5e4, 3e3) == pytest.approx(local, rel=1e-3)
-    assert flowing(5e4, 2e4, 3e3) == pytest.approx(local + 9e3 * 3e4, rel=1e-3)
-    assert flowing(2e4, 5e4, 3e3) == pytest.approx(flowing(2e4, 0.0, 0.0) - 9e3 * 3e4, rel=1e-3)
-
-
-def test_flow_around_leaves_a_twentieth_of_a_points_strength():
-    local = flowing(1e3, 0.0, 0.0)
-    still = float(AISI_1045.flow_stress.at(0.3, 1.0, 500.0))
-    assert flowing(1e3, 1e7, 3e3) == pytest.approx(local - 0.95 * still + 9e3 * 1e3, rel=1e-3)
-
-
 @pytest.mark.parametrize("cell", [10e-6, 5e-6])
 def test_weak_places_flow_as_much_faster_as_the_mean_allows(cell):
     """Shear under one stress, of a strength that varies as a wave.

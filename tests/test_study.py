@@ -1,5 +1,5 @@
 import threading
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 from math import isfinite, radians
 from pathlib import Path
 
@@ -36,42 +36,30 @@ from chipglow.surface import (
 )
 from chipglow.text import DescriptionError
 
-QUANTITIES = [
-    units.LENGTH,
-    units.POSITION,
-    units.CUT_LENGTH,
-    units.TIME,
-    units.FREQUENCY,
-    units.SPEED,
-    units.ANGLE,
-    units.TEMPERATURE,
+TEXTS = [
+    (units.TIME, "10 us", 10e-6),
+    (units.TIME, "0.2us", 0.2e-6),
+    (units.LENGTH, "6 um", 6e-6),
+    (units.LENGTH, "6 µm", 6e-6),
+    (units.LENGTH, "6000 nm", 6e-6),
+    (units.CUT_LENGTH, "1.579 mm", 1.579e-3),
+    (units.POSITION, "-420 um", -420e-6),
+    (units.POSITION, "−420 um", -420e-6),
+    (units.SPEED, "250 m/min", 250 / 60),
+    (units.ANGLE, "-7 deg", radians(-7)),
+    (units.ANGLE, "7°", radians(7)),
+    (units.TEMPERATURE, "391 degC", 664.15),
+    (units.TEMPERATURE, "300 °C", 573.15),
+    (units.TEMPERATURE, "293 K", 293.0),
+    (units.FREQUENCY, "600 Hz", 600.0),
+    (units.FREQUENCY, "0.6 kHz", 600.0),
+    (units.LENGTH, "6e-3 mm", 6e-6),
+    (units.LENGTH, "2/3 um", 6.666666666666667e-07),
+    (units.POSITION, "-2/3 um", -6.666666666666667e-07),
 ]
 
 
-@pytest.mark.parametrize(
-    ("kind", "text", "value"),
-    [
-        (units.TIME, "10 us", 10e-6),
-        (units.TIME, "0.2us", 0.2e-6),
-        (units.LENGTH, "6 um", 6e-6),
-        (units.LENGTH, "6 µm", 6e-6),
-        (units.LENGTH, "6000 nm", 6e-6),
-        (units.CUT_LENGTH, "1.579 mm", 1.579e-3),
-        (units.POSITION, "-420 um", -420e-6),
-        (units.POSITION, "−420 um", -420e-6),
-        (units.SPEED, "250 m/min", 250 / 60),
-        (units.ANGLE, "-7 deg", radians(-7)),
-        (units.ANGLE, "7°", radians(7)),
-        (units.TEMPERATURE, "391 degC", 664.15),
-        (units.TEMPERATURE, "300 °C", 573.15),
-        (units.TEMPERATURE, "293 K", 293.0),
-        (units.FREQUENCY, "600 Hz", 600.0),
-        (units.FREQUENCY, "0.6 kHz", 600.0),
-        (units.LENGTH, "6e-3 mm", 6e-6),
-        (units.LENGTH, "2/3 um", 6.666666666666667e-07),
-        (units.POSITION, "-2/3 um", -6.666666666666667e-07),
-    ],
-)
+@pytest.mark.parametrize(("kind", "text", "value"), TEXTS)
 def test_quantities_are_exactly_the_float_that_python_writes(kind, text, value):
     assert kind.parse(text) == value
 
@@ -85,7 +73,7 @@ def test_a_simple_fraction_is_written_as_such_and_a_range_has_one_unit():
 
 
 @given(
-    st.sampled_from(QUANTITIES),
+    st.sampled_from(list(dict.fromkeys(kind for kind, *_ in TEXTS))),
     st.floats(min_value=1e-9, max_value=1e9, allow_nan=False),
     st.booleans(),
 )
@@ -158,10 +146,6 @@ REFUSED = [
     (
         "cutting: {tool: {temperature: 1300 degC}}",
         "1300 degC, expected -73.15 degC to 1226.85 degC",
-    ),
-    (
-        "cutting: {tool: {rake_angle: 80 deg}}",
-        "80 deg, expected more than -60 deg, less than 60 deg",
     ),
     ("cutting: {tool: {material: cheese}}", "'cheese' is unknown, expected one of carbide"),
     ("cutting: {workpiece: cheese}", "workpiece: 'cheese' is unknown, expected one of aisi-1045"),
@@ -286,15 +270,6 @@ def test_other_kinds_of_psf_are_built_and_written(tmp_path):
     # As run, the study names the file's whole path: it can be run from any folder.
     assert measured.camera.psf.file == str(tmp_path / "psf.npy")
     assert load(study_text(measured), tmp_path) == measured
-
-
-def test_a_study_in_python_takes_the_same_text():
-    study = Study(camera={"pitch": "5 um"}, analysis={"exposures": 3})
-    assert study.camera.pitch == 5e-6
-    assert study.analysis.exposures == 3
-    assert Study(camera={"pitch": 5e-6}) == Study(camera={"pitch": "5 um"})
-    with pytest.raises(FrozenInstanceError):
-        study.seed = 4
 
 
 @pytest.fixture
