@@ -42,6 +42,8 @@ BAND = Band(3.8e-6, 5.1e-6)
 CAMERA = replace(Camera.paper(), psf=GaussianPSF(12e-6))
 GRID = Raster(left=-300e-6, top=300e-6, spacing=2e-6, rows=180, columns=180)
 TOOL = ToolGeometry()
+POINTS = np.stack(np.meshgrid(GRID.x, GRID.y), axis=-1)
+DEPTH = TOOL.signed_distance(POINTS[..., 0], POINTS[..., 1])
 SURFACES = {"chip 1": CHIP_1, "chip 2": CHIP_2}
 NOISY = Detector(response=EnergyResponse(1e4), full_well=1e7, terms=(ReadNoise(2000.0),))
 
@@ -134,16 +136,14 @@ def test_references_by_hand():
 
 def rake_layer(rate, depth):
     """Strain rate of a layer that falls off from the rake face."""
-    x, y = np.meshgrid(GRID.x, GRID.y)
-    return rate * np.exp(-np.maximum(TOOL.signed_distance(x, y), 0.0) / depth)
+    return rate * np.exp(-np.maximum(DEPTH, 0.0) / depth)
 
 
 def band_scene(shape, width=20e-6, gap=0.0):
     """Gaussian ridge along a circle, from a distance on, to a free surface at y = 200 µm."""
-    x, y = np.meshgrid(GRID.x, GRID.y)
-    along, across = shape.place(np.stack([x, y], axis=-1))
+    along, across = shape.place(POINTS)
     rate = 60e3 * np.exp(-4 * log(2) * (across / width) ** 2) * (along >= gap)
-    return rate, (y < 200e-6) & (TOOL.signed_distance(x, y) > 0)
+    return rate, (POINTS[..., 1] < 200e-6) & (DEPTH > 0)
 
 
 @pytest.mark.parametrize("degrees", [36.0, 42.0, 50.0])
@@ -251,8 +251,7 @@ def test_the_next_band_is_no_part_of_one_that_has_left_the_edge():
     shape = BandImage(angle=radians(38.0), bend=1.0, shift=80e-6)
     rate, workpiece = band_scene(shape)
     following = BandImage(angle=radians(20.0), bend=1.0)
-    x, y = np.meshgrid(GRID.x, GRID.y)
-    along, _ = following.place(np.stack([x, y], axis=-1))
+    along, _ = following.place(POINTS)
     fading = 2 * np.exp(-np.maximum(along, 0.0) / 80e-6)
     rate = rate + fading * band_scene(following, width=25e-6)[0] + rake_layer(300e3, 8e-6)
     check_that_it_begins_beside_the_layer(rate, workpiece, shape)
@@ -285,19 +284,14 @@ def test_what_climbs_into_the_layer_is_not_the_bands(degrees):
 @given(length=st.floats(40e-6, 200e-6))
 @settings(max_examples=20)
 def test_the_contact_ends_where_the_chip_leaves(length):
-    x, y = np.meshgrid(GRID.x, GRID.y)
-    depth = TOOL.signed_distance(x, y)
-    points = np.stack([x, y], axis=-1)
-    along = (points - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_direction)
-    chip = (depth > 0) & ((along < length) | (depth > 10e-6))
+    along = (POINTS - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_direction)
+    chip = (DEPTH > 0) & ((along < length) | (DEPTH > 10e-6))
     # A sample and a half, and the samples' slant to the face.
     assert contact_length(GRID, chip, TOOL, 3e-6) == pytest.approx(length, abs=4e-6)
 
 
 def test_no_contact_is_no_length():
-    x, y = np.meshgrid(GRID.x, GRID.y)
-    chip = TOOL.signed_distance(x, y) > 20e-6
-    assert contact_length(GRID, chip, TOOL, 3e-6) == 0.0
+    assert contact_length(GRID, DEPTH > 20e-6, TOOL, 3e-6) == 0.0
 
 
 def test_lines_across_the_rake_face_follow_its_normal():

@@ -19,7 +19,6 @@ from chipglow.app.files import chip_picture, measurement_file, study_file
 from chipglow.app.opening import open_any, open_uploaded, scene_model
 from chipglow.app.session import Newest, Session, SupersededError
 from chipglow.app.view import View as PageView
-from chipglow.camera import View, expose
 from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
 from chipglow.quantities.format import readable
@@ -141,18 +140,24 @@ def test_an_error_image_that_is_zero_everywhere_says_why(model):
     assert absent == ["emissivity", "emissivity", plain, plain, "emissivity psf texture"]
 
 
-def test_a_failure_is_shown_on_the_page(opened):
+@pytest.fixture
+def page_view(opened):
+    """A page without a browser, and what it would send there."""
     view, sent = PageView(opened), []
     view.page._send_msg = sent.append
+    return view, sent
+
+
+def test_a_failure_is_shown_on_the_page(page_view):
+    view, sent = page_view
     view._receive(SimpleNamespace(data={"n": 1, "kind": "change", "content": {}}))
     shown = {"text": "Defect: KeyError: 'texts'", "kind": "error"}
     assert sent == [{"kind": "status", "content": shown}]
 
 
-def test_values_answer_the_message_that_caused_them_not_a_later_one(opened):
+def test_values_answer_the_message_that_caused_them_not_a_later_one(page_view):
     """Otherwise the page would overwrite what the later message has just set."""
-    view, sent, waiting = PageView(opened), [], []
-    view.page._send_msg = sent.append
+    (view, sent), waiting = page_view, []
     document = SimpleNamespace(
         add_next_tick_callback=waiting.append, hold=lambda policy: None, unhold=lambda: None
     )
@@ -201,7 +206,7 @@ def test_a_limit_above_all_temperatures_says_so_and_leaves_the_scene_visible(ope
     assert kind == "error"
 
 
-def test_the_contributions_at_the_cursor_sum_to_the_error_of_the_true_temperature(opened, model):
+def test_the_contributions_at_the_cursor_sum_to_the_error_of_the_true_temperature(model, page_view):
     state = model.controls.changed(model.controls.initial, {"cursor": "-40,200"})
     picture = model.picture(state)
     found = model.contributions(picture, lambda: None)
@@ -211,28 +216,29 @@ def test_the_contributions_at_the_cursor_sum_to_the_error_of_the_true_temperatur
     assert found == dict(zip(data.effect.values, one.contribution.values, strict=True))
     error = float(one.measured - one.reference)
     assert sum(found.values()) == pytest.approx(error, abs=1e-9)
-    view, sent = PageView(opened), []
-    view.page._send_msg = sent.append
+    view, sent = page_view
     view._show_numbers(picture, model.numbers(picture), found)
     assert "Contribution of each effect" in sent[-1]["content"]
     largest = max(found, key=lambda name: abs(found[name]))
     assert f"{abs(found[largest]):.1f}" in sent[-1]["content"]
 
 
-def test_a_newer_state_ends_the_contributions(model):
-    state = model.controls.changed(model.controls.initial, {"camera.pitch": "7 um"})
-    picture = model.picture(state)
+def test_a_newer_state_ends_the_picture_and_the_contributions(model):
+    controls = model.controls
+    seen, next_one = (controls.changed(controls.initial, {"start": f"{n} us"}) for n in (401, 402))
+    picture = model.picture(seen)
 
     def check():
         raise SupersededError
 
     with pytest.raises(SupersededError):
+        model.picture(next_one, check=check)
+    with pytest.raises(SupersededError):
         model.contributions(picture, check)
 
 
-def test_the_uncertainty_is_shown_or_its_absence_explained(opened, model):
-    view, sent = PageView(opened), []
-    view.page._send_msg = sent.append
+def test_the_uncertainty_is_shown_or_its_absence_explained(model, page_view):
+    view, sent = page_view
     for texts, said in (({}, "No ± without noise"), ({"camera.detector": "noise"}, " ± 0.0")):
         picture = model.picture(model.controls.changed(model.controls.initial, texts))
         view._show_numbers(picture, model.numbers(picture), {})
@@ -479,24 +485,6 @@ def test_only_the_newest_job_is_done():
     go.set()
     assert ended.wait(10)
     assert done == ["first", "fourth"]
-
-
-def test_a_pass_that_nobody_waits_for_ends_early(opened):
-    scene, camera = opened.scene, Study().camera.build()
-    views = [View(camera.prepare(CHIP_1, scene), camera.band)]
-    start = opened.controls.initial.study.start
-    calls = []
-
-    def check():
-        calls.append(1)
-        raise SupersededError
-
-    with pytest.raises(SupersededError):
-        expose(scene, views, start, 10e-6, check=check)
-    assert calls
-    (whole,) = expose(scene, views, start, 10e-6)
-    (again,) = expose(scene, views, start, 10e-6, check=lambda: None)
-    np.testing.assert_array_equal(whole.mean_radiance, again.mean_radiance)
 
 
 # Parts of the error

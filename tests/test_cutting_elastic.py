@@ -1,13 +1,14 @@
-"""Elastic constants over the temperature: what a point answers, and the energy that it holds."""
+"""Elastic constants and volume over the temperature: what a point answers, and what it holds."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import expansion
 from solver import Block
 
 from chipglow.cutting import workpiece
-from chipglow.cutting.momentum import MODULI_LOSS
+from chipglow.cutting.momentum import EXPANSION_WORK, MODULI_LOSS
 from chipglow.cutting.stress import BULK
 
 STRAIN = 1e-4
@@ -80,3 +81,23 @@ def test_warmed_at_constant_strain_stress_and_energy_fall_with_the_moduli_and_co
     assert stresses(block)[0] == pytest.approx(cold, rel=1e-6, abs=1.0)
     assert block.energy()[1] == pytest.approx(before, rel=1e-6)
     assert block.sums[MODULI_LOSS] == pytest.approx(held - before, rel=1e-6)
+
+
+def test_without_room_expansion_becomes_pressure_and_the_account_tells_its_energy():
+    # So heavy that nothing moves it.
+    block = Block((60e-6, 60e-6), material=expansion.STEEL, mass=1e9)
+    block.points["temperature"] = expansion.COLD
+    block.advance(1)
+    before = block.energy()[1]
+    block.points["temperature"] = expansion.MIDDLE
+    block.advance(1)
+    # Kernels take the volume as linear within a kelvin: 3e-8 of the pressure here, 1e-5 when cold.
+    free = expansion.GROWTH_AT_MIDDLE
+    assert expansion.tension(block) == pytest.approx(expansion.BULK * (1.0 / free - 1.0), rel=1e-7)
+    stored = 0.5 * expansion.BULK * (1.0 / free - 1.0) ** 2 * free * 3600e-12
+    assert block.energy()[1] - before == pytest.approx(stored, rel=1e-6)
+    assert block.sums[EXPANSION_WORK] == pytest.approx(stored, rel=1e-6)
+    block.points["temperature"] = expansion.COLD
+    block.advance(1)
+    assert block.sums[EXPANSION_WORK] == pytest.approx(-stored, rel=1e-6)
+    assert np.abs(expansion.tension(block)).max() < 1e-5 * expansion.BULK

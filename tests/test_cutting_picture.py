@@ -12,6 +12,8 @@ CELL = 10e-6
 GRID = Grid(-300e-6, -200e-6, CELL, 60, 60)
 RASTER = Raster(-150e-6, 200e-6, 1e-6, 300, 250)
 AWAY = ToolGeometry()
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+DEPTH = AWAY.signed_distance(X, Y)
 
 
 def lattice(angle=0.0, spacing=CELL / 2, top=100e-6):
@@ -43,9 +45,8 @@ def test_a_straight_free_surface_is_straight_and_in_its_place(degrees):
     angle = np.radians(degrees)
     points = lattice(angle)
     material = frame_of(points).material
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    height = np.cos(angle) * (y - 100e-6) - np.sin(angle) * x
-    clear = (AWAY.signed_distance(x, y) > 30e-6) & (np.abs(x) < 110e-6) & (y > -60e-6)
+    height = np.cos(angle) * (Y - 100e-6) - np.sin(angle) * X
+    clear = (DEPTH > 30e-6) & (np.abs(X) < 110e-6) & (Y > -60e-6)
     # Sub-pixel of the camera (6 um): half a micrometre of a 10 um cell, half a sample.
     assert (material[clear & (height < -0.7e-6)] == Material.WORKPIECE).all()
     assert (material[clear & (height > 0.7e-6)] == Material.VOID).all()
@@ -55,13 +56,12 @@ def test_linear_fields_are_drawn_exactly_inside():
     points = lattice(0.3)
     field = 600.0 + 5e5 * points["x"] - 3e5 * points["y"]
     frame = frame_of(points, temperature=field, material_x=points["x"])
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    height = np.cos(0.3) * (y - 100e-6) - np.sin(0.3) * x
-    inside = (height < -35e-6) & (np.abs(x) < 110e-6) & (AWAY.signed_distance(x, y) > 0)
-    exact = 600.0 + 5e5 * x - 3e5 * y
+    height = np.cos(0.3) * (Y - 100e-6) - np.sin(0.3) * X
+    inside = (height < -35e-6) & (np.abs(X) < 110e-6) & (DEPTH > 0)
+    exact = 600.0 + 5e5 * X - 3e5 * Y
     # Weighted means of points that lie unevenly: what two corrections leave is 0.2 K of 5 K a cell.
     assert np.abs(frame.temperature - exact)[inside].max() < 0.2
-    edge = (height < -1e-6) & (np.abs(x) < 110e-6) & (AWAY.signed_distance(x, y) > 0)
+    edge = (height < -1e-6) & (np.abs(X) < 110e-6) & (DEPTH > 0)
     # On the surface the fit is one-sided: less than the change over a third of a cell.
     assert np.abs(frame.temperature - exact)[edge].max() < 2.0
 
@@ -70,13 +70,12 @@ def test_no_gap_between_chip_and_tool_and_the_tool_shows_its_own_temperature():
     points = lattice(0.0, top=150e-6)
     outside = AWAY.signed_distance(points["x"], points["y"]) > 0
     frame = frame_of(points[outside])
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    tool = AWAY.signed_distance(x, y) < 0
+    tool = DEPTH < 0
     assert (frame.material[tool] == Material.TOOL).all()
-    beside = (AWAY.signed_distance(x, y) > 0) & (y > -50e-6) & (y < 120e-6) & (x > -110e-6)
+    beside = (DEPTH > 0) & (Y > -50e-6) & (Y < 120e-6) & (X > -110e-6)
     assert (frame.material[beside] == Material.WORKPIECE).all()
-    deep = AWAY.signed_distance(x, y) < -15e-6
-    assert frame.temperature[deep] == pytest.approx(400.0 + 1e6 * x[deep], abs=1e-3)
+    deep = DEPTH < -15e-6
+    assert frame.temperature[deep] == pytest.approx(400.0 + 1e6 * X[deep], abs=1e-3)
 
 
 def test_steps_do_not_overshoot():

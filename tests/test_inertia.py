@@ -35,14 +35,12 @@ def test_kinetic_fraction_is_the_greatest_after_the_build_up():
     kinetic[3] = 500.0  # the shock of the entry
     kinetic[time.size // 2] = 0.007 * work[time.size // 2]
     found = inertia(scene_with(drive_work=work, kinetic_energy=kinetic))
-    assert found is not None
     assert found.kinetic_fraction == pytest.approx(0.007, rel=1e-12)
     assert np.isnan(found.force_fraction)
 
 
 def test_force_fraction_is_momentum_over_mean_force():
     found = inertia(scene_with(4.5e3, drive_work=np.linspace(1.0, 2.0, CHIP.forces()[0].size)))
-    assert found is not None
     # The chip's force is 450 N/mm but for the rise, noise and a swing of 30 N/mm over some periods.
     assert found.force_fraction == pytest.approx(0.01, rel=0.02)
     assert found.mass_scaling == 100.0
@@ -52,7 +50,6 @@ def test_a_scene_without_forces_or_account():
     bare = CHIP.scene()
     assert inertia(Scene(bare.data.drop_vars(list(FORCE_UNITS)))) is None
     found = inertia(bare)
-    assert found is not None
     assert np.isnan([found.kinetic_fraction, found.force_fraction, found.mass_scaling]).all()
     assert found.warning == ""
 
@@ -61,7 +58,6 @@ def test_before_the_tool_touches_nothing_is_known():
     nothing = np.zeros(CHIP.forces()[0].size)
     data = scene_with(1.0, drive_work=nothing).data
     found = inertia(Scene(data.assign(cutting_force=data["cutting_force"] * 0)))
-    assert found is not None
     assert np.isnan([found.kinetic_fraction, found.force_fraction]).all()
 
 

@@ -82,26 +82,6 @@ def test_a_place_at_filled_samples_is_warned_about():
     assert not [one for one in found(places=(MIDDLE,)).warnings if "filled" in one]
 
 
-def test_at_an_edge_the_blurred_radiance_is_the_mean_of_both_sides():
-    """The pixels beside the edge: erf over a pixel's width, calculated from the closed form."""
-    from scipy.integrate import quad
-    from scipy.special import erf
-
-    point = PointPlace("cold side", (-2e-6, 2e-6))
-    result = found(places=(point,), phases=1)
-    deviation = 8e-6 / np.sqrt(8 * np.log(2))
-    bright, _ = quad(lambda x: 0.5 * (1 + erf(x / (np.sqrt(2) * deviation))), -4e-6, 0.0)
-    fraction = bright / 4e-6
-    radiance = [0.6 * float(BAND.radiance(np.array(T))) for T in (COLD, HOT)]
-    measured = float(BAND.temperature((1 - fraction) * radiance[0] + fraction * radiance[1]))
-    reference = float(BAND.temperature(radiance[0]))
-    one = reading(result, "cold side", "pixel")
-    # The kernel is summed over samples of 1 um: 0.03 of the 8 um of its width.
-    assert one.error.mean == pytest.approx(measured - reference, abs=1.5)
-    assert one.reference.mean == pytest.approx(reference, abs=0.01)
-    assert one.psf_portion.mean == pytest.approx(one.error.mean, abs=1e-4)  # the inverse
-
-
 def test_lines_and_regions_give_mean_and_extremes():
     pad = RegionPlace("pad", Region("pad", Circle((40e-6, 0.0), 10e-6), unit="m"))
     result = found(places=(ACROSS, pad))
