@@ -56,7 +56,7 @@ class AnalyticChip:
         """Angle of the band over the horizontal in rad."""
         return self.shear_angle + self.shear_angle_drift * time
 
-    def distance_to_band(self, points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    def distance_to_band(self, points, time):
         """Signed distance from the band's line in m, positive in the chip."""
         angle = self.angle(time)
         offset = points - self.edge
@@ -113,7 +113,7 @@ class AnalyticChip:
             time, cutting, thrust, self.passing(time), energy, self.scene().frame(0)
         )
 
-    def _fields(self, time: float) -> dict[str, NDArray[np.generic]]:
+    def _fields(self, time):
         points = np.stack(np.meshgrid(self.raster.x, self.raster.y), axis=-1)
         across = self.distance_to_band(points, time)
         across = np.where(points[..., 0] < self.edge[0], across, -1e-3)
@@ -149,13 +149,7 @@ class AnalyticChip:
             "material_y": origin[..., 1],
         }
 
-    def _material(
-        self,
-        points: NDArray[np.float64],
-        across: NDArray[np.float64],
-        depth: NDArray[np.float64],
-        along: NDArray[np.float64],
-    ) -> NDArray[np.uint8]:
+    def _material(self, points, across, depth, along):
         """Free surface where the mean band meets it; the chip lifts off where contact ends."""
         corner = self.edge + self.band_length(0.0) * np.array(
             [-cos(self.shear_angle), sin(self.shear_angle)]
@@ -169,14 +163,7 @@ class AnalyticChip:
         material = np.where(solid, Material.WORKPIECE, Material.VOID)
         return np.where(depth < 0, Material.TOOL, material).astype(np.uint8)
 
-    def _origin(
-        self,
-        points: NDArray[np.float64],
-        across: NDArray[np.float64],
-        chip: NDArray[np.bool_],
-        chip_velocity: NDArray[np.float64],
-        time: float,
-    ) -> NDArray[np.float64]:
+    def _origin(self, points, across, chip, chip_velocity, time):
         """Where each point was before the cut: back down the chip, then back to the left."""
         angle = self.angle(time)
         closing = chip_velocity @ np.array([sin(angle), cos(angle)])

@@ -64,7 +64,6 @@ def test_a_heated_face_follows_erfc_up_to_the_border_and_as_if_it_were_not_there
     length, cell = 200e-6, 10e-6
     tool = Tool(round(length / cell) + 1, 5, cell)
     tool.fraction[:, 1:4] = 1.0  # a rod
-    tool.fraction[0, 1:4] = 1.0
 
     def hot(temperature, _):
         temperature[0, 1:4] = 1.0

@@ -1,6 +1,5 @@
 import json
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,16 +43,14 @@ SETS = [
         ("ti-6al-4v/lee-lin", 1.0, 1e4, 1085.5, 1012.23e6),
     ],
 )
-def test_flow_stress_by_hand(
-    name: str, strain: float, rate: float, temperature: float, by_hand: float
-) -> None:
+def test_flow_stress_by_hand(name, strain, rate, temperature, by_hand):
     law = workpiece(name).flow_stress
     # Six digits of the hand calculation.
     assert law.at(strain, rate, temperature) == pytest.approx(by_hand, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_workpieces_are_physical(name: str) -> None:
+def test_workpieces_are_physical(name):
     material = workpiece(name)
     law = material.flow_stress
     assert 2000 < material.density_at(293.15) < 10000
@@ -80,7 +77,7 @@ def test_workpieces_are_physical(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", material_names("tool"))
-def test_tools_are_physical(name: str) -> None:
+def test_tools_are_physical(name):
     tool = tool_material(name)
     assert 3000 < tool.density < 16000
     assert 10 < tool.conductivity < 130
@@ -88,14 +85,14 @@ def test_tools_are_physical(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", material_names())
-def test_every_number_has_unit_and_source(name: str) -> None:
+def test_every_number_has_unit_and_source(name):
     file = material_file(name)
     assert file.properties and file.name and file.description
     assert all(len(number.source) > 10 for number in file.properties)
     assert (file.tool is None) == bool(file.workpieces)
 
 
-def test_the_rooms_data_are_files_of_the_package() -> None:
+def test_the_rooms_data_are_files_of_the_package():
     assert len(list(FOLDER.rglob("*.yaml"))) == len(material_names()) == 8
 
 
@@ -109,13 +106,13 @@ def test_the_rooms_data_are_files_of_the_package() -> None:
         ("../materials/aisi-1045", "'..' is unknown"),
     ],
 )
-def test_unknown_names(name: str, message: str) -> None:
+def test_unknown_names(name, message):
     with pytest.raises(MaterialError) as raised:
         workpiece(name)
     assert message in str(raised.value)
 
 
-def _write(path: Path, old: str, new: str, steel: str = "aisi-4140") -> Path:
+def _write(path, old, new, steel="aisi-4140"):
     text = (FOLDER / "workpieces" / f"{steel}.yaml").read_text(encoding="utf-8")
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -159,9 +156,7 @@ def _write(path: Path, old: str, new: str, steel: str = "aisi-4140") -> Path:
         ("numbers: [d1,", "numbers: [1,", "fitted_damage.numbers.0: 1, expected text"),
     ],
 )
-def test_faults_name_file_field_value_and_expectation(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
+def test_faults_name_file_field_value_and_expectation(tmp_path, old, new, message):
     steel = "aisi-1045" if old.startswith("numbers") else "aisi-4140"
     path = _write(tmp_path / "steel.yaml", old, new, steel)
     with pytest.raises(MaterialError) as raised:
@@ -170,7 +165,7 @@ def test_faults_name_file_field_value_and_expectation(
     assert message in str(raised.value)
 
 
-def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
+def test_a_set_names_its_law_and_whether_it_fails(tmp_path):
     data = yaml.safe_load((FOLDER / "workpieces" / "aisi-4140.yaml").read_text(encoding="utf-8"))
     softening = {
         "law": "tanh", "damage": "none", "hardening_limit": 1.1, "recovery_temperature": 0.4,
@@ -193,7 +188,7 @@ def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
     )  # fmt: skip
 
 
-def test_elastic_constants_over_the_temperature(tmp_path: Path) -> None:
+def test_elastic_constants_over_the_temperature(tmp_path):
     path = tmp_path / "steel.yaml"
     rows = "value: [[300 K, 0.3], [500 K, 0.35]]\n"
     moving = workpiece(str(_write(path, "value: 0.3\n", rows)))
@@ -217,7 +212,7 @@ def test_elastic_constants_over_the_temperature(tmp_path: Path) -> None:
     assert still.elastic_ratios().tolist() == [[1.0, 1.0, 1.0, 0.0]]
 
 
-def test_limits_hold_for_every_value_of_a_table() -> None:
+def test_limits_hold_for_every_value_of_a_table():
     table = replace(AISI_1045.conductivity, values=(-1.0,) * len(AISI_1045.conductivity.values))
     with pytest.raises(ValueError, match=r"Material\.conductivity: -1 W/m/K, expected more than 0"):
         replace(AISI_1045, conductivity=table)
@@ -225,7 +220,7 @@ def test_limits_hold_for_every_value_of_a_table() -> None:
         replace(AISI_1045, taylor_quinney=RateTable((1.0, 2.0), (0.5, 1.5)))
 
 
-def test_heat_fraction_over_the_strain_rate(tmp_path: Path) -> None:
+def test_heat_fraction_over_the_strain_rate(tmp_path):
     path = _write(tmp_path / "steel.yaml", "value: 0.9\n", f"value: {RATES}\n")
     file = read_material(path)
     assert workpiece(str(path)).taylor_quinney == RateTable((1.0, 1000.0), (0.6, 0.9))
@@ -236,7 +231,7 @@ def test_heat_fraction_over_the_strain_rate(tmp_path: Path) -> None:
     assert "0.6" in json.dumps(scene_inputs(study)["workpiece"]["taylor_quinney"])
 
 
-def test_a_study_takes_a_file_beside_it(tmp_path: Path) -> None:
+def test_a_study_takes_a_file_beside_it(tmp_path):
     _write(tmp_path / "steel.yaml", "212 GPa", "200 GPa")
     for name in ("steel.yaml", "steel.yaml/pantale"):
         (tmp_path / "study.yaml").write_text(f"cutting: {{workpiece: {name}}}")
@@ -244,7 +239,7 @@ def test_a_study_takes_a_file_beside_it(tmp_path: Path) -> None:
         assert cutting.simulation().workpiece.young_modulus.values[0] == 200e9
 
 
-def test_the_cache_knows_a_materials_numbers(tmp_path: Path) -> None:
+def test_the_cache_knows_a_materials_numbers(tmp_path):
     path = _write(tmp_path / "steel.yaml", "212 GPa", "200 GPa")
     study = Study(**{"cutting": {"workpiece": str(path)}})
     before = json.dumps(scene_inputs(study))
@@ -254,7 +249,7 @@ def test_the_cache_knows_a_materials_numbers(tmp_path: Path) -> None:
     assert json.dumps(scene_inputs(study)) != before
 
 
-def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch):
     class Mine(JohnsonCook):
         """Another law with the fields of Johnson and Cook's."""
 
@@ -267,7 +262,7 @@ def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch: pytest.Monk
     assert json.dumps(scene_inputs(study)) != json.dumps(before)
 
 
-def test_a_study_chooses_a_set() -> None:
+def test_a_study_chooses_a_set():
     study = Study(**{"cutting": {"workpiece": "aisi-1045/ozel"}})
     ozel = study.cutting.simulation().workpiece
     assert isinstance(ozel.flow_stress, JohnsonCook)
@@ -275,7 +270,7 @@ def test_a_study_chooses_a_set() -> None:
     assert replace(ozel, name="", flow_stress=AISI_1045.flow_stress) == replace(AISI_1045, name="")
 
 
-def test_command_lists_and_shows() -> None:
+def test_command_lists_and_shows():
     listed = chipglow("materials").output
     assert all(name in listed for name in material_names())
     shown = chipglow("materials", "aisi-1045", COLUMNS="120")
@@ -283,7 +278,7 @@ def test_command_lists_and_shows() -> None:
         assert text in shown.output
 
 
-def test_command_draws(tmp_path: Path) -> None:
+def test_command_draws(tmp_path):
     path = tmp_path / "steel.png"
     result = chipglow("materials", "al-7075-t6", "--plot", path)
     assert path.read_bytes().startswith(b"\x89PNG")

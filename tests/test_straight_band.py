@@ -30,13 +30,10 @@ def test_readings_against_the_camera_on_a_scene_of_the_same_band():
     )
     images = error_images(camera, exposure)
     distance = np.arange(-60e-6, 60.5e-6, 1e-6)[:, None]
-    line = distance * [sin(radians(40)), cos(radians(40))]
-    lines = np.array(
-        [
-            line + s * np.array([cos(radians(40)), -sin(radians(40))])
-            for s in (camera.pitch * 1.2 * np.arange(-3, 4))
-        ]
-    )
+    aside = (camera.pitch * 1.2 * np.arange(-3, 4))[:, None, None]
+    normal, tangent = np.array([[sin(radians(40)), cos(radians(40))],
+                                [cos(radians(40)), -sin(radians(40))]])  # fmt: skip
+    lines = distance * normal + aside * tangent
     pixels = camera.pixels(raster)
     error, portion = (
         sample(images[name].values, pixels, lines) for name in ("case_1", "psf_portion")
