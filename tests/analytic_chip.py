@@ -52,6 +52,12 @@ class AnalyticChip:
         """Times of the frames in s."""
         return self.frame_spacing * np.arange(self.frames)
 
+    @property
+    def field_of_view(self) -> dict[str, str | int]:
+        """Section of a study that has the scene's samples."""
+        lengths = {name: f"{getattr(self.raster, name)} m" for name in ("left", "top", "spacing")}
+        return {**lengths, "rows": self.raster.rows, "columns": self.raster.columns}
+
     def angle(self, time: float) -> float:
         """Angle of the band over the horizontal in rad."""
         return self.shear_angle + self.shear_angle_drift * time

@@ -2,7 +2,7 @@ import re
 import shlex
 import subprocess
 import sys
-from json import loads
+from json import dumps, loads
 from pathlib import Path
 from shutil import copy
 
@@ -36,13 +36,7 @@ ROOT = Path(__file__).parents[1]
 RASTER = AnalyticChip().raster
 STUDY = f"""
 title: A chip in closed form
-cutting:
-  field_of_view:
-    left: {RASTER.left} m
-    top: {RASTER.top} m
-    spacing: {RASTER.spacing} m
-    rows: {RASTER.rows}
-    columns: {RASTER.columns}
+cutting: {dumps({"field_of_view": AnalyticChip().field_of_view})}
 analysis: {{exposures: 3, phases: 3, psf_widths: [8 um, 12 um]}}
 """
 

@@ -285,15 +285,7 @@ def runs(monkeypatch):
 
 
 def small_study(**cutting):
-    raster = AnalyticChip().raster
-    view = {
-        "left": f"{raster.left} m",
-        "top": f"{raster.top} m",
-        "spacing": f"{raster.spacing} m",
-        "rows": raster.rows,
-        "columns": raster.columns,
-    }
-    return Study(cutting={"field_of_view": view, **cutting})
+    return Study(cutting={"field_of_view": AnalyticChip().field_of_view, **cutting})
 
 
 def test_a_scene_is_computed_once_for_the_same_inputs(cache, runs):
