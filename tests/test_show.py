@@ -161,7 +161,7 @@ def test_the_command_prints_the_parts_of_a_scene_with_a_gap(tmp_path, monkeypatc
     whole = AnalyticChip().scene()
     kept = [*range(10), *range(20, 25)]
     write_scene(Scene(whole.data.isel(time=kept)), "scene.nc")
-    _, text = show("scene.nc")
+    text = show("scene.nc")
     times = [f"{1e6 * whole.times[index]:.7g} µs" for index in (0, 9, 20, 24)]
     assert f"{times[0]} to {times[1]}, {times[2]} to {times[3]}" in text
 
