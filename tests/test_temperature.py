@@ -131,6 +131,22 @@ def test_few_images_widen_the_interval():
     assert np.isnan(alone.contribution("repeatability"))
 
 
+def test_an_uncertain_emissivity_has_an_asymmetric_interval():
+    found = true_temperature([image()], WHOLE, EmissivityLine.constant(0.42, 0.08))
+    # The temperature falls with the emissivity, so quantiles are those of the emissivity.
+    ends = 0.42 - 0.08 * 1.959964, 0.42 + 0.08 * 1.959964
+    radiance = BAND.radiance(np.array([HOT, ROOM]))
+    high, low = (
+        float(BAND.temperature(radiance[1] + 0.42 / end * (radiance[0] - radiance[1])))
+        for end in ends
+    )
+    # The interval is stable to half a unit of the second digit of u, here 0.5 K.
+    assert (found.distribution.low, found.distribution.high) == pytest.approx((low, high), abs=1.0)
+    assert not found.distribution.validates(found.estimate)
+    exact = true_temperature([image()], WHOLE, EmissivityLine.constant(0.42, 0.005))
+    assert exact.distribution.validates(exact.estimate)
+
+
 def test_errors_that_emissivity_and_image_share_cancel():
     """At the temperature of the heating itself, only the thermocouple's error is left."""
     calibration = fitted(common=1.0)
@@ -254,6 +270,10 @@ def test_a_line_is_taken_at_the_temperature_that_is_found(slope, kelvins):
     # Radiances in float32 are good to 6e-8 of 40 K a relative change of the radiance.
     assert found.estimate.values == pytest.approx(kelvins, abs=1e-3)
     assert found.emissivity == pytest.approx(on_the_line(kelvins, slope), abs=1e-6)
+    # Half a unit of the second digit at most; with a constant emissivity u is 12 % or more off.
+    assert found.distribution.standard_uncertainty == pytest.approx(
+        found.estimate.standard_uncertainty, rel=0.05
+    )
 
 
 @pytest.mark.parametrize("kelvins", [700.0, 900.0])

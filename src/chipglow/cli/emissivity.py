@@ -204,7 +204,7 @@ def _print(result: "lab.RegionTemperatures") -> None:
     from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     screen, rows = current(), result.to_frame()
-    for name in ("radiance_temperature", "true_temperature"):
+    for name in ("radiance_temperature", "true_temperature", "low", "high"):
         rows[f"{name}_degC"] = rows[f"{name}_K"] - 273.15
     columns = {
         "region": "region",
@@ -214,6 +214,8 @@ def _print(result: "lab.RegionTemperatures") -> None:
         "true temperature ± u / °C": "true_temperature_degC ± standard_uncertainty_K",
         "U 95 % / K": "expanded_uncertainty_K",
         "k": "coverage_factor",
+        "lower 95 % / °C": "low_degC",
+        "upper 95 % / °C": "high_degC",
     }
     screen.table("regions", rows, columns)
     screen.heading()

@@ -7,13 +7,16 @@ from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.dataset import from_xarray, to_xarray
 from chipglow.uncertainty.draws import draw
 from chipglow.uncertainty.estimate import Estimate, propagate
+from chipglow.uncertainty.monte_carlo import MonteCarlo, monte_carlo
 
 __all__ = [
     "Cause",
     "Component",
     "Estimate",
+    "MonteCarlo",
     "draw",
     "from_xarray",
+    "monte_carlo",
     "propagate",
     "to_xarray",
 ]

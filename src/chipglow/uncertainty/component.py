@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, Final
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,13 @@ from scipy import sparse
 
 from chipglow.quantities import Array
 
+Distribution: TypeAlias = Literal["normal", "rectangular", "triangular", "arcsine"]
+"""Distribution of an error; a normal one with degrees of freedom is Student's."""
+
 _MOST: Final = 200_000_000
 """Numbers that the effects of one component may take: 1.6 GB."""
+
+_DISTRIBUTIONS: Final = get_args(Distribution)
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class Cause:
     """Whether one estimate with these degrees of freedom serves all errors (JCGM 100:2008, H.3)."""
     parts: tuple[str, ...] = ()
     """Names of the errors in budgets, if each has a separate line."""
+    distribution: Distribution = "normal"
+    """Distribution of each error."""
 
     def __post_init__(self) -> None:
         rules = {
@@ -44,6 +51,9 @@ class Cause:
             ),
             f"has {len(self.parts)} parts, expected {self.errors}": (
                 len(self.parts) in (0, self.errors)
+            ),
+            f"distribution: {self.distribution!r}, expected one of {', '.join(_DISTRIBUTIONS)}": (
+                self.distribution in _DISTRIBUTIONS
             ),
         }
         if wrong := [text for text, holds in rules.items() if not holds]:

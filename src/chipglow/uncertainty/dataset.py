@@ -9,17 +9,19 @@ obsarray (cause, identity, degrees of freedom, warnings) is in attributes of our
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import xarray as xr
 from scipy import sparse
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import Cause, Component
+from chipglow.uncertainty.component import Cause, Component, Distribution
 from chipglow.uncertainty.estimate import Estimate, factor
 
 _MOST_ERRORS: Final = 1000
+_SHAPES: Final = {"normal": "gaussian"}
+_DISTRIBUTIONS: Final[Mapping[str, Distribution]] = {"gaussian": "normal", "uniform": "rectangular"}
 
 _RANDOM, _SYSTEMATIC, _MATRIX = "random", "systematic", "err_corr_matrix"
 
@@ -91,7 +93,7 @@ def _parts(component: Component) -> Iterator[tuple[Array, dict[str, Any]]]:
 
 def _attributes(cause: Cause, error: int) -> dict[str, Any]:
     return {
-        "pdf_shape": "gaussian",
+        "pdf_shape": _SHAPES.get(cause.distribution, cause.distribution),
         "cause": cause.name,
         "identity": cause.identity,
         "error": error,
@@ -126,7 +128,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
     if part.attrs.get("units") == "%":
         values = values / 100 * variable.values
     effects, own = _effects(data, part, label, values.ravel())
-    attributes = part.attrs
+    attributes, shape = part.attrs, str(part.attrs.get("pdf_shape", "gaussian"))
     cause = Cause(
         str(attributes.get("cause", label)),
         # A dataset of obsarray says nothing of other variables: its errors are its own.
@@ -135,6 +137,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
         float(attributes.get("degrees_of_freedom", np.inf)),
         bool(attributes.get("pooled", not own)),
         _texts(attributes.get("parts", ())),
+        _DISTRIBUTIONS.get(shape, cast("Distribution", shape)),
     )
     return cause, int(attributes.get("error", 0)), effects
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +27,7 @@ def draw(
 
     Returns an array of shape (count, ...) for each estimate; a function of them has the
     distribution of the output (JCGM 101:2008, clause 7; 7.2.2 advises 10⁶ draws for a coverage
-    interval). A cause with finite degrees of freedom is drawn from Student's distribution (6.4.9);
+    interval). A normal cause with finite degrees of freedom has Student's distribution (6.4.9);
     pooled errors have one χ² together. With 2 degrees of freedom or fewer their standard deviation
     is infinite, whatever that of the draws: these are refused, unless `heavy_tails` states that
     only quantiles are used.
@@ -72,7 +72,14 @@ def _used(effects: Any) -> NDArray[np.intp]:
 
 def _errors(cause: Cause, count: int, generator: np.random.Generator) -> Array:
     """Draw errors in standard uncertainties, shape (count, errors)."""
-    found = generator.standard_normal((count, cause.errors))
+    shape = (count, cause.errors)
+    if cause.distribution == "rectangular":
+        return generator.uniform(-sqrt(3.0), sqrt(3.0), shape)
+    if cause.distribution == "triangular":
+        return generator.triangular(-sqrt(6.0), 0.0, sqrt(6.0), shape)
+    if cause.distribution == "arcsine":
+        return np.asarray(sqrt(2.0) * np.cos(np.pi * generator.uniform(size=shape)))
+    found = generator.standard_normal(shape)
     freedom = cause.degrees_of_freedom
     if isfinite(freedom):
         number = 1 if cause.pooled else cause.errors

@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.special import stdtrit
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import Cause, Component
+from chipglow.uncertainty.component import Cause, Component, Distribution
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +85,7 @@ class Estimate:
         per_element: bool = False,
         degrees_of_freedom: float = np.inf,
         pooled: bool = True,
+        distribution: Distribution = "normal",
     ) -> "Estimate":
         """Return the estimate with one more component.
 
@@ -97,7 +98,7 @@ class Estimate:
         signed = np.broadcast_to(np.asarray(effect, np.float64), self.values.shape).flatten()
         identity = uuid4().hex if identity is None else identity
         errors = signed.size if per_element else 1
-        cause = Cause(name, identity, errors, degrees_of_freedom, pooled)
+        cause = Cause(name, identity, errors, degrees_of_freedom, pooled, (), distribution)
         effects = _diagonal(signed) if per_element else signed[:, None]
         return replace(self, components=(*self.components, Component(cause, effects)))
 

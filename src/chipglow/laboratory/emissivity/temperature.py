@@ -1,8 +1,8 @@
 """True temperature of an area whose emissivity is known, with its uncertainty."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from math import inf, isnan, sqrt
 from typing import Any, Final
 from uuid import uuid4
@@ -32,7 +32,7 @@ from chipglow.quantities.units import HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes
-from chipglow.uncertainty import Estimate, propagate
+from chipglow.uncertainty import Estimate, MonteCarlo, monte_carlo, propagate
 
 TEMPERATURE_BUDGET: Final = (
     *("reference", "reflected", "calibration", "emissivity"),
@@ -47,6 +47,8 @@ _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
 _STEP: Final = 0.5
 _STEPS: Final = 200
+_ROUNDS: Final = 4
+_SEED: Final = 2010
 
 
 def reflected_temperature(
@@ -79,6 +81,15 @@ class TrueTemperature:
     """True temperature in K, with the lines `TEMPERATURE_BUDGET`."""
     correlation: float | None
     """Correlation of the calibration's errors at the radiances of area and emissivity, if known."""
+    model: Callable[..., Array]
+    """True temperature in K as a function of arrays of `inputs`."""
+    inputs: tuple[Estimate, ...]
+    """Emissivity, mean radiance in W/(m² sr), temperature of the surroundings in K."""
+
+    @cached_property
+    def distribution(self) -> MonteCarlo:
+        """Distribution of the true temperature by the model itself (JCGM 101:2008)."""
+        return monte_carlo(self.model, *self.inputs, generator=np.random.default_rng(_SEED))
 
 
 def true_temperature(
@@ -141,11 +152,14 @@ def true_temperature(
     shared = (correlation or 0.0) if emissivity.heatings else 1.0
     stated = calibration_uncertainty(measurements, radiance.mean(axis=0), camera_uncertainty)
     error = 0.0 if stated is None else float(stated[used.mask].mean())
-    estimate = propagate(
-        lambda _, seen, __: temperature(seen),
+    inputs = (
         value.renamed(RANDOM, "emissivity"),
         _mean_radiance(values, error, shared, drift, len(measurements)),
         reflecting,
+    )
+    estimate = propagate(
+        lambda _, seen, __: temperature(seen),
+        *inputs,
         derivatives=[lambda *_, value=value: np.array(value) for value in derivatives],
     )
     pixels = temperature(values.mean(axis=0))
@@ -166,6 +180,10 @@ def true_temperature(
         emissivity=float(value.values),
         estimate=replace(estimate, warnings=tuple(warnings)),
         correlation=correlation,
+        model=partial(
+            _modelled, emissivity.slope if len(emissivity.heatings) > 1 else 0.0, at, band
+        ),
+        inputs=inputs,
     )
 
 
@@ -187,6 +205,8 @@ class RegionTemperatures:
                 "radiance_temperature_K": row.radiance_temperature,
                 "true_temperature_K": float(row.estimate.values),
                 "standard_deviation_K": row.standard_deviation,
+                "low_K": float(row.distribution.low),
+                "high_K": float(row.distribution.high),
                 **uncertainty_columns(row.estimate, TEMPERATURE_BUDGET, "_K"),
             }
             for row in self.rows
@@ -229,6 +249,7 @@ def true_temperatures(
     ]
     warnings += [warning for row in rows for warning in row.estimate.warnings]
     warnings += [text for row, line in zip(rows, lines, strict=True) for text in _far(row, line)]
+    warnings += [text for row in rows for text in _unvalidated(row)]
     unknown_drift = drift is None and len(measurements) == 1
     unknown_drift |= any(
         np.isnan(line.at(line.middle).contribution("drift")).any() for line in lines
@@ -252,6 +273,17 @@ def _far(row: TrueTemperature, line: EmissivityLine) -> Iterator[str]:
         yield (
             f"{row.name}: is {difference:.0f} K from the {' to '.join(ends)} at which its "
             "emissivity was determined; u does not include the error of the extrapolation."
+        )
+
+
+def _unvalidated(row: TrueTemperature) -> Iterator[str]:
+    """Warn if Monte Carlo does not validate the interval to first order."""
+    found = row.distribution
+    if not found.validates(row.estimate):
+        low, high = found.low - ZERO_CELSIUS, found.high - ZERO_CELSIUS
+        yield (
+            f"{row.name}: Monte Carlo does not confirm the expanded uncertainty to first order "
+            f"(JCGM 101, 8.1): the 95 % interval is {low:.4g} °C to {high:.4g} °C."
         )
 
 
@@ -318,6 +350,18 @@ def _temperature(emissivity: float, reflected: float, band: Band, radiance: Arra
     room = float(band.radiance(np.array(reflected)))
     own = (radiance - (1 - emissivity) * room) / emissivity
     return np.asarray(band.temperature(own), np.float64)
+
+
+def _modelled(
+    slope: float, at: float, band: Band, emissivity: Array, radiance: Array, reflected: Array
+) -> Array:
+    """Return true temperatures in K; the emissivity in 1/K has a slope, and its value at `at`."""
+    room = band.radiance(reflected)
+    found: Any = np.full_like(radiance, at)
+    for _ in range(_ROUNDS if slope else 1):
+        actual = emissivity + slope * (found - at)
+        found = band.temperature((radiance - (1 - actual) * room) / actual)
+    return np.where(np.isnan(found), inf, found)  # too little emissivity for any temperature
 
 
 def _derivatives(
