@@ -195,12 +195,7 @@ def test_the_stage_follows_from_the_place_beside_the_reference():
     shifts = [-18e-6, 0.0, 3e-6, 30e-6]
     frames = measured([BandImage(shift=shift, bend=1e-3).temperature() for shift in shifts])
     profile = band_profile(frames, TOOL, reference=1)
-    assert profile.stage == (
-        Stage.DEVELOPING,
-        Stage.DEVELOPED,
-        Stage.DEVELOPED,
-        Stage.MOVED,
-    )
+    assert profile.stage == (Stage.DEVELOPING, Stage.DEVELOPED, Stage.DEVELOPED, Stage.MOVED)
     # Either of the two curves is within a tenth of a pixel.
     np.testing.assert_allclose(profile.offset, shifts, atol=0.2 * PITCH)
     np.testing.assert_array_equal(profile.in_place, [True, True, True, False])

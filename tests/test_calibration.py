@@ -5,11 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from chipglow.camera import (
-    MODELS,
-    Blackbody,
-    fit_calibration,
-)
+from chipglow.camera import MODELS, Blackbody, fit_calibration
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -49,10 +45,7 @@ def test_exact_points_give_their_sakuma_hattori_back():
 
 
 def test_the_slopes_are_those_of_the_counts():
-    for fit in (
-        SAKUMA_HATTORI,
-        fit_linear(KELVINS, counts_of("linear", KELVINS), BAND),
-    ):
+    for fit in (SAKUMA_HATTORI, fit_linear(KELVINS, counts_of("linear", KELVINS), BAND)):
         calibration = fit.calibration
         rise = calibration.counts(BETWEEN + 0.05) - calibration.counts(BETWEEN - 0.05)
         # The table of slopes has steps of 0.25 K, between which it is straight.

@@ -9,12 +9,7 @@ import pytest
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from typer.testing import CliRunner
 
-from chipglow.camera import (
-    LinearCalibration,
-    Measurement,
-    SakumaHattori,
-    fit_calibration,
-)
+from chipglow.camera import LinearCalibration, Measurement, SakumaHattori, fit_calibration
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid

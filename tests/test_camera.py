@@ -231,11 +231,7 @@ def test_times_in_another_unit_are_doubted(step, rise, doubted):
     assert any("1 s apart, 1e+05 times the exposure of 10 µs" in one for one in warnings) == doubted
 
 
-@given(
-    pitch=st.floats(0.3e-6, 15e-6),
-    offset=st.floats(0, 5e-6),
-    fill=st.floats(0.01, 1.0),
-)
+@given(pitch=st.floats(0.3e-6, 15e-6), offset=st.floats(0, 5e-6), fill=st.floats(0.01, 1.0))
 def test_sampling_conserves_energy(pitch, offset, fill):
     scene = Raster(0.0, 0.0, SPACING, 41, 60)
     sensors = sensor_raster(scene, pitch, (offset, offset), None)

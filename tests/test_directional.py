@@ -8,11 +8,7 @@ from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from test_reflections import RASTER, a_scene, apparent
 
-from chipglow.surface import (
-    Fresnel,
-    UniformSurface,
-    Wedge,
-)
+from chipglow.surface import Fresnel, UniformSurface, Wedge
 
 INDICES = st.floats(1.05, 30.0)
 

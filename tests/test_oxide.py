@@ -5,11 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from chipglow.scene import Raster, Scene
-from chipglow.surface import (
-    OxideHistory,
-    ParabolicOxide,
-    UniformSurface,
-)
+from chipglow.surface import OxideHistory, ParabolicOxide, UniformSurface
 
 RASTER = Raster(0.0, 60e-6, 1e-6, 60, 80)
 OXIDE = ParabolicOxide()

@@ -42,14 +42,7 @@ from chipglow.io import write_scene
 from chipglow.radiometry import Band, RatioThermometer, spectral_radiance
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
-from chipglow.surface import (
-    CHIP_1,
-    CHIP_2,
-    Dispersion,
-    HagenRubens,
-    SpectralTable,
-    UniformSurface,
-)
+from chipglow.surface import CHIP_1, CHIP_2, Dispersion, HagenRubens, SpectralTable, UniformSurface
 
 C2 = 0.01438776877
 SHORT, LONG = Band(1.5e-6, 1.7e-6), Band(3.8e-6, 5.1e-6)

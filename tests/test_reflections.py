@@ -10,14 +10,7 @@ from hypothesis import given, settings, strategies as st
 from chipglow.camera import Camera, View, expose
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry
-from chipglow.surface import (
-    CHIP_1,
-    CHIP_2,
-    EmissivityStack,
-    Exchange,
-    UniformSurface,
-    Wedge,
-)
+from chipglow.surface import CHIP_1, CHIP_2, EmissivityStack, Exchange, UniformSurface, Wedge
 
 CHIP, TOOL, HOT, WARM = 0.42, 0.58, 900.0, 700.0
 RIGHT = np.pi / 2

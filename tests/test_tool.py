@@ -332,10 +332,7 @@ def test_an_outline_is_read_in_any_unit_of_length_and_from_any_origin(content, t
         ("x_um,y_um\n0,500\n0,nan\n600,60\n", "line 3: '0,nan', expected 2 numbers"),
         ("x_um,y_um\n0,500\n0,20\n0,20\n600,60\n", "line 4: the same point as the one before"),
         ("x_um,y_um\n0,500\n0,20\n0,90\n600,95\n", "line 3: the line turns back"),
-        (
-            "x_um,y_um\n0,9e6\n0,20\n600,60\n",
-            "line 2: outline 8999.98 mm long, expected up to",
-        ),
+        ("x_um,y_um\n0,9e6\n0,20\n600,60\n", "line 2: outline 8999.98 mm long, expected up to"),
         (
             "x_um,y_um\n0,500\n0,100\n90,0\n-50,60\n20,-5\n600,60\n",
             "line 6: the piece from point 2 crosses that from point 5",

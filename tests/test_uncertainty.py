@@ -10,15 +10,7 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from scipy.special import stdtrit
 
-from chipglow.uncertainty import (
-    Cause,
-    Component,
-    Estimate,
-    draw,
-    from_xarray,
-    propagate,
-    to_xarray,
-)
+from chipglow.uncertainty import Cause, Component, Estimate, draw, from_xarray, propagate, to_xarray
 
 # JCGM 100:2008, annex H, as printed
 
