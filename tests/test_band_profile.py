@@ -20,7 +20,6 @@ from chipglow.laboratory.chip import (
     ThermalImage,
     band_profile,
     find_band,
-    read_curve,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
 from chipglow.uncertainty import from_xarray
@@ -260,26 +259,6 @@ def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
 # Bad input
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"tool": TOOL.at((1.0, 0.0))}, r"^tool: its edge at .* outside the image"),
-        ({"width": -1e-6}, "width is -1e-06 m, expected 0 m or more"),
-        ({"position": np.nan}, "position is nan m"),
-        ({"frames": [3]}, "frame 3, expected 0 to 0"),
-        ({"reference": -1}, "frame -1, expected 0 to 0"),
-        ({"curve": STRAIGHT[::-1]}, "expected from the edge outward"),
-        ({"curve": STRAIGHT[:1]}, "expected 2 or more"),
-        ({"curve": STRAIGHT[[0, 0, 1]]}, "two points are the same"),
-        ({"curve": STRAIGHT * np.nan}, "all finite"),
-        ({"curve": STRAIGHT - np.array([2e-3, 0.0])}, "expected a curve in the image"),
-    ],
-)
-def test_what_cannot_be_is_one_error(wrong, message):
-    with pytest.raises(ValueError, match=message):
-        band_profile(measured([BandImage().temperature()]), **{"tool": TOOL, **wrong})
-
-
 # The command
 
 
@@ -332,28 +311,6 @@ def test_the_netcdf_file_holds_si_units(file, tmp_path):
     both = np.hypot(read.contribution("calibration"), read.contribution("position"))
     np.testing.assert_allclose(data["standard_uncertainty"], both)
     assert 1.5 < np.nanmax(read.contribution("calibration")) < 2.0
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--at", "3 s"), "--at: 3000000 us is not in the measurement, expected 0 us to 10 us"),
-        (("--reference", "1 ms"), "--reference: 1000 us is not in the measurement, expected"),
-        (("--curve", "none.csv"), "none.csv: No such file"),
-    ],
-)
-def test_what_the_command_cannot_do_is_one_line(file, tmp_path, options, message):
-    result = run(file, *options)
-    assert result.exit_code == 2
-    assert message in result.output
-    assert len(result.output.strip().splitlines()) == 1
-    assert not list(tmp_path.glob("band.*"))
-
-
-def test_a_curve_of_one_point_is_one_error(tmp_path):
-    (tmp_path / "curve.csv").write_text("x_um,y_um\n1,2\n", encoding="utf-8")
-    with pytest.raises(ValueError, match="1 points, expected 2 or more"):
-        read_curve(tmp_path / "curve.csv")
 
 
 @pytest.mark.parametrize("depth", [5e-6, 10e-6, 20e-6])

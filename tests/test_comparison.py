@@ -289,32 +289,6 @@ def test_without_a_band_the_rake_face_is_left():
     assert result.fits["place"].str.contains("rake face|chip").all()
 
 
-COLD = frames(np.full(RASTER.shape, 500.0))
-OWN = frames(field(X, Y), relative_uncertainty=0.01)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (
-            lambda: compare(COLD, {"same": COLD}, TOOL, stated=STATED),
-            r"^comparison: there is nothing[^\n]+$",
-        ),
-        (lambda: compare(COLD, {}, TOOL), "no simulation, expected 1 or more"),
-        (
-            lambda: compare(OWN, {"same": OWN}, TOOL, CURVE, STATED),
-            "uncertainty: 5 K beside the uncertainty that the measurement states",
-        ),
-        (lambda: StatedUncertainties(-1.0), "temperature: -1 K, expected 0 K or more"),
-        (lambda: StatedUncertainties(emissivity=np.nan), "emissivity: nan, expected 0 or more"),
-        (lambda: StatedUncertainties(position=-1e-6), "position: -1e-06 m, expected 0 m"),
-    ],
-)
-def test_what_cannot_be_compared_is_one_error(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
-
-
 def test_another_rake_angle_and_no_tool_are_said():
     base = frames(field(X, Y))
     other = base.with_tool(ToolGeometry(rake_angle=0.0))
@@ -369,26 +343,6 @@ def test_the_command_writes_what_it_says(folder):
         with Image.open(folder / name) as picture:
             assert picture.width > 800
     assert (folder / "result" / "comparison.svg").is_file()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ((*FILES, "one.nc", "one.nc", *USUAL), "one.nc: is given twice"),
-        (
-            (*FILES, "--reference", "1 s"),
-            "--reference: 1000000 us is not in the measurement, expected 0 us to 20 us",
-        ),
-        (("measured.nc", "curve.csv"), "curve.csv: curve: unit: is missing"),
-        ((*FILES, *USUAL, "--out", "."), "which chipglow did not write"),
-    ],
-)
-def test_what_the_command_cannot_do_is_one_line(folder, options, message):
-    result = run(*options)
-    assert result.exit_code == 2
-    last = result.output.strip().splitlines()[-1]
-    assert message in last
-    assert last.startswith("chipglow: ")
 
 
 # Noise that is alike from place to place and from frame to frame

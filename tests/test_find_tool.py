@@ -173,25 +173,3 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
         code, _, said = command("real.nc", "--tool", "tool.yaml")
         assert code == 0
         assert ("Warning: The rake face that shows in the image is" in said) is doubted
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["real.nc"], "tool: the measurement contains no tool"),
-        (["told.nc", "--frame", "2"], "--frame: '2', expected 0 to 1, or all"),
-        (["told.nc", "--frame", "0", "--at", "1 us"], "--frame and --at cannot be combined"),
-        (
-            ["told.nc", "--at", "1 s"],
-            "--at: 1000000 us is not in the measurement, expected 0 us to 10 us",
-        ),
-        (["told.nc", "--tool", "away.yaml"], "no square on the rake face is inside the image"),
-    ],
-)
-def test_what_is_wrong_is_one_line(folder, arguments, message):
-    (folder / "away.yaml").write_text("tip: [5 mm, 0 mm]\n")
-    before = sorted(folder.iterdir())
-    code, _, error = command(*arguments)
-    assert code == 2 and "\n" not in error
-    assert message in error
-    assert sorted(folder.iterdir()) == before

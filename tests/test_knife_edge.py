@@ -28,7 +28,6 @@ from synthetic_edge import (
 from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
 from chipglow.laboratory.psf import (
     NoEdgeError,
-    aperture_image,
     edge_image,
     find_edge,
     knife_edge,
@@ -436,22 +435,6 @@ def test_a_measurement_becomes_an_image():
     assert "acts twice" in told.notes.assumed[1]
     with pytest.raises(ValueError, match=r"m: the region has 0 x 40 pixels, expected 8 x 8"):
         edge_image(measurement, "m", (slice(50, 60), slice(None)))
-
-
-def test_images_and_apertures_that_are_not_there_are_errors():
-    with pytest.raises(ValueError, match="none is given"):
-        knife_edge([])
-    edge, hole = an_image(), gaussian_aperture(FWHM, 100e-6)
-    with pytest.raises(ValueError, match="expected 3 diameters or more"):
-        knife_edge([edge], [hole, hole, gaussian_aperture(FWHM, 60e-6)])
-    others = [gaussian_aperture(FWHM, 60e-6), gaussian_aperture(FWHM, 80e-6)]
-    flat = replace(hole, radiance=np.full_like(hole.radiance, 2.0))
-    with pytest.raises(ValueError, match="100 um: all pixels are as bright"):
-        knife_edge([edge], [flat, *others])
-    with pytest.raises(ValueError, match="no aperture of 20 um within the image"):
-        knife_edge([edge], [replace(hole, diameter=20e-6, name="hole"), *others])
-    with pytest.raises(ValueError, match=r"hole: diameter is -1\.0 m, expected more than 0"):
-        aperture_image(measurement_of(hole.radiance * 100), -1.0, "hole")
 
 
 def test_the_annular_transfer_function_is_the_transform_of_the_closed_form():

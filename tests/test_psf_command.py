@@ -115,26 +115,6 @@ def test_diffraction_beside_a_dead_pixel_is_drawn_and_doubts_are_printed(folder)
     assert (folder / "psf.pdf").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (("edge.nc", "--model", "lorentz"), "'lorentz' was not fitted"),
-        (("edge.nc", "--set", "band=3-5 um"), "--set"),
-        (("edge.nc", "--region", "5:35"), "expected rows and columns such as 10:70,20:90"),
-        (("edge.nc", "--region", "0:4,0:4"), "edge.nc: the region has 4 x 4 pixels"),
-        (("flat.nc",), "flat.nc: no edge stands out of the noise"),
-    ],
-)
-def test_bad_input_is_one_line(folder, arguments, text):
-    radiance = COLD + np.random.default_rng(0).normal(0.0, 0.01 * COLD, (40, 40))
-    write_measurement(measurement_of(radiance), folder / "flat.nc")
-    code, output = psf(*arguments)
-    assert code == 2
-    assert text in output
-    assert output.count("\n") == 1
-    assert not (folder / "psf.nc").exists()
-
-
 def write_counts(folder, name, fwhm=10e-6, offset=300.0, gain=400.0, normal=5.0):
     """Counts of an edge as a camera's file, cut off at 0 and 16 bits."""
     radiance = edge_radiance(gaussian_edge(fwhm), normal, background=2.0, step=5.0)

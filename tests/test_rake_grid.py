@@ -150,35 +150,6 @@ def test_noise_averages_as_the_number_of_pixels_says():
     assert 0.97 < scaled.mean() < 1.10
 
 
-TOUCH = ToolGeometry().signed_distance(*np.meshgrid(RASTER.x, RASTER.y))
-APART = np.where((TOUCH > 0) & (TOUCH < 30e-6), Flag.UNDER_RANGE, 0).astype(np.uint8)[None]
-
-
-def grid_of(tool=None, flags=None, **options):
-    rake_grid(measured(linear_image(), flags=flags), tool or ToolGeometry(), **options)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (
-            lambda: grid_of(ToolGeometry().at((5e-3, 0.0))),
-            "no square on the rake face is inside the image",
-        ),
-        (lambda: grid_of(flags=APART), r"none of the \d+ squares .* touches the tool"),
-        (lambda: grid_of(pixels=0.5), "pixels is 0.5, expected 1 or more"),
-        (lambda: grid_of(depth=10e-6), "depth is 1e-05 m, expected a square's 1.8e-05 m"),
-        (lambda: grid_of(frames=[3]), "frame 3, expected 0 to 0"),
-        (lambda: grid_of(frames=[]), "frame none, expected 0 to 0"),
-        (lambda: tool_of(measured(linear_image())), "tool: the measurement contains no tool"),
-        (lambda: ToolGeometry().at((0.0, np.nan)), "tip: .* finite"),
-    ],
-)
-def test_impossible_input_is_refused(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
-
-
 def test_a_simulated_measurement_tells_its_tool(tmp_path):
     chip = AnalyticChip(frames=30)
     measurement = Camera(integration_time=5e-6, lower_limit=None).measure(

@@ -55,28 +55,6 @@ def test_regions_of_a_feature_are_taken_together_and_a_pixel_counts_once():
     assert shared_pixels(regions, RASTER) == {("b", "band"): 10}
 
 
-@pytest.mark.parametrize(
-    ("region", "message"),
-    [
-        (Polygon.rectangle((30, 0), (41, 5)), "region a: reaches over columns 30 to 41, expected"),
-        (Polygon.rectangle((0, -2), (4, 5)), "reaches over rows -2 to 5, .*within the image's 0"),
-        (Circle((20, 29), 3), "reaches over rows 26 to 32"),
-        (Polygon.rectangle((3.6, 3.6), (4.4, 4.4)), "region a: is empty"),
-    ],
-)
-def test_a_region_outside_the_image_or_empty_is_refused(region, message):
-    with pytest.raises(ValueError, match=message):
-        areas((Region("a", region),), RASTER)
-
-
-def test_names_differ():
-    box = Polygon.rectangle((0, 0), (3, 3))
-    with pytest.raises(ValueError, match="region a: another region"):
-        areas((Region("a", box), Region("a", box)), RASTER)
-    with pytest.raises(ValueError, match="region body: another region, or a feature"):
-        areas((Region("body", box, "body"), Region("b", box, "body")), RASTER)
-
-
 def written(tmp_path, text):
     path = tmp_path / "regions.yaml"
     path.write_text(text)

@@ -254,20 +254,3 @@ def test_the_place_of_a_found_tool_goes_into_the_band(folder):
     assert np.nanmin(uncertainty["found"]) >= 0.0
     assert np.nanmax(uncertainty["found"]) > 1.0
     assert (uncertainty["stated"] == 0.0).all()
-
-
-# What is wrong
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"along": -1e-6}, "along: -1e-06 m, expected 0 m or more"),
-        ({"across": np.nan}, "across: nan m"),
-        ({"angle": np.inf}, "angle: inf rad"),
-        ({"pivot": np.nan}, "pivot: nan m is not finite"),
-    ],
-)
-def test_impossible_uncertainties_are_refused(wrong, message):
-    with pytest.raises(ValueError, match=message):
-        ToolUncertainty(**({"along": 1e-6, "across": 1e-6} | wrong))
