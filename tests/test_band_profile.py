@@ -63,23 +63,6 @@ def test_noise_of_5_kelvin_moves_the_ridge_by_less_than_a_quarter_of_a_pixel(see
     assert np.sqrt((across[inner(along)] ** 2).mean()) < 0.25 * PITCH
 
 
-def test_a_band_that_has_left_the_edge_is_found_where_it_is():
-    image = BandImage(shift=60e-6)
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    along, _ = image.place(np.stack([x, y], axis=-1))
-    temperature = np.where(along > 60e-6, image.temperature(), 600.0)
-    line = find_band(ThermalImage.of(measured([temperature]), 0), TOOL)
-    along, across = image.place(line.points)
-    assert np.abs(across[(along > 100e-6) & (along < LENGTH - 40e-6)]).max() < 0.1 * PITCH
-    assert line.distance[0] > 50e-6
-
-
-def test_the_noise_of_an_image_is_estimated():
-    image = ThermalImage.of(measured([NO_BANDS["slope"]], 7.0), 0)
-    # 4992 differences that share pixels: a few per cent.
-    assert image.noise() == pytest.approx(7.0, rel=0.05)
-
-
 NO_BANDS = {
     "uniform": np.full(RASTER.shape, 650.0),
     "slope": 650.0 + 2e5 * X,

@@ -166,16 +166,6 @@ def test_drift_and_noise_are_told_apart():
     assert found.estimate.standard_uncertainty.mean() == pytest.approx(expected, rel=0.01)
 
 
-def test_images_are_the_repetitions_where_there_are_several():
-    images = [measured(EVEN * (1 + step), frames=50, noise=0.1) for step in (-0.01, 0.0, 0.01)]
-    row = determine_emissivity(images, HEATING).of(WHOLE)
-    # Means of 0.495, 0.5 and 0.505: s = 0.005, and s / sqrt(3) with 2 degrees of freedom.
-    random = row.estimate.only("random")
-    assert random.standard_uncertainty == pytest.approx(0.005 / 3**0.5, rel=1e-3)
-    assert row.estimate.degrees_of_freedom == pytest.approx(2.0, rel=1e-6)
-    assert row.estimate.coverage_factor() == pytest.approx(4.302653, rel=1e-6)
-
-
 def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
     errors = CalibrationErrors(np.array([0.0, 1.0]), np.array([[5.0, 5.0]]))
     image = measured(table_1(), calibration_errors=errors)

@@ -1,6 +1,6 @@
 """Point spread functions of a pupil against closed forms and an independent Hankel transform."""
 
-from math import acos, exp, pi, sqrt
+from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
@@ -218,11 +218,3 @@ def test_a_working_f_number_is_that_of_the_light_at_the_detector():
     # Abbe's sine condition: NA at the detector, 1 / (2 N), times the magnification.
     assert AiryAperture(working_f_number=2.5).aperture(4.0) == pytest.approx(0.8)
     assert AiryAperture(working_f_number=2.5).aperture(1.0) == pytest.approx(0.2)
-
-
-def test_transfer_of_a_clear_pupil():
-    for nu in (0.0, 0.2, 0.77, 1.0):
-        expected = 2 / pi * (acos(nu) - nu * sqrt(1 - nu**2))
-        assert annular_transfer(np.array([nu]), 0.0)[0] == pytest.approx(expected, abs=1e-14)
-        found = pupil().transfer(np.array([nu * CUTOFF * (1 - 1e-6)]), np.array([0.0]))
-        assert found[0] == pytest.approx(expected, abs=1e-5)

@@ -4,15 +4,13 @@ from math import cos, radians, sin
 
 import numpy as np
 import pytest
-from analytic_chip import AnalyticChip
 from hypothesis import given, settings, strategies as st
 
-from chipglow.camera import Camera, Flag, Measurement
+from chipglow.camera import Flag, Measurement
 from chipglow.io import read_measurement, write_measurement
-from chipglow.laboratory.chip import load_tool, rake_grid, tool_of
+from chipglow.laboratory.chip import load_tool, rake_grid
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, ToolGeometry, ToolOutline
-from chipglow.surface import CHIP_2
 from chipglow.text import DescriptionError
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -148,16 +146,6 @@ def test_noise_averages_as_the_number_of_pixels_says():
     scaled = (grid.frame_standard_deviation * np.sqrt(grid.count[0]) / 5.0)[seen]
     # 60 frames give each standard deviation to 9 %, about 60 squares their mean to 1.2 %.
     assert 0.97 < scaled.mean() < 1.10
-
-
-def test_a_simulated_measurement_tells_its_tool(tmp_path):
-    chip = AnalyticChip(frames=30)
-    measurement = Camera(integration_time=5e-6, lower_limit=None).measure(
-        chip.scene(), CHIP_2, 2e-6
-    )
-    assert measurement.tool == chip.tool
-    write_measurement(measurement, tmp_path / "m.nc")
-    assert tool_of(read_measurement(tmp_path / "m.nc"), None) == chip.tool
 
 
 OUTLINE = ToolOutline.placed([(-20e-6, 300e-6), (0.0, 30e-6), (10e-6, 0.0), (300e-6, 30e-6)])

@@ -20,7 +20,6 @@ from chipglow.laboratory.registration import (
     fit_images,
     fit_points,
     load_registration,
-    read_points,
     simultaneous_frames,
     write_registration,
 )
@@ -358,11 +357,3 @@ def test_what_is_written_is_read_again(tmp_path):
     assert (again.matrix == found.matrix).all()
     assert (again.covariance == found.covariance).all()
     assert again.degrees_of_freedom == found.degrees_of_freedom
-
-
-def test_points_are_the_middles_of_sensors(tmp_path):
-    path = tmp_path / "points.csv"
-    path.write_text("infrared_column,infrared_row,visible_column,visible_row\n3,5,1,2\n")
-    places, pixels = read_points(path, RASTER, SHAPE)
-    assert places[0] == pytest.approx([RASTER.x[3], RASTER.y[5]], abs=1e-12)
-    assert pixels[0].tolist() == [1.0, 2.0]

@@ -236,22 +236,6 @@ def test_a_hone_leaves_the_faces_where_it_should(tool):
     assert np.abs(distances(tool, curve)).max() < 2e-3 * min(tool.hone.rake, tool.hone.clearance)
 
 
-@given(st.floats(-30, 30), st.floats(2, 20), st.floats(5e-6, 60e-6), st.integers(0, 2**32))
-@FEW
-def test_a_symmetric_hone_is_the_round_edge(rake, clearance, radius, seed):
-    round_edge = ToolGeometry(radians(rake), radians(clearance), radius)
-    length = radius / tan((pi / 2 - radians(rake) - radians(clearance)) / 2)
-    hone = replace(round_edge, hone=Hone(length, length))
-    assert hone.hone.form_factor == 1.0
-    points = places(seed)
-    # 64 chords of an arc of half the radius: within their height of it.
-    chord = (pi / 2 + radians(rake) + radians(clearance)) / 64
-    height = radius / 2 * (1 - cos(chord / 2))
-    np.testing.assert_allclose(
-        distances(hone, points), distances(round_edge, points), rtol=0, atol=height + 1e-15
-    )
-
-
 def test_faces_of_a_sampled_wedge_are_found():
     tool = ToolGeometry(radians(6.0), radians(9.0), 30e-6)
     outline = ToolOutline.placed(sampled(tool) + np.array([3e-3, -2e-3]))

@@ -189,13 +189,6 @@ def test_linear_propagation_is_that_of_draws(one, seed):
     assert np.abs((shown - found.covariance()) / scale).max() < 0.06
 
 
-def test_per_element_errors_of_different_elements_do_not_cancel():
-    one = Estimate([1.0, 1.0]).with_component("noise", 0.3, per_element=True)
-    assert (one[0] - one[1]).standard_uncertainty == pytest.approx(0.3 * 2**0.5)
-    assert (one - one.mean()).standard_uncertainty == pytest.approx(0.3 / 2**0.5)
-    assert one.mean().standard_uncertainty == pytest.approx(0.3 / 2**0.5)
-
-
 def test_only_components_of_one_name_and_identity_are_the_same():
     """Equal names are no reason to cancel: the difference of two results is uncertain."""
     for each in (False, True):
