@@ -27,7 +27,7 @@ from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
 from chipglow.study import Study
-from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface, UniformSurface
+from chipglow.surface import EmissivityField, Surface, UniformSurface
 
 SPACING = 2e-6 / 3
 STEP = 0.2e-6
@@ -155,28 +155,6 @@ def test_no_emissivity_is_not_no_material():
     assert (mirror.peak_temperature == 900.0).all()
     assert (nothing.mean_radiance == 0.0).all()
     assert np.isnan(nothing.peak_temperature).all()
-
-
-def test_exposures_of_several_surfaces_are_those_of_each():
-    scene, painted = random_scene()
-    surfaces = [painted, UniformSurface(0.3), CHIP_1.redrawn(2)]
-    coordinates = np.meshgrid(scene.raster.x, scene.raster.y)
-    data = scene.data.assign(
-        {
-            name: (("time", "y", "x"), np.broadcast_to(grid, (6, *grid.shape)), {"units": "m"})
-            for name, grid in zip(("material_x", "material_y"), coordinates, strict=True)
-        }
-    )
-    scene = Scene(data)
-    for some in (surfaces, [CHIP_1, CHIP_2, CHIP_1.redrawn(1)]):
-        views = [View(surface.prepare(scene), Camera().band, 500.0) for surface in some]
-        found = expose(scene, views, 0.1 * STEP, 4 * STEP)
-        for one, view in zip(found, views, strict=True):
-            (alone,) = expose(scene, [view], 0.1 * STEP, 4 * STEP)
-            np.testing.assert_array_equal(one.peak_temperature, alone.peak_temperature)
-            for name in ("mean_radiance", "peak_radiance", "centre_radiance"):
-                # One unit of float32 of the emissivity, see test_surface.
-                np.testing.assert_allclose(getattr(one, name), getattr(alone, name), rtol=1e-6)
 
 
 @pytest.mark.parametrize("start", [3.0, 4.5, 6.0, 9.0])

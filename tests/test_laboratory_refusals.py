@@ -21,34 +21,9 @@ from typed import refused
 
 from chipglow.camera import Flag, Measurement
 from chipglow.io import write_measurement
-from chipglow.laboratory.chip import (
-    ToolUncertainty,
-    band_profile,
-    find_tool,
-    rake_grid,
-    tool_of,
-)
+from chipglow.laboratory import chip, emissivity as em, registration as two
 from chipglow.laboratory.comparison import StatedUncertainties, compare
-from chipglow.laboratory.emissivity import (
-    EmissivityLine,
-    Heating,
-    RegionEmissivities,
-    determine_emissivity,
-    emissivity_line,
-    read_emissivity_lines,
-    read_emissivity_map,
-    reflected_temperature,
-    true_temperature,
-    write_emissivity,
-)
 from chipglow.laboratory.psf import aperture_image, edge_image, knife_edge
-from chipglow.laboratory.registration import (
-    Registration,
-    align_times,
-    find_dots,
-    fit_images,
-    fit_points,
-)
 from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
 from chipglow.scene import Area, Circle, Polygon, Raster, Region, ToolGeometry, areas
 from chipglow.study import Study
@@ -62,7 +37,7 @@ EVEN = np.full(RASTER.shape, 0.5)
 WHOLE = Area("all", "all", np.ones(RASTER.shape, bool), True)
 SMALL = heated_chip.measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
 SATURATED = np.full((1, *RASTER.shape), Flag.SATURATED, np.uint8)
-KNOWN = EmissivityLine.constant(0.42)
+KNOWN = em.EmissivityLine.constant(0.42)
 
 
 def heated(emissivity=0.5, kelvins=664.15, **more):
@@ -70,18 +45,18 @@ def heated(emissivity=0.5, kelvins=664.15, **more):
 
 
 def emissivity(image, kelvins=664.15):
-    return determine_emissivity([image], Heating(kelvins)).of(WHOLE)
+    return em.determine_emissivity([image], em.Heating(kelvins)).of(WHOLE)
 
 
 def line(slope):
     """Emissivity of an object that was heated to 600 K and 800 K."""
-    return emissivity_line(
+    return em.emissivity_line(
         [emissivity(heated(0.42 + slope * (t - 700.0), t), t).line for t in (600.0, 800.0)]
     )
 
 
 def temperature(image, known=KNOWN, around=None):
-    return true_temperature([image], WHOLE, known, around)
+    return em.true_temperature([image], WHOLE, known, around)
 
 
 def region(shape, name="a", feature=None):
@@ -120,15 +95,15 @@ def flagged(flags):
 
 
 def profile(**wrong):
-    return band_profile(CHIP, **{"tool": TOOL, **wrong})
+    return chip.band_profile(CHIP, **{"tool": TOOL, **wrong})
 
 
 def grid(measurement=CHIP, tool=TOOL, **wrong):
-    return rake_grid(measurement, tool, **wrong)
+    return chip.rake_grid(measurement, tool, **wrong)
 
 
 def placed(**wrong):
-    return ToolUncertainty(**({"along": 1e-6, "across": 1e-6} | wrong))
+    return chip.ToolUncertainty(**({"along": 1e-6, "across": 1e-6} | wrong))
 
 
 def plain(radiance, raster=NARROW):
@@ -157,38 +132,40 @@ SECOND = Arrangement(RANDOM.uniform(20, 460, (30, 2)), (480, 480), 12.0)
 
 
 def registration(**changed):
-    good = Registration(np.eye(3), np.zeros((9, 9)), "affine", "points")
+    good = two.Registration(np.eye(3), np.zeros((9, 9)), "affine", "points")
     return replace(good, **changed)
 
 
 def clocks(times=SLOW, seen=SLOW**2, visible=FAST, bright=FAST**2):
-    return align_times(times, seen, visible, bright)
+    return two.align_times(times, seen, visible, bright)
 
 
 REFUSED = {
-    "reference: 19.85 °C must be over what is reflected, 19.85 °C": lambda: Heating(ROOM),
-    "by 5 standard uncertainties of 3 K or more": lambda: Heating(300.0, ROOM, 3.0),
+    "reference: 19.85 °C must be over what is reflected, 19.85 °C": lambda: em.Heating(ROOM),
+    "by 5 standard uncertainties of 3 K or more": lambda: em.Heating(300.0, ROOM, 3.0),
     "reference: 391 °C is below the camera's lower range limit of 426.85 °C": lambda: emissivity(
         heated(lower_limit=700.0)
     ),
-    "image 2: has other pix": lambda: determine_emissivity([heated(), SMALL], Heating(664.15)),
+    "image 2: has other pix": lambda: em.determine_emissivity(
+        [heated(), SMALL], em.Heating(664.15)
+    ),
     "all: 0 of its 1200 pixels .*1200 s": lambda: emissivity(heated(flags=SATURATED)),
-    "are all the same": lambda: emissivity_line(2 * [emissivity(heated()).line]),
+    "are all the same": lambda: em.emissivity_line(2 * [emissivity(heated()).line]),
     "have shape": lambda: MapSurface(EVEN[:3], RASTER),
     "goes from 1.01 to 1.01, expected 0 to 1": lambda: MapSurface(2.02 * EVEN, RASTER),
     "no pixel is known": lambda: MapSurface(np.nan * EVEN, RASTER),
-    "temperature: there is no image": lambda: true_temperature([], WHOLE, KNOWN),
+    "temperature: there is no image": lambda: em.true_temperature([], WHOLE, KNOWN),
     r"darker than its reflection at 626\.85 °C": lambda: temperature(
-        heated(), around=reflected_temperature(900.0)
+        heated(), around=em.reflected_temperature(900.0)
     ),
     "use an emissivity that falls less": lambda: temperature(heated(0.9, 1000.0), line(-1.6e-3)),
     r"darker than its reflection at 19\.85 °C": lambda: temperature(heated(0.5, 283.0), line(4e-4)),
     "0 of its 1200 pixels can be used": lambda: temperature(heated(flags=SATURATED)),
-    "emissivity: is 0.0, expected more than 0 to 1": lambda: EmissivityLine.constant(0.0),
-    "emissivity: is nan": lambda: EmissivityLine.constant(float("nan")),
-    "standard uncertainty is -1": lambda: EmissivityLine.constant(0.5, -1.0),
-    "reflected: is 0": lambda: reflected_temperature(0.0),
-    "reflected: standard uncertainty": lambda: reflected_temperature(ROOM, -1.0),
+    "emissivity: is 0.0, expected more than 0 to 1": lambda: em.EmissivityLine.constant(0.0),
+    "emissivity: is nan": lambda: em.EmissivityLine.constant(float("nan")),
+    "standard uncertainty is -1": lambda: em.EmissivityLine.constant(0.5, -1.0),
+    "reflected: is 0": lambda: em.reflected_temperature(0.0),
+    "reflected: standard uncertainty": lambda: em.reflected_temperature(ROOM, -1.0),
     "a: reaches over columns 30 to 41, expected": lambda: covered(region(box(30, 0, 41, 5))),
     "over rows -2 to 5, .*within the image's 0": lambda: covered(region(box(0, -2, 4, 5))),
     "reaches over rows 26 to 32": lambda: covered(region(Circle((20, 29), 3))),
@@ -213,13 +190,13 @@ REFUSED = {
     "depth is 1e-05 m, expected a square's 1.8e-05 m": lambda: grid(depth=10e-6),
     "frame 2, expected 0 to 0": lambda: grid(frames=[2]),
     "frame none, expected 0 to 0": lambda: grid(frames=[]),
-    "tool: the measurement contains no tool": lambda: tool_of(without_tool(CHIP)),
+    "tool: the measurement contains no tool": lambda: chip.tool_of(without_tool(CHIP)),
     "tip: .* finite": lambda: ToolGeometry().at((0.0, np.nan)),
     "along: -1e-06 m, expected 0 m or more": lambda: placed(along=-1e-6),
     "across: nan m": lambda: placed(across=np.nan),
     "angle: inf rad": lambda: placed(angle=np.inf),
     "pivot: nan m is not finite": lambda: placed(pivot=np.nan),
-    "the image is 8 pixels wide": lambda: find_tool(plain(np.ones((1, *NARROW.shape)))),
+    "the image is 8 pixels wide": lambda: chip.find_tool(plain(np.ones((1, *NARROW.shape)))),
     "^comparison: there is nothing": lambda: compare(COLD, {"same": COLD}, TOOL),
     "no simulation, expected 1 or more": lambda: compare(CHIP, {}, TOOL),
     "uncertainty: 5 K beside the uncertainty that the measurement states": lambda: compare(
@@ -236,28 +213,34 @@ REFUSED = {
     ),
     "hole: diameter is -1.0 m, expected more": lambda: aperture_image(EDGE_FILE, -1.0, "hole"),
     "m: the region has 0 x 40 pixels, expected 8 x 8": lambda: edge_image(EDGE_FILE, "m", OUTSIDE),
-    "2 for .*expected 3 or more": lambda: fit_points(PLACES[:2], PIXELS[:2], "similarity"),
-    "3 for .*expected 4 or more": lambda: fit_points(PLACES[:3], PIXELS[:3], "affine"),
-    "4 for .*expected 5 or more": lambda: fit_points(PLACES[:4], PIXELS[:4], "homography"),
-    "infrared image they lie on a line": lambda: fit_points(LINE, PIXELS),
-    "visible picture they lie on a line": lambda: fit_points(PLACES, 1e6 * LINE),
-    "not finite": lambda: fit_points(np.where(PLACES[0] == PLACES, np.nan, PLACES), PIXELS),
-    "leave the homography open": lambda: fit_points(ONE_OFF, 6e5 * ONE_OFF + 300.0, "homography"),
+    "2 for .*expected 3 or more": lambda: two.fit_points(PLACES[:2], PIXELS[:2], "similarity"),
+    "3 for .*expected 4 or more": lambda: two.fit_points(PLACES[:3], PIXELS[:3], "affine"),
+    "4 for .*expected 5 or more": lambda: two.fit_points(PLACES[:4], PIXELS[:4], "homography"),
+    "infrared image they lie on a line": lambda: two.fit_points(LINE, PIXELS),
+    "visible picture they lie on a line": lambda: two.fit_points(PLACES, 1e6 * LINE),
+    "not finite": lambda: two.fit_points(np.where(PLACES[0] == PLACES, np.nan, PLACES), PIXELS),
+    "leave the homography open": lambda: two.fit_points(
+        ONE_OFF, 6e5 * ONE_OFF + 300.0, "homography"
+    ),
     "its last element is 2, expected 1": lambda: registration(matrix=2 * np.eye(3)),
     "must have an inverse": lambda: registration(matrix=np.diag([1.0, 0.0, 1.0])),
     "covariance: expected finite": lambda: registration(covariance=np.zeros((3, 3))),
     "degrees_of_freedom 0.0 must be positive": lambda: registration(degrees_of_freedom=0.0),
-    "visible picture: has no contrast": lambda: fit_images(IMAGE, RASTER, np.full((480, 640), 7)),
-    "infrared image: has no contrast": lambda: fit_images(EVEN, RASTER, IMAGE),
-    "infrared.*no contrast": lambda: fit_images(np.nan * EVEN, RASTER, IMAGE),
+    "visible picture: has no contrast": lambda: two.fit_images(
+        IMAGE, RASTER, np.full((480, 640), 7)
+    ),
+    "infrared image: has no contrast": lambda: two.fit_images(EVEN, RASTER, IMAGE),
+    "infrared.*no contrast": lambda: two.fit_images(np.nan * EVEN, RASTER, IMAGE),
     "visible signal: does not change": lambda: clocks(bright=np.ones(FAST.size)),
     "infrared signal: 3 frames, expected 6": lambda: clocks(SLOW[:3], SLOW[:3]),
     "ascending times": lambda: clocks(SLOW[::-1]),
     "29 values but 30 times": lambda: clocks(seen=SLOW[1:]),
     "of 30 in the infrared image and 30 in the visible": lambda: match_dots(FIRST, SECOND),
-    "^image: has no contrast": lambda: find_dots(EVEN),
-    "image: has no contrast": lambda: find_dots(np.nan * EVEN),
-    "image: 0 dots are found": lambda: find_dots(np.add.outer(np.arange(60.0), np.arange(80.0))),
+    "^image: has no contrast": lambda: two.find_dots(EVEN),
+    "image: has no contrast": lambda: two.find_dots(np.nan * EVEN),
+    "image: 0 dots are found": lambda: two.find_dots(
+        np.add.outer(np.arange(60.0), np.arange(80.0))
+    ),
 }
 
 
@@ -276,20 +259,20 @@ def laboratory(tmp_path_factory):
     """A folder with a file of each kind."""
     path = tmp_path_factory.mktemp("laboratory")
     images = [BandImage(shift=shift, bend=1e-3).temperature() for shift in (-18e-6, 0.0)]
-    chip = measured_band.measured(images)
+    cut = measured_band.measured(images)
     flat = np.random.default_rng(0).normal(100.0, 1.0, (40, 40))
     for name, measurement in (
-        ("chip", chip),
-        ("bare", without_tool(chip)),
+        ("chip", cut),
+        ("bare", without_tool(cut)),
         ("hot", heated_chip.measured(table_1())),
         ("small", SMALL),
         ("edge", EDGE_FILE),
         ("flat", measurement_of(flat)),
     ):
         write_measurement(measurement, path / f"{name}.nc")
-    found = determine_emissivity([heated()], Heating(664.15))
+    found = em.determine_emissivity([heated()], em.Heating(664.15))
     row = replace(found.of(WHOLE), name="other")
-    write_emissivity(RegionEmissivities((found,), ((row,),)), path / "e.nc")
+    em.write_emissivity(em.RegionEmissivities((found,), ((row,),)), path / "e.nc")
     with xr.open_dataset(path / "e.nc", engine="h5netcdf") as data:
         data.load().drop_vars("observations").to_netcdf(path / "old.nc", engine="h5netcdf")
     (path / "regions.yaml").write_text(REGIONS)
@@ -411,6 +394,6 @@ def test_files_of_emissivities_are_refused(folder):
         ("none.nc", "none.nc"),
     ):
         with pytest.raises((ValueError, FileNotFoundError), match=message):
-            read_emissivity_map(name)
+            em.read_emissivity_map(name)
     with pytest.raises(ValueError, match="by an earlier version"):
-        read_emissivity_lines("old.nc")
+        em.read_emissivity_lines("old.nc")

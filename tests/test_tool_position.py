@@ -31,12 +31,6 @@ def linear(count=3):
     return measured([700.0 + SLOPE[0] * X + SLOPE[1] * Y] * count)
 
 
-def of_the_tool(estimate):
-    """What each error of the tool's place changes, shape (3, ...)."""
-    (component,) = estimate.only("tool").components
-    return component.effects.T.reshape(3, *estimate.shape)
-
-
 def moved(tool, uncertainty, along, across, angle):
     """A tool that is off by so many standard uncertainties."""
     turned = replace(tool, rake_angle=tool.rake_angle + angle * uncertainty.angle)
@@ -76,40 +70,6 @@ def test_the_tool_of_the_measurement_is_taken_if_none_is_given():
     for analysis in (rake_grid, band_profile):
         with pytest.raises(ValueError, match="tool: the measurement contains no tool"):
             analysis(told)
-
-
-def test_squares_are_uncertain_by_slope_times_position():
-    grid = rake_grid(linear(), TOOL, uncertainty=FOUND)
-    up = grid.along[None, :] - FOUND.pivot
-    turn = grid.depth[:, None] * (SLOPE @ UP) - up * (SLOPE @ INTO)
-    expected = [
-        np.full(turn.shape, FOUND.along * (SLOPE @ UP)),
-        np.full(turn.shape, FOUND.across * (SLOPE @ INTO)),
-        FOUND.angle * turn,
-    ]
-    known = grid.frame_count > 0
-    assert known.sum() > 30
-    for part, value in zip(of_the_tool(grid.frame_estimate), expected, strict=True):
-        # A thousandth of a kelvin is lost on the way through radiance.
-        np.testing.assert_allclose(part[known], value[known], atol=1e-3)
-    total = np.sqrt(sum(value**2 for value in expected))
-    for estimate in (grid.frame_estimate, grid.estimate[1]):
-        spread = estimate.only("tool").standard_uncertainty
-        np.testing.assert_allclose(spread[known], total[known], rtol=1e-3)
-
-
-def test_the_distance_along_a_curve_is_uncertain_by_the_edge():
-    """A straight curve through the edge: only what moves the edge along it counts."""
-    way = (CURVE[1] - CURVE[0]) / np.hypot(*(CURVE[1] - CURVE[0]))
-    moves = FOUND.displacements(TOOL, TOOL.edge_point)
-    profile = band_profile(linear(), TOOL, curve=CURVE, uncertainty=FOUND)
-    alone = band_profile(linear(), TOOL, curve=CURVE)
-    expected = np.abs(moves @ way * (SLOPE @ way))
-    known = np.isfinite(profile.temperature)
-    for part, value in zip(of_the_tool(profile.estimate), expected, strict=True):
-        np.testing.assert_allclose(np.abs(part[known]), value, atol=1e-3)
-    total = np.hypot(alone.estimate.standard_uncertainty[known], np.hypot.reduce(expected))
-    np.testing.assert_allclose(profile.estimate.standard_uncertainty[known], total, rtol=1e-3)
 
 
 def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
