@@ -9,10 +9,9 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
-from typer.testing import CliRunner
+from typed import typed
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import (
     NoShearBandError,
@@ -253,15 +252,9 @@ def file(tmp_path, monkeypatch):
     return "measured.nc"
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["shearband", *map(str, arguments)])
-
-
 def test_the_command_writes_what_it_shows(file, tmp_path):
-    result = run(file, "--reference", "10 us", "--out", "band.csv", "--plot", "band.png")
-    assert result.exit_code == 0, result.output
-    assert "developing" in result.output
-    assert "fully developed" in result.output
+    said = typed(f"shearband {file} --reference '10 us' --out band.csv --plot band.png").output
+    assert "developing" in said and "fully developed" in said
     with (tmp_path / "band.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     profile = band_profile(read_measurement(file), TOOL, reference=1)
@@ -272,7 +265,7 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
         parts = [float(row[f"{cause}_uncertainty_K"] or "nan") for row in rows]
         expected = profile.estimate.contribution(cause)[there]
         np.testing.assert_allclose(parts, expected, atol=1e-3)
-        (line,) = (line.split() for line in result.output.splitlines() if cause in line)
+        (line,) = (line.split() for line in said.splitlines() if cause in line)
         assert float(line[-1]) == pytest.approx(np.nanmax(expected), rel=0.05)
     assert {row["tool_along_uncertainty_K"] for row in rows} == {""}
     assert [row["stage"] for row in rows].count("developing") == there[0].sum()
@@ -282,9 +275,8 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
 
 def test_the_netcdf_file_holds_si_units(file, tmp_path):
     (tmp_path / "curve.csv").write_text("x_um,y_um\n-30,40\n-230,240\n", encoding="utf-8")
-    options = ("--at", "10 us", "--curve", "curve.csv", "--width", "12 um")
-    result = run(file, *options, "--position", "2 um", "--out", "band.nc")
-    assert result.exit_code == 0, result.output
+    options = "--at '10 us' --curve curve.csv --width '12 um' --position '2 um'"
+    typed(f"shearband {file} {options} --out band.nc")
     data = xr.load_dataset(tmp_path / "band.nc", engine="h5netcdf", decode_times=False)
     assert data["temperature"].attrs["units"] == "K"
     assert data.sizes["time"] == 1

@@ -7,12 +7,12 @@ from math import cos, hypot, radians, sin
 import numpy as np
 import pytest
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
-from typer.testing import CliRunner
+from typed import typed
 
 from chipglow.camera import LinearCalibration, Measurement, SakumaHattori, fit_calibration
-from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
+from chipglow.radiometry.band import SECOND_RADIATION_CONSTANT
 from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -22,25 +22,10 @@ FOUND = ToolUncertainty(along=3e-6, across=1e-6, angle=radians(0.3), pivot=70e-6
 BODIES = np.arange(300.0, 701.0, 50.0) + 273.15
 DRAWS = 20_000
 
-H, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
 KELVINS = np.arange(450.0, 1100.0, 0.1)
 
 
-def planck():
-    """In-band radiance of `KELVINS` in W/(m² sr): the integral by Simpson's rule, written out."""
-    wavelengths = np.linspace(3.8e-6, 5.1e-6, 401)
-    weights = np.ones(401)
-    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
-    step = wavelengths[1] - wavelengths[0]
-    total = np.zeros(KELVINS.size)
-    for wavelength, weight in zip(wavelengths, weights, strict=True):
-        photon = H * LIGHT / (wavelength * BOLTZMANN * KELVINS)
-        spectral = 2 * H * LIGHT**2 / wavelength**5 / (np.exp(photon) - 1)
-        total += weight * step / 3 * spectral
-    return total
-
-
-RADIANCE = planck()
+RADIANCE = BAND.radiance(KELVINS)
 
 
 def by_line(counts, offset, gain):
@@ -49,8 +34,7 @@ def by_line(counts, offset, gain):
 
 
 def by_sakuma_hattori(counts, offset, a, b, scale):
-    c2 = H * LIGHT / BOLTZMANN
-    return (c2 / np.log(scale / (counts - offset) + 1) - b) / a
+    return (SECOND_RADIATION_CONSTANT / np.log(scale / (counts - offset) + 1) - b) / a
 
 
 # Of counts, of each blackbody and of all of them in K. The form's parameters are so uncertain by
@@ -222,8 +206,7 @@ def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     images = [BandImage(shift=shift).temperature() for shift in (-3e-6, 0.0)]
     write_measurement(measured(images, relative_uncertainty=0.01), tmp_path / "m.nc")
-    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
-    assert result.exit_code == 0, result.output
+    said = typed("rake m.nc --out grid.csv").output
     estimate = rake_grid(read_measurement("m.nc")).estimate
     with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
@@ -232,7 +215,7 @@ def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
         expected = estimate.contribution("calibration").ravel()
         np.testing.assert_allclose(found, expected, atol=1e-3)
     most = np.nanmax(expected)
-    lines = [line.split() for line in result.output.splitlines()]
+    lines = [line.split() for line in said.splitlines()]
     (line,) = (line for line in lines if line[:1] == ["calibration"])
     assert float(line[-1]) == pytest.approx(most, rel=0.05)
-    assert "Errors of calibration move all squares together" in result.output
+    assert "Errors of calibration move all squares together" in said

@@ -11,10 +11,9 @@ from hypothesis import given, strategies as st
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from PIL import Image
 from scipy.ndimage import gaussian_filter
-from typer.testing import CliRunner
+from typed import typed
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.chip.frames import frame_scatter
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
@@ -314,18 +313,9 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(*arguments):
-    return CliRunner().invoke(app, ["compare", *map(str, arguments)])
-
-
-FILES = ("measured.nc", "one.nc", "two.nc")
-USUAL = ("--curve", "curve.csv", "--uncertainty", "5 K")
-
-
 def test_the_command_writes_what_it_says(folder):
-    result = run(*FILES, *USUAL, "--out", "result", "--plot", "picture.png")
-    assert result.exit_code == 0, result.output
-    assert "two fits best" in result.output
+    options = "--curve curve.csv --uncertainty '5 K' --out result --plot picture.png"
+    assert "two fits best" in typed(f"compare measured.nc one.nc two.nc {options}").output
     summary = json.loads((folder / "result" / "summary.json").read_text(encoding="utf-8"))
     assert summary["simulations"] == ["chip 1", "two"]
     assert [place["best"] for place in summary["places"]] == ["two"] * 4

@@ -10,10 +10,9 @@ from hypothesis import given, settings, strategies as st
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f
-from typer.testing import CliRunner
+from typed import typed, words
 
 from chipglow.camera import Measurement
-from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.registration import find_dots, fit_dots, load_registration
 from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
@@ -202,9 +201,7 @@ def test_the_command_registers_by_dots(tmp_path, monkeypatch):
     write_measurement(measured, "infrared.nc")
     Image.fromarray(SMALL.visible).save("visible.png")
     command = "register infrared.nc visible.png --method dots --out map.yaml --overlay over.png"
-    result = CliRunner().invoke(app, command.split(), env={"COLUMNS": "120"})
-    output = " ".join(result.output.split())
-    assert result.exit_code == 0, output
+    output = words(typed(command).output)
     assert "Infrared: 19 bright dots with a radius of" in output
     assert "Visible: 19 dark dots with a radius of" in output
     assert "Assumed: The visible picture is not mirrored, is turned by up to 30 degrees" in output

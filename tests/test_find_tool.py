@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from seen_chip import BAND, FLOOR, look, noisy
-from typer.testing import CliRunner
+from typed import typed
 
 from chipglow.camera import Measurement
-from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.chip import find_tool, rake_grid
 from chipglow.quantities import uncertain_text
@@ -65,9 +64,7 @@ def test_the_shape_says_where_to_look_and_what_the_edge_is(seen):
     assert degrees(found.rake_angle) == pytest.approx(-7.0, abs=4.0)  # as stated above
     assert (found.clearance_angle, found.edge_radius) == (radians(10.0), 8e-6)
     elsewhere = find_tool(measurement, ToolGeometry(radians(30.0)))
-    assert any(
-        "at the limit of the search range" in warning for warning in elsewhere.notes.warnings
-    )
+    assert "at the limit of the search range" in " ".join(elsewhere.notes.warnings)
 
 
 def test_a_found_tool_moves_with_the_image(seen):
@@ -105,10 +102,6 @@ def test_an_image_without_an_edge_is_one_error(noise):
     measurement = Measurement.from_radiance(image, BAND, np.zeros(1), raster)
     with pytest.raises(ValueError, match="find tool: no rake face is found, nothing stands out"):
         find_tool(measurement)
-    narrow = Raster(0.0, 0.0, 6e-6, 60, 8)
-    few = Measurement.from_radiance(image[:, :, :8], BAND, np.zeros(1), narrow)
-    with pytest.raises(ValueError, match="the image is 8 pixels wide"):
-        find_tool(few)
 
 
 @pytest.fixture
@@ -119,14 +112,8 @@ def folder(tmp_path, monkeypatch, seen):
     return tmp_path
 
 
-def command(*arguments):
-    result = CliRunner().invoke(app, ["rake", *arguments], env={"COLUMNS": "160"})
-    return result.exit_code, result.stdout, result.stderr.strip()
-
-
 def test_the_command_writes_what_the_function_gives(folder, seen):
-    code, text, _ = command("told.nc", "--out", "grid.nc", "--plot", "grid.png")
-    assert code == 0
+    text = typed("rake told.nc --out grid.nc --plot grid.png").stdout
     measurement = seen[-7.0, "chip 2"]
     grid = rake_grid(measurement, measurement.tool)
     with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
@@ -142,7 +129,7 @@ def test_the_command_writes_what_the_function_gives(folder, seen):
 
 
 def test_the_table_has_units_and_gaps(folder, seen):
-    assert command("told.nc", "--frame", "1", "--out", "grid.csv")[0] == 0
+    typed("rake told.nc --frame 1 --out grid.csv")
     lines = (folder / "grid.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == (
         "time_us,depth_um,along_um,mean_degC,standard_deviation_K,usable_pixels,standard_uncertainty_K,"
@@ -170,6 +157,5 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
         ("rake_angle: 7 deg\ntip: [0 um, 0 um]\n", True),
     ):
         (folder / "tool.yaml").write_text(text)
-        code, _, said = command("real.nc", "--tool", "tool.yaml")
-        assert code == 0
+        said = typed("rake real.nc --tool tool.yaml").stderr
         assert ("Warning: The rake face that shows in the image is" in said) is doubted

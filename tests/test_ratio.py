@@ -10,7 +10,7 @@ from figure6 import figure_6
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import simpson
 from scipy.optimize import brentq
-from typer.testing import CliRunner
+from typed import refused, typed
 
 from chipglow.analysis import (
     CAUSES,
@@ -37,7 +37,6 @@ from chipglow.camera import (
     View,
     expose,
 )
-from chipglow.cli import app
 from chipglow.io import write_scene
 from chipglow.radiometry import Band, RatioThermometer, spectral_radiance
 from chipglow.scene import Raster, Scene
@@ -436,16 +435,13 @@ def test_the_command_reads_a_users_points(tmp_path, monkeypatch):
     analysis: {phases: 1, textures: 1, exposures: 2%s}
     """
     (tmp_path / "study.yaml").write_text(text % ", points: {here: [0 um, 0 um]}")
-    files = ["--out", "bands.csv", "--plot", "bands.png"]
-    result = CliRunner().invoke(app, ["wavelengths", "study.yaml", *files])
-    assert result.exit_code == 0, result.output
-    assert "here: 72" in result.stdout and "1.5-1.7" in result.stdout
+    said = typed("wavelengths study.yaml --out bands.csv --plot bands.png").stdout
+    assert "here: 72" in said and "1.5-1.7" in said
     frame = pd.read_csv("bands.csv")
     assert frame.second_um.fillna("").tolist() == ["", "", "3.8-5.1"]
     assert (frame.draws == 2).all()
     assert (tmp_path / "bands.png").stat().st_size > 10_000
     (tmp_path / "study.yaml").write_text(text % "")
-    result = CliRunner().invoke(app, ["wavelengths", "study.yaml"])
-    assert result.exit_code == 2
-    assert "scene.nc: No rake face is read" in result.output
-    assert "Expected points to read (analysis.points)" in " ".join(result.output.split())
+    said = refused("wavelengths study.yaml")
+    assert "scene.nc: No rake face is read" in said
+    assert "Expected points to read (analysis.points)" in said

@@ -9,9 +9,8 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from measured_band import RASTER, TOOL, measured
 from seen_chip import look, noisy
-from typer.testing import CliRunner
+from typed import typed
 
-from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, find_tool, rake_grid
 from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
@@ -153,29 +152,24 @@ def seen():
     return look(-7.0, CHIP_2)
 
 
-def command(*arguments):
-    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "160"})
-    return result.exit_code, result.stdout, result.stderr.strip()
-
-
 def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
     (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
     measurement = read_measurement(folder / "real.nc")
     found = find_tool(measurement)
     stated = ToolUncertainty(along=5e-6, across=5e-6)
     for options, tool, uncertainty, said in (
-        (["--tool", "found"], found.tool, found.uncertainty, "found, ± 16 um along the face"),
+        ("--tool found", found.tool, found.uncertainty, "found, ± 16 um along the face"),
         (
-            ["--tool", "found", "--position", "5 um"],
+            "--tool found --position '5 um'",
             found.tool,
             stated,
             "--position 5 um instead of the detected one, ± 16 um along",
         ),
-        (["--tool", "tool.yaml", "--position", "5 um"], None, stated, None),
-        (["--tool", "tool.yaml"], None, None, None),
+        ("--tool tool.yaml --position '5 um'", None, stated, None),
+        ("--tool tool.yaml", None, None, None),
     ):
-        code, text, assumed = command("rake", "real.nc", *options, "--out", "grid.nc")
-        assert code == 0
+        result = typed(f"rake real.nc {options} --out grid.nc")
+        text, assumed = result.stdout, result.stderr
         if tool is found.tool:
             angle = degrees(tool.rake_angle)
             assert f"Found: rake angle {angle:.1f} deg, tip at x " in text
@@ -201,10 +195,9 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
 def test_the_place_of_a_found_tool_goes_into_the_band(folder):
     (folder / "curve.csv").write_text("x_um,y_um\n-30,40\n-150,140\n")
     uncertainty = {}
-    for name, options in (("found", []), ("stated", ["--position", "2 um"])):
-        usual = ("real.nc", "--curve", "curve.csv", "--tool", "found", "--out", f"{name}.nc")
-        code, text, _ = command("shearband", *usual, *options)
-        assert code == 0 and "Position of the tool: " in text
+    for name, options in (("found", ""), ("stated", "--position '2 um'")):
+        usual = f"real.nc --curve curve.csv --tool found --out {name}.nc"
+        assert "Position of the tool: " in typed(f"shearband {usual} {options}").stdout
         path = folder / f"{name}.nc"
         with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
             read = from_xarray(data.load(), "temperature")
