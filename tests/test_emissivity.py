@@ -11,10 +11,9 @@ import xarray as xr
 import yaml
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from hypothesis import given, settings, strategies as st
-from typer.testing import CliRunner
+from typed import typed
 
 from chipglow.camera import CalibrationErrors, Camera, Flag
-from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
     Heating,
@@ -310,12 +309,7 @@ def test_unknown_pixels_of_a_map_do_not_pull_their_neighbours():
 
 # Files and the command
 
-
-AT_391, AT_500 = ["--reference", "391degC"], ["--reference", "500 degC"]
-
-
-def command(*arguments):
-    return CliRunner().invoke(app, ["emissivity", "--regions", "regions.yaml", *arguments])
+COMMAND = "emissivity --regions regions.yaml --reference 391degC"
 
 
 @pytest.fixture(scope="module")
@@ -339,10 +333,9 @@ def folder(made, monkeypatch):
 def two(folder):
     """What the command says of both images, whose emissivities it has written."""
     if not Path("two.nc").exists():
-        spread = ["--reference-uncertainty", "2 K", "--plot", "p.svg", "--out", "two.nc"]
-        result = command("a.nc", "b.nc", *AT_391, *AT_500, *spread)
-        assert result.exit_code == 0, result.output
-        Path("said.txt").write_text(result.stdout, encoding="utf-8")
+        spread = "--reference-uncertainty '2 K' --plot p.svg --out two.nc"
+        said = typed(f"{COMMAND} a.nc b.nc --reference '500 degC' {spread}").stdout
+        Path("said.txt").write_text(said, encoding="utf-8")
     return Path("said.txt").read_text(encoding="utf-8")
 
 
@@ -352,22 +345,21 @@ def study_of(output):
 
 
 def test_the_command_writes_table_map_and_picture(folder):
-    outputs = ["--out", "one.nc", "--table", "t.csv", "--plot", "p.png"]
-    spread = ["--reference-uncertainty", "2 K", "--reflected-uncertainty", "1 degC"]
-    result = command("a.nc", *AT_391, *spread, "--metal", "Ti-6Al-4V", *outputs)
-    assert result.exit_code == 0, result.output
-    assert result.stdout.splitlines()[-3:] == ["one.nc", "t.csv", "p.png"]
+    outputs = "--metal Ti-6Al-4V --out one.nc --table t.csv --plot p.png"
+    spread = "--reference-uncertainty '2 K' --reflected-uncertainty '1 degC'"
+    said = typed(f"{COMMAND} a.nc {spread} {outputs}").stdout
+    assert said.splitlines()[-3:] == ["one.nc", "t.csv", "p.png"]
     lines = pd.read_csv("t.csv", index_col="region")
     image, heating = measured(table_1(), frames=5, noise=1.0), Heating(TRUTH, 293.0, 2.0, 1.0)
     for name, row in rows_of(image, heating).items():
         expanded = row.estimate.expanded_uncertainty()
         assert lines["mean"][name] == pytest.approx(row.mean, rel=1e-6)
         assert lines["expanded_uncertainty"][name] == pytest.approx(expanded, rel=1e-6)
-    chip = study_of(result.stdout).surface.chips["measured chip"]
+    chip = study_of(said).surface.chips["measured chip"]
     assert chip.body.mean == pytest.approx(lines["mean"]["chip body"], abs=6e-5)
     surface, found = read_emissivity_map("one.nc"), determine_emissivity([image], heating)
     known = (pytest.approx(BAND.lower), pytest.approx(BAND.upper)), "Ti-6Al-4V"
-    for one in (surface, *surfaces_of(study_of(result.stdout).surface, 1).values()):
+    for one in (surface, *surfaces_of(study_of(said).surface, 1).values()):
         assert (one.origin.band, one.origin.metal) == known
     np.testing.assert_allclose(surface.values, found.emissivity, rtol=1e-15)
     np.testing.assert_allclose(surface.raster.extent, RASTER.extent, atol=1e-12)
@@ -384,15 +376,14 @@ def test_assumptions_and_warnings_are_printed(folder):
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[0, :3] = Flag.DEAD
     write_measurement(measured(table_1(), flags=flags), folder / "dead.nc")
-    result = command("dead.nc", *AT_391)
-    assert result.exit_code == 0
+    said = typed(f"{COMMAND} dead.nc").stderr
     for words in (
         *("The true temperature is exact", "The camera's calibration is exact"),
         *("reflects exactly 19.85 degC; 100 K more would shift", "does not drift"),
         *("Nothing changes between frames", "Warning: shear band: 18 of 180 pixels are left out"),
     ):
-        assert words in result.stderr
-    stated = command("dead.nc", *AT_391, "--reflected-uncertainty", "5 K").stderr
+        assert words in said
+    stated = typed(f"{COMMAND} dead.nc --reflected-uncertainty '5 K'").stderr
     assert "reflects 19.85 ± 5 degC and nothing hotter; 100 K more would shift" in stated
 
 
@@ -400,14 +391,9 @@ def test_assumptions_and_warnings_are_printed(folder):
 
 
 def even_scene(temperature, strain=1.0, rate=0.0):
-    values = np.ones((1, *RASTER.shape))
-    fields = {
-        "temperature": values * temperature,
-        "material": values.astype(np.uint8),
-        "plastic_strain": values * strain,
-        "plastic_strain_rate": values * rate,
-    }
-    return Scene.from_fields(RASTER, [0.0], fields)
+    fields = {"temperature": temperature, "plastic_strain": strain, "plastic_strain_rate": rate}
+    values = {name: np.full((1, *RASTER.shape), value) for name, value in fields.items()}
+    return Scene.from_fields(RASTER, [0.0], {**values, "material": np.ones((1, *RASTER.shape))})
 
 
 def shown(surface, *of_scene):
