@@ -55,12 +55,6 @@ def test_regions_of_a_feature_are_taken_together_and_a_pixel_counts_once():
     assert shared_pixels(regions, RASTER) == {("b", "band"): 10}
 
 
-def written(tmp_path, text):
-    path = tmp_path / "regions.yaml"
-    path.write_text(text)
-    return path
-
-
 def test_a_file_of_regions(tmp_path):
     text = """
 regions:
@@ -68,7 +62,8 @@ regions:
   band: {polygon: [[0 um, 0 um], [0.03 mm, 0 um], [0 um, 30 um]], feature: shear band}
   spot: {circle: {centre: [10.5, 4], radius: 3}}
 """
-    body, band, spot = load_regions(written(tmp_path, text))
+    (tmp_path / "regions.yaml").write_text(text)
+    body, band, spot = load_regions(tmp_path / "regions.yaml")
     assert body == Region("body", Polygon.rectangle((1.0, 2.0), (5.0, 6.0)))
     assert band.unit == "m"
     assert band.feature == "shear band"
@@ -76,30 +71,29 @@ regions:
     assert spot.shape == Circle((10.5, 4.0), 3.0)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("regions: {}", "regions.yaml: regions: there are none"),
-        ("regions: {a: {}}", "regions.a: no shape, expected one of polygon, rectangle, circle"),
-        (
-            "regions: {a: {circle: {centre: [1, 1], radius: 1}, rectangle: [[0, 0], [1, 1]]}}",
-            "rectangle and circle, expected one of",
-        ),
-        ("regions: {a: {circle: {centre: [1, 1]}}}", "circle: radius is 0.0, expected more than 0"),
-        ("regions: {a: {rectangle: [[0, 0], [1 um, 1]]}}", "pixels and lengths are mixed"),
-        ("regions: {a: {polygon: [[0, 0], [1, 1]]}}", "has 2 corners, expected 3"),
-        ("regions: {a: {rectangle: [[0, 0], [1 s, 1]]}}", "'1 s', expected a number of pixels"),
-        ("regions: {a: {rectangle: [[0, 0], [.nan, 1]]}}", "corner is not finite"),
-        ("regions: {'': {rectangle: [[0, 0], [1, 1]]}}", "name is empty"),
-        ("region: {}", "unknown key 'region', did you mean 'regions'"),
-        ("regions: {a: {rectangle: [0, 0]}}", "regions.a.rectangle"),
-        ("[", "expected YAML"),
-        ("", "regions: there are none"),
-    ],
-)
-def test_a_bad_file_of_regions_is_one_line(tmp_path, text, message):
+BOTH = "{circle: {centre: [1, 1], radius: 1}, rectangle: [[0, 0], [1, 1]]}"
+BAD = {
+    "regions: {}": "regions.yaml: regions: there are none",
+    "regions: {a: {}}": "regions.a: no shape, expected one of polygon, rectangle, circle",
+    f"regions: {{a: {BOTH}}}": "rectangle and circle, expected one of",
+    "regions: {a: {circle: {centre: [1, 1]}}}": "circle: radius is 0.0, expected more than 0",
+    "regions: {a: {rectangle: [[0, 0], [1 um, 1]]}}": "pixels and lengths are mixed",
+    "regions: {a: {polygon: [[0, 0], [1, 1]]}}": "has 2 corners, expected 3",
+    "regions: {a: {rectangle: [[0, 0], [1 s, 1]]}}": "'1 s', expected a number of pixels",
+    "regions: {a: {rectangle: [[0, 0], [.nan, 1]]}}": "corner is not finite",
+    "regions: {'': {rectangle: [[0, 0], [1, 1]]}}": "name is empty",
+    "region: {}": "unknown key 'region', did you mean 'regions'",
+    "regions: {a: {rectangle: [0, 0]}}": "regions.a.rectangle",
+    "[": "expected YAML",
+    "": "regions: there are none",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_file_of_regions_is_one_line(tmp_path, text):
+    (tmp_path / "regions.yaml").write_text(text)
     with pytest.raises(DescriptionError) as caught:
-        load_regions(written(tmp_path, text))
-    assert message in str(caught.value)
+        load_regions(tmp_path / "regions.yaml")
+    assert BAD[text] in str(caught.value)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("regions.yaml: ")

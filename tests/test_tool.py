@@ -260,30 +260,28 @@ def tool(**changed):
     return replace(ToolGeometry(), **changed)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: tool(rake_angle=radians(80.0)), "rake_angle: 80 deg, expected more than -60 deg"),
-        (lambda: tool(clearance_angle=0.0), "clearance_angle: 0 rad, expected more than 0"),
-        (lambda: ToolGeometry(radians(50.0), radians(40.0)), "wedge of less than 5"),
-        (lambda: tool(chamfer=Chamfer(10e-6, 0.35)), "chamfer width: more than 17.* got 10 um"),
-        (lambda: tool(chamfer=Chamfer(1e-4, 1.5)), "chamfer angle: expected less than 83 degrees"),
-        (
-            lambda: tool(chamfer=Chamfer(1e-4, 0.3), hone=Hone(1e-5, 1e-5)),
-            "chamfer and hone: cannot be combined",
-        ),
-        (lambda: Chamfer(0.0, 0.3), "Chamfer.width: 0 m, expected more than 0 m"),
-        (lambda: Chamfer(1e-4, -0.1), "Chamfer.angle: -0.1 rad, expected more than 0 rad"),
-        (lambda: Hone(1e-4, 1e-6), "form factor rake / clearance is 100, expected 0.1 to 10"),
-        (
-            lambda: ToolOutline(((0.0, 400e-6), (0.0, 10e-6), (400e-6, 50e-6))),
-            "lowest point at y 10 um, expected 0 um",
-        ),
-    ],
-)
-def test_a_tool_that_cannot_be_is_refused(make, message):
+REFUSED = {
+    "rake_angle: 80 deg, expected more than -60 deg": lambda: tool(rake_angle=radians(80.0)),
+    "clearance_angle: 0 rad, expected more than 0": lambda: tool(clearance_angle=0.0),
+    "wedge of less than 5": lambda: ToolGeometry(radians(50.0), radians(40.0)),
+    "chamfer width: more than 17.* got 10 um": lambda: tool(chamfer=Chamfer(10e-6, 0.35)),
+    "chamfer angle: expected less than 83 degrees": lambda: tool(chamfer=Chamfer(1e-4, 1.5)),
+    "chamfer and hone: cannot be combined": lambda: tool(
+        chamfer=Chamfer(1e-4, 0.3), hone=Hone(1e-5, 1e-5)
+    ),
+    "Chamfer.width: 0 m, expected more than 0 m": lambda: Chamfer(0.0, 0.3),
+    "Chamfer.angle: -0.1 rad, expected more than 0 rad": lambda: Chamfer(1e-4, -0.1),
+    "form factor rake / clearance is 100, expected 0.1 to 10": lambda: Hone(1e-4, 1e-6),
+    "lowest point at y 10 um, expected 0 um": lambda: ToolOutline(
+        ((0.0, 400e-6), (0.0, 10e-6), (400e-6, 50e-6))
+    ),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_a_tool_that_cannot_be_is_refused(message):
     with pytest.raises(ValueError, match=message):
-        make()
+        REFUSED[message]()
 
 
 GOOD = "0,500\n0,20\n20,0\n600,60\n"
@@ -304,39 +302,37 @@ def test_an_outline_is_read_in_any_unit_of_length_and_from_any_origin(content, t
     np.testing.assert_allclose(corners, expected, atol=1e-18)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "there is no number in it, expected a first line such as x_um,y_um"),
-        ("x,y\n" + GOOD, "line 1: 'x' has no unit, expected a name such as x_um"),
-        (GOOD, "line 1: unknown column '0', expected x_um, y_um"),
-        ("x_um,y_um\n0,500\n0,ten\n", "line 3: '0,ten', expected 2 numbers"),
-        ("x_um,y_um\n0,500\n\n600,60\n", "line 4: 2 points, expected 3 to 1000"),
-        ("x_um,y_um\n0,500\n20,0\n", "line 3: 2 points, expected 3 to 1000"),
-        ("x_um,y_um\n0,500\n0,nan\n600,60\n", "line 3: '0,nan', expected 2 numbers"),
-        ("x_um,y_um\n0,500\n0,20\n0,20\n600,60\n", "line 4: the same point as the one before"),
-        ("x_um,y_um\n0,500\n0,20\n0,90\n600,95\n", "line 3: the line turns back"),
-        ("x_um,y_um\n0,9e6\n0,20\n600,60\n", "line 2: outline 8999.98 mm long, expected up to"),
-        (
-            "x_um,y_um\n0,500\n0,100\n90,0\n-50,60\n20,-5\n600,60\n",
-            "line 6: the piece from point 2 crosses that from point 5",
-        ),
-        (
-            "x_um,y_um\n600,60\n20,0\n0,20\n0,500\n",
-            "line 2: rake_angle: .* got 84.* degrees; points go from the rake face",
-        ),
-        (
-            "x_um,y_um\n0,500\n0,0\n600,-30\n",
-            "line 2: clearance_angle: expected more than 0 and less than 45 degrees, got -2.8",
-        ),
-        ("x_um,y_um\n" + 1001 * "0,500\n", "line 1002: 1001 points, expected 3 to 1000"),
-        ("x_um,y_um\n" + 250_000 * "0,1\n", "expected a file of up to 1000 kB"),
-        ("x_um,y_um\n\xff\xfe\n", r"edge\.csv: expected text in UTF-8"),
-    ],
-)
-def test_a_bad_file_is_one_line_with_file_line_value_and_expectation(text, message, tmp_path):
+HEAD = "x_um,y_um\n"
+BAD = {
+    "there is no number in it, expected a first line such as x_um,y_um": "",
+    "line 1: 'x' has no unit, expected a name such as x_um": "x,y\n" + GOOD,
+    "line 1: unknown column '0', expected x_um, y_um": GOOD,
+    "line 3: '0,ten', expected 2 numbers": HEAD + "0,500\n0,ten\n",
+    "line 4: 2 points, expected 3 to 1000": HEAD + "0,500\n\n600,60\n",
+    "line 3: 2 points, expected 3 to 1000": HEAD + "0,500\n20,0\n",
+    "line 3: '0,nan', expected 2 numbers": HEAD + "0,500\n0,nan\n600,60\n",
+    "line 4: the same point as the one before": HEAD + "0,500\n0,20\n0,20\n600,60\n",
+    "line 3: the line turns back": HEAD + "0,500\n0,20\n0,90\n600,95\n",
+    "line 2: outline 8999.98 mm long, expected up to": HEAD + "0,9e6\n0,20\n600,60\n",
+    "line 6: the piece from point 2 crosses that from point 5": (
+        HEAD + "0,500\n0,100\n90,0\n-50,60\n20,-5\n600,60\n"
+    ),
+    "line 2: rake_angle: .* got 84.* degrees; points go from the rake face": (
+        HEAD + "600,60\n20,0\n0,20\n0,500\n"
+    ),
+    "line 2: clearance_angle: expected more than 0 and less than 45 degrees, got -2.8": (
+        HEAD + "0,500\n0,0\n600,-30\n"
+    ),
+    "line 1002: 1001 points, expected 3 to 1000": HEAD + 1001 * "0,500\n",
+    "expected a file of up to 1000 kB": HEAD + 250_000 * "0,1\n",
+    r"edge\.csv: expected text in UTF-8": HEAD + "\xff\xfe\n",
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_a_bad_file_is_one_line_with_file_line_value_and_expectation(message, tmp_path):
     path = tmp_path / "edge.csv"
-    path.write_bytes(text.encode("latin-1"))
+    path.write_bytes(BAD[message].encode("latin-1"))
     with pytest.raises(ValueError, match=message) as caught:
         read_tool_outline(path)
     assert str(path) in str(caught.value)

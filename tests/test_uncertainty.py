@@ -276,8 +276,6 @@ def test_parts_of_a_component_share_its_degrees_of_freedom():
     back = from_xarray(to_xarray(one.reshape(1), "t"), "t")
     assert back.names == one.names
     assert (back - one).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
-    with pytest.raises(ValueError, match="has 1 parts, expected 2"):
-        replace(cause, parts=("noise",))
 
 
 # Derivatives
@@ -295,8 +293,6 @@ def test_derivatives_of_any_function():
     np.testing.assert_allclose(found.covariance(), analytic.covariance(), rtol=1e-5)
     unknown = propagate(np.add, Estimate([1.0, np.nan]), two)
     np.testing.assert_array_equal(unknown.values, [4.0, np.nan])
-    with pytest.raises(ValueError, match="derivatives: 1 of a function of 2 inputs"):
-        propagate(np.add, one, two, derivatives=[np.exp])
 
 
 # Draws
@@ -336,10 +332,8 @@ def test_draws_have_their_distribution():
     assert half_width(drawn) == pytest.approx(float(one.coverage_factor()), rel=0.02)
 
 
-def test_draws_of_infinite_variance_are_asked_for():
+def test_draws_of_infinite_variance_are_made_if_asked_for():
     one = exact(0.0, "cause", 1.0, 2)
-    with pytest.raises(ValueError, match="cause: draws with 2 degrees of freedom have no finite"):
-        draw([one], 10, np.random.default_rng(2))
     (drawn,) = draw([one], 200_000, np.random.default_rng(2), heavy_tails=True)
     assert half_width(drawn) == pytest.approx(float(one.coverage_factor()), rel=0.03)
 
@@ -448,54 +442,52 @@ def test_an_image_takes_less_than_a_second_and_a_gigabyte():
 # What is impossible
 
 
-def test_impossible_estimates_are_refused():
-    one = Estimate([1.0, 2.0])
-    with pytest.raises(ValueError, match="noise: an effect is not finite"):
-        one.with_component("noise", [1.0, np.nan])
-    with pytest.raises(ValueError, match="a component occurs twice"):
-        one.with_component("noise", 1.0, identity="").with_component("noise", 2.0, identity="")
-    with pytest.raises(ValueError, match="has effects on 3 values, expected 2"):
-        Estimate(one.values, (Component(Cause("noise"), np.ones((3, 1))),))
-    with pytest.raises(ValueError, match=r"effects have shape \(2,\)"):
-        Component(Cause("noise"), np.ones(2))
-    for settings_, message in (
-        ({"name": " "}, "its name is ' '"),
-        ({"errors": 0}, "has 0 errors"),
-        ({"degrees_of_freedom": 0.0}, "degrees of freedom are 0.0"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            Cause(**{"name": "noise", **settings_})
-    zeros = Estimate(np.zeros(2))
-    pixels = zeros.with_component("noise", 1.0, identity="", degrees_of_freedom=3)
-    other = zeros.with_component("noise", 1.0, identity="")
-    generator = np.random.default_rng(1)
-    for together in (
-        lambda: pixels + other,
-        lambda: draw([pixels, other], 2, generator),
-        lambda: propagate(np.add, pixels, other),
-    ):
-        with pytest.raises(ValueError, match="they must be the same errors wherever its name"):
-            together()
-    with pytest.raises(ValueError, match="1 observations, expected 2 or more"):
-        Estimate.from_observations([1.0], "noise")
-    for matrix, message in (
-        (np.eye(3), r"covariance has shape \(3, 3\), expected \(2, 2\)"),
-        ([[1.0, 0.5], [0.0, 1.0]], "covariance is not symmetric"),
-        ([[1.0, 2.0], [2.0, 1.0]], "has a variance of -1 in one direction"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            Estimate.from_covariance([1.0, 2.0], matrix, "noise")
-    with pytest.raises(ValueError, match="level of confidence: is 95"):
-        one.coverage_factor(95)
-    with pytest.raises(ValueError, match="t: has 2 dimensions named, expected 1"):
-        to_xarray(one, "t", ["y", "x"])
-    with pytest.raises(ValueError, match="read-only"):
-        one.values[0] = 3.0
+ONE, ZEROS = Estimate([1.0, 2.0]), Estimate(np.zeros(2))
+PIXELS, OTHER = (
+    ZEROS.with_component("noise", 1.0, identity="", degrees_of_freedom=freedom)
+    for freedom in (3, np.inf)
+)
+IMAGE = Estimate(np.zeros(30_000)).with_component("noise", 1.0, per_element=True)
+SAME = "they must be the same errors wherever its name"
 
 
-def test_a_table_of_all_pairs_of_pixels_is_refused():
-    image = Estimate(np.zeros(30_000)).with_component("noise", 1.0, per_element=True)
-    with pytest.raises(ValueError, match=r"9\.0e\+08 effects of single errors"):
-        image - image.mean()
-    with pytest.raises(ValueError, match="expected 1000 or fewer in a file"):
-        to_xarray(image[1:] - image[:-1], "t")
+def of_covariance(matrix):
+    return Estimate.from_covariance([1.0, 2.0], matrix, "noise")
+
+
+REFUSED = {
+    "noise: an effect is not finite": lambda: ONE.with_component("noise", [1.0, np.nan]),
+    "a component occurs twice": lambda: OTHER.with_component("noise", 2.0, identity=""),
+    "has effects on 3 values, expected 2": lambda: Estimate(
+        ONE.values, (Component(Cause("noise"), np.ones((3, 1))),)
+    ),
+    r"effects have shape \(2,\)": lambda: Component(Cause("noise"), np.ones(2)),
+    "its name is ' '": lambda: Cause(" "),
+    "has 0 errors": lambda: Cause("noise", errors=0),
+    "degrees of freedom are 0.0": lambda: Cause("noise", degrees_of_freedom=0.0),
+    "has 1 parts, expected 2": lambda: Cause("random", "image", 2, 2, parts=("noise",)),
+    SAME: lambda: PIXELS + OTHER,
+    f"{SAME}|draw": lambda: draw([PIXELS, OTHER], 2, np.random.default_rng(1)),
+    f"{SAME}|propagate": lambda: propagate(np.add, PIXELS, OTHER),
+    "1 observations, expected 2 or more": lambda: Estimate.from_observations([1.0], "noise"),
+    r"covariance has shape \(3, 3\), expected \(2, 2\)": lambda: of_covariance(np.eye(3)),
+    "covariance is not symmetric": lambda: of_covariance([[1.0, 0.5], [0.0, 1.0]]),
+    "has a variance of -1 in one direction": lambda: of_covariance([[1.0, 2.0], [2.0, 1.0]]),
+    "level of confidence: is 95": lambda: ONE.coverage_factor(95),
+    "t: has 2 dimensions named, expected 1": lambda: to_xarray(ONE, "t", ["y", "x"]),
+    "read-only": lambda: ONE.values.__setitem__(0, 3.0),
+    "derivatives: 1 of a function of 2 inputs": lambda: propagate(
+        np.add, ONE, ZEROS, derivatives=[np.exp]
+    ),
+    "cause: draws with 2 degrees of freedom have no finite": lambda: draw(
+        [exact(0.0, "cause", 1.0, 2)], 10, np.random.default_rng(2)
+    ),
+    r"9\.0e\+08 effects of single errors": lambda: IMAGE - IMAGE.mean(),
+    "expected 1000 or fewer in a file": lambda: to_xarray(IMAGE[1:] - IMAGE[:-1], "t"),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_the_impossible_is_refused(message):
+    with pytest.raises(ValueError, match=message):
+        REFUSED[message]()
