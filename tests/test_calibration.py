@@ -149,15 +149,6 @@ def test_an_outlier_is_named(stated):
     assert any(f"The point at {place} lies" in one for one in fit.calibration.warnings)
 
 
-def test_three_points_of_unknown_uncertainty_have_students_interval():
-    kelvins = KELVINS[[0, 5, 9]]
-
-    def fault(rng):
-        return fit_linear(kelvins, counts_of("linear", kelvins) + rng.normal(0, 5.0, 3), BAND)
-
-    assert held(fault, 200)[0] > 0.9
-
-
 def test_a_drift_during_the_calibration_is_seen_in_points_up_and_down():
     kelvins = np.concatenate([KELVINS, KELVINS[::-1]])
 

@@ -164,26 +164,6 @@ def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
         assert result.estimate.unevaluated == ("calibration",)
 
 
-@pytest.mark.parametrize("kind", [LinearCalibration, SakumaHattori])
-def test_the_table_of_errors_is_what_the_covariance_says(kind):
-    """Between its nodes too, against Equation 13 of the GUM with differences for derivatives."""
-    fit = fit_calibration(kind, BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
-    kelvins = np.linspace(fit.lowest, fit.highest, 37)
-    counts = fit.counts(kelvins)
-    changes = []
-    for number, spread in enumerate(np.sqrt(np.diag(fit.covariance))):
-        step = 1e-4 * spread * np.eye(fit.parameters.size)[number]
-        above, below = (
-            replace(fit, parameters=fit.parameters + sign * step).radiance(counts)
-            for sign in (1, -1)
-        )
-        changes.append((above - below) / (2e-4 * spread))
-    expected = np.transpose(changes) @ fit.covariance @ changes
-    found = fit.errors.estimate(BAND.radiance(kelvins)).covariance()
-    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * expected.max())
-    np.testing.assert_allclose(fit.uncertainty(counts), np.sqrt(np.diag(expected)), rtol=1e-3)
-
-
 KNOWN = measured([np.full(RASTER.shape, 700.0)], relative_uncertainty=0.01).data
 
 

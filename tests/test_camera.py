@@ -13,7 +13,6 @@ from scipy.special import erf
 
 from chipglow.camera import (
     AnnularAperturePSF,
-    CalibrationErrors,
     Camera,
     ChipglowWarning,
     Flag,
@@ -521,27 +520,3 @@ def test_what_has_no_radiance_or_grid_is_refused():
     for wrong in (exposures, []):
         with pytest.raises(ValueError, match="at least one exposure, all of the same grid"):
             Camera().form_measurement(wrong)
-
-
-def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():
-    radiance = Band(3.8e-6, 5.1e-6).radiance(np.array([[[400.0, 700.0, 800.0, 900.0]]]))
-    flags = np.array([[[0, Flag.SATURATED, Flag.DEAD, Flag.REPLACED]]], np.uint8)
-    errors = CalibrationErrors(np.array([0.0, 1e6]), np.array([[0.0, 6e3], [0.0, -8e3]]))
-    band = Band(3.8e-6, 5.1e-6)
-    measured = Measurement.from_radiance(
-        radiance,
-        band,
-        np.array([2.0]),
-        Raster(0, 6e-6, 6e-6, 1, 4),
-        573.15,
-        flags,
-        errors,
-        {"camera": "one"},
-    )
-    temperature = measured.radiance_temperature()[0, 0]
-    np.testing.assert_allclose(temperature, [np.nan, np.nan, np.nan, 900.0], rtol=1e-6)
-    assert measured.flags.tolist() == [[[Flag.UNDER_RANGE, *flags[0, 0, 1:].tolist()]]]
-    # 0.6 % and 0.8 % of other errors: 1 % of the radiance.
-    np.testing.assert_allclose(measured.calibration_uncertainty, 0.01 * radiance, rtol=1e-12)
-    assert (measured.band, measured.raster.columns) == (band, 4)
-    assert measured.data.attrs["camera"] == "one" and measured.data.attrs["lower_limit"] == 573.15

@@ -43,20 +43,6 @@ def test_at_one_temperature_it_is_the_root_of_time(kelvins, duration, initial):
     np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
-def test_after_a_step_of_temperature_squares_add():
-    cold, hot, step = 700.0, 1100.0, 10e-6
-    made = scene(
-        step * np.arange(21), lambda t, x, y: np.full(x.shape, hot if t > 10.5 * step else cold)
-    )
-    expected = OXIDE.growth(cold) * 10 * step + OXIDE.growth(hot) * 9 * step
-    # The trapezoidal rule lays the step in the middle of its interval.
-    expected += (OXIDE.growth(cold) + OXIDE.growth(hot)) / 2 * step
-    np.testing.assert_allclose(grown(made, 20), np.sqrt(expected), rtol=1e-5)
-    # Between frames it goes on linearly in the square.
-    late, early = (grown(made, i) ** 2 for i in (20, 19))
-    np.testing.assert_allclose(late - early, OXIDE.growth(hot) * step, rtol=1e-4)
-
-
 def test_it_converges_with_the_square_of_the_interval():
     def error(count):
         times = np.linspace(0, 100e-6, count + 1)

@@ -1,6 +1,6 @@
 """The analysis grid on the rake face, and tools that stand where an image has them."""
 
-from math import cos, radians, sin
+from math import radians
 
 import numpy as np
 import pytest
@@ -73,21 +73,6 @@ def test_squares_on_the_pixels_are_plain_means_of_nine():
         assert abs(grid.standard_deviation[0, m, n] - square.std(ddof=1)) < EXACT
     np.testing.assert_allclose(grid.along[:2], [9e-6, 27e-6])
     np.testing.assert_allclose(grid.depth, 18e-6 * (np.arange(5) + 0.5))
-
-
-def test_every_pixel_beside_the_face_counts_once():
-    tool = ToolGeometry()
-    grid = rake_grid(measured(linear_image()), tool)
-    corners = grid.corners()
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    offset = np.stack([x, y], -1) - tool.rake_foot
-    up, in_chip = offset @ tool.rake_direction, offset @ tool.rake_normal
-    inside = (up >= 0) & (up < grid.size * grid.along.size)
-    inside &= (in_chip >= 0) & (in_chip < grid.size * grid.depth.size)
-    assert grid.count.sum() == inside.sum()
-    np.testing.assert_allclose(corners[0], tool.rake_point(grid.size * np.arange(len(corners[0]))))
-    into = grid.depth.size * grid.size * np.array([-cos(tool.rake_angle), sin(tool.rake_angle)])
-    np.testing.assert_allclose(corners[-1, 0] - corners[0, 0], into)
 
 
 @pytest.mark.parametrize("flag", [Flag.UNDER_RANGE, Flag.SATURATED, Flag.DEAD])

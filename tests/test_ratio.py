@@ -404,24 +404,28 @@ def test_spots_of_a_cut(analytic_scene):
     assert analytic_scene.tool.signed_distance(*face) == pytest.approx(3e-6)
 
 
-def test_what_a_study_of_bands_refuses():
-    with pytest.raises(ValueError, match="bands: 1, expected two or more"):
-        WavelengthPlan((SHORT,))
-    with pytest.raises(ValueError, match="bands: 2, expected two or more that differ"):
-        WavelengthPlan((SHORT, SHORT))
-    with pytest.raises(ValueError, match="delay: -1 s, expected 0 s or more"):
-        WavelengthPlan((SHORT, LONG), delay=-1)
-    with pytest.raises(
-        ValueError, match=r"(?s)wavelengths.misregistration.*-1 um, expected 0 um or more"
-    ):
-        Study(wavelengths={"misregistration": "-1 um"})
-    spot = Spot("far", "plate", 0.0, np.array([1.0, 0.0]))
-    arguments = {"plate": UniformSurface(1.0)}, CAMERA, WavelengthPlan((SHORT, LONG), delay=1e-3)
-    with pytest.raises(ValueError, match="delay: 1000 us, expected so little"):
-        wavelength_errors(scene(900.0), *arguments, [spot], 1, 1)
-    plan = WavelengthPlan((SHORT, LONG))
-    with pytest.raises(ValueError, match=r"far: .* is outside the pixels"):
-        wavelength_errors(scene(900.0), *arguments[:2], plan, [spot], 1, 1)
+def bands_of(place, **plan):
+    spot = Spot("far", "plate", 0.0, np.array([place, 0.0]))
+    plan = WavelengthPlan((SHORT, LONG), **plan)
+    wavelength_errors(scene(900.0), {"plate": UniformSurface(1.0)}, CAMERA, plan, [spot], 1, 1)
+
+
+REFUSED = {
+    "bands: 1, expected two or more": lambda: WavelengthPlan((SHORT,)),
+    "bands: 2, expected two or more that differ": lambda: WavelengthPlan((SHORT, SHORT)),
+    "delay: -1 s, expected 0 s or more": lambda: WavelengthPlan((SHORT, LONG), delay=-1),
+    "(?s)wavelengths.misregistration.*-1 um, expected 0 um or more": lambda: Study(
+        wavelengths={"misregistration": "-1 um"}
+    ),
+    "delay: 1000 us, expected so little": lambda: bands_of(0.0, delay=1e-3),
+    "far: .* is outside the pixels": lambda: bands_of(1.0),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_a_study_of_bands_refuses_the_impossible(message):
+    with pytest.raises(ValueError, match=message):
+        REFUSED[message]()
 
 
 def test_the_command_reads_a_users_points(tmp_path, monkeypatch):

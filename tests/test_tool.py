@@ -379,17 +379,6 @@ def cut(tool):
     return history, frames[-1], kept[-1]["points"]
 
 
-def test_a_finely_sampled_wedge_cuts_as_the_wedge_does():
-    tool = ToolGeometry()
-    wedge, _, _ = cut(tool)
-    line, _, _ = cut(ToolOutline.placed(sampled(tool)))
-    late = wedge.time > 0.5 * wedge.time[-1]
-    # The outline is placed 0.15 um to the left of the wedge, whose circle x = 0 touches beyond
-    # its arc: the cut begins and the free surfaces are met that much earlier.
-    assert line.cutting[late].mean() == pytest.approx(wedge.cutting[late].mean(), rel=0.01)
-    assert line.thrust[late].mean() == pytest.approx(wedge.thrust[late].mean(), rel=0.02)
-
-
 @pytest.mark.parametrize("tool", [CHAMFERED, BREAKER])
 def test_a_cut_with_corners_runs_and_leaves_no_point_in_the_tool(tool):
     history, frame, points = cut(tool)
