@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chipglow.camera import CalibrationErrors, Measurement
 from chipglow.radiometry import Band
@@ -31,74 +30,53 @@ class BandImage:
     raster: Raster = RASTER
 
     @property
-    def edge(self) -> NDArray[np.float64]:
-        return TOOL.edge_point
+    def axes(self):
+        """Tangent and normal of the band at the edge."""
+        cosine, sine = np.cos(self.angle), np.sin(self.angle)
+        return np.array([[-cosine, sine], [sine, cosine]])
 
-    @property
-    def _tangent(self) -> NDArray[np.float64]:
-        return np.array([-np.cos(self.angle), np.sin(self.angle)])
-
-    @property
-    def _normal(self) -> NDArray[np.float64]:
-        return np.array([np.sin(self.angle), np.cos(self.angle)])
-
-    def curve(self, along: NDArray[np.float64]) -> NDArray[np.float64]:
+    def curve(self, along):
         """Points of the ridge at distances from the edge in m."""
         turned = self.bend * along
-        away = np.sin(turned) / self.bend, (1 - np.cos(turned)) / self.bend - self.shift
-        return self.edge + away[0][:, None] * self._tangent - away[1][:, None] * self._normal
+        away = np.sin(turned) / self.bend, self.shift - (1 - np.cos(turned)) / self.bend
+        return TOOL.edge_point + np.transpose(away) @ self.axes
 
-    def place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def place(self, points):
         """Distance along and, positive toward the chip, across of points."""
-        offset = points - self.edge
-        forward = offset @ self._tangent
-        up = offset @ self._normal - self.shift
+        forward, up = np.moveaxis((points - TOOL.edge_point) @ self.axes.T, -1, 0)
+        up = up - self.shift
         along = np.arctan2(forward, 1 / self.bend + up) / self.bend
         return along, np.hypot(forward, 1 / self.bend + up) - 1 / self.bend
 
-    def ridge_temperature(self, along: NDArray[np.float64]) -> NDArray[np.float64]:
+    def ridge_temperature(self, along):
         return 800.0 - 100.0 * along / LENGTH
 
-    def temperature(self) -> NDArray[np.float64]:
+    def temperature(self):
         """Radiance temperature of every pixel's middle, shape (y, x)."""
         x, y = np.meshgrid(self.raster.x, self.raster.y)
         image = self.at(np.stack([x, y], axis=-1))
-        return np.asarray(np.where(TOOL.signed_distance(x, y) > 0, image, 500.0))
+        return np.where(TOOL.signed_distance(x, y) > 0, image, 500.0)
 
-    def at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, points):
         """Radiance temperature of points of the chip."""
         along, across = self.place(points)
         rise = self.ridge_temperature(along) - self.base
         fade = 1 / (1 + np.exp((along - LENGTH) / 6e-6))
         profile = np.exp(-0.5 * (across / self.deviation) ** 2)
-        return np.asarray(self.base + rise * fade * profile)
+        return self.base + rise * fade * profile
 
 
-def measured(
-    images: list[NDArray[np.float64]],
-    noise: float = 0.0,
-    seed: int = 1,
-    relative_uncertainty: float | None = None,
-    raster: Raster = RASTER,
-    **attributes: float | str,
-) -> Measurement:
+def measured(images, noise=0.0, seed=1, relative_uncertainty=None, raster=RASTER, **attributes):
     """Measurement of radiance temperatures in K, with noise of a standard deviation in K."""
-    generator = np.random.default_rng(seed)
     temperature = np.stack(images)
-    temperature = temperature + noise * generator.standard_normal(temperature.shape)
-    radiance = np.asarray(BAND.radiance(temperature))
+    noise = noise * np.random.default_rng(seed).standard_normal(temperature.shape)
     known = None
     if relative_uncertainty is not None:
         # A straight line from no radiance to more than any here.
-        known = CalibrationErrors(
-            np.array([0.0, 1e6]), np.array([[0.0, relative_uncertainty * 1e6]])
-        )
+        effects = np.array([[0.0, relative_uncertainty * 1e6]])
+        known = CalibrationErrors(np.array([0.0, 1e6]), effects)
+    times = 1e-5 * np.arange(len(images))
+    radiance = BAND.radiance(temperature + noise)
     return Measurement.from_radiance(
-        radiance,
-        BAND,
-        1e-5 * np.arange(len(images)),
-        raster,
-        lower_limit=573.15,
-        calibration_errors=known,
-        attributes=attributes,
+        radiance, BAND, times, raster, 573.15, None, known, attributes
     ).with_tool(TOOL)

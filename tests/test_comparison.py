@@ -27,6 +27,12 @@ FINE = replace(RASTER, spacing=5e-6, rows=79, columns=96)
 STATED = StatedUncertainties(temperature=5.0)
 
 
+def parts(result):
+    """What is compared at the rake face and in the band; both are there."""
+    assert result.grid is not None and result.band is not None
+    return result.grid, result.band
+
+
 def random(estimate):
     """Standard uncertainty of what differs from value to value."""
     return np.hypot(estimate.contribution("position"), estimate.contribution("frames"))
@@ -78,9 +84,7 @@ def test_pixels_and_places_may_differ():
     x, y = np.meshgrid(FINE.x, FINE.y)
     simulated = frames(field(x - tip[0], y - tip[1]), raster=FINE).with_tool(TOOL.at(tip))
     result = compare(frames(field(X, Y)), {"same": simulated}, TOOL, CURVE, STATED)
-    assert result.grid is not None
-    assert result.band is not None
-    for part in (result.grid, result.band):
+    for part in parts(result):
         away = part.simulated[0].values - part.measured.values
         assert np.isfinite(away).sum() > 30
         # A ten-thousandth of a kelvin for the way through radiance.
@@ -111,52 +115,33 @@ def test_bias_and_rms_by_hand():
 
 
 def test_the_uncertainty_is_made_of_its_parts():
-    temperature = np.full(RASTER.shape, 750.0)
-    result = compare(
-        frames(temperature, relative_uncertainty=0.03),
-        {"chip": frames(temperature)},
-        TOOL,
-        CURVE,
-        StatedUncertainties(emissivity=0.1),
-    )
+    temperature, stated = np.full(RASTER.shape, 750.0), StatedUncertainties(emissivity=0.1)
+    known = frames(temperature, relative_uncertainty=0.03)
+    result = compare(known, {"chip": frames(temperature)}, TOOL, CURVE, stated)
     kelvin = slope_of(750.0)
-    for part in (result.grid, result.band):
-        assert part is not None
-        known = np.isfinite(part.measured.values)
-        # Where nothing varies only the calibration and the emissivity are left.
-        np.testing.assert_allclose(
-            part.measured.standard_uncertainty[known], 0.03 * kelvin, rtol=1e-3
-        )
-        known = np.isfinite(part.simulated[0].values)
-        np.testing.assert_allclose(
-            part.simulated[0].standard_uncertainty[known], 0.1 * kelvin, rtol=1e-3
-        )
+    # Where nothing varies only the calibration and the emissivity are left.
+    for part in parts(result):
+        for estimate, expected in ((part.measured, 0.03), (part.simulated[0], 0.1)):
+            found = estimate.standard_uncertainty[np.isfinite(estimate.values)]
+            np.testing.assert_allclose(found, expected * kelvin, rtol=1e-3)
     expected = kelvin * hypot(0.03, 0.1)
     assert result.fits["bias_standard_uncertainty_K"][0] == pytest.approx(expected, rel=1e-3)
 
 
 def test_the_position_counts_where_the_temperature_rises():
-    result = compare(
-        frames(field(X, Y)),
-        {"same": frames(field(X, Y))},
-        TOOL,
-        CURVE,
-        StatedUncertainties(1.0, 0.0, 4e-6),
-    )
-    expected = 4e-6 * hypot(2e5, 1e5)
-    for part in (result.grid, result.band):
-        assert part is not None
-        known = np.isfinite(part.measured.values)
+    chip, stated = frames(field(X, Y)), StatedUncertainties(1.0, 0.0, 4e-6)
+    result = compare(chip, {"same": chip}, TOOL, CURVE, stated)
+    for part in parts(result):
+        found = random(part.measured)[np.isfinite(part.measured.values)]
         # The bend of a straight slope is 0; the way through radiance leaves a thousandth.
-        np.testing.assert_allclose(random(part.measured)[known], expected, rtol=1e-3)
+        np.testing.assert_allclose(found, 4e-6 * hypot(2e5, 1e5), rtol=1e-3)
 
 
 def test_frames_that_differ_make_the_mean_uncertain():
     base = field(X, Y)
     three = measured([base - 9.0, base, base + 9.0])
     result = compare(three, {"same": frames(base)}, TOOL, CURVE, StatedUncertainties(5.0, 0.0, 0.0))
-    for part in (result.grid, result.band):
-        assert part is not None
+    for part in parts(result):
         known = np.isfinite(part.measured.values)
         # Three frames do not show whether they are alike, and count as one.
         np.testing.assert_allclose(random(part.measured)[known], 9.0, rtol=1e-3)
@@ -170,8 +155,7 @@ def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
         radiance, BAND, clean.times, RASTER, 573.15, flags, clean.calibration_errors
     )
     result = compare(damaged, {"same": frames(field(X, Y))}, TOOL, CURVE)
-    for part in (result.grid, result.band):
-        assert part is not None
+    for part in parts(result):
         known = np.isfinite(part.measured.values)
         assert np.isfinite(part.measured.standard_uncertainty[known]).all()
         assert known.sum() > 30
