@@ -8,29 +8,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
+from chipglow import camera as cam
 from chipglow.analysis import error_images, headline
-from chipglow.camera import (
-    UNUSABLE,
-    AnnularAperturePSF,
-    Camera,
-    DarkCurrent,
-    DeadElements,
-    Detector,
-    EquivalentNoise,
-    Exposure,
-    Flag,
-    FlickerNoise,
-    GainPattern,
-    Lag,
-    NonLinearity,
-    OffsetPattern,
-    OperationPoint,
-    PhotonResponse,
-    RangeResponse,
-    ReadNoise,
-    ShotNoise,
-    lower_range_limit,
-)
 from chipglow.io import write_scene
 from chipglow.report import write_report
 from chipglow.report.answer import answer, changes
@@ -40,14 +19,14 @@ from chipglow.scene import Raster, Scene
 from chipglow.study import Study, errors, load_study, study_text
 
 SCENE = Raster(-120e-6, 90e-6, 2e-6, 90, 120)
-PLAIN = Camera(psf=None, lower_limit=None)
+PLAIN = cam.Camera(psf=None, lower_limit=None)
 BAND = PLAIN.band
-INSB = PhotonResponse(0.8, 15e-6, 2.5)
+INSB = cam.PhotonResponse(0.8, 15e-6, 2.5)
 
 
 def camera(*terms, lower_limit=None, psf=None, **fields):
     made = {"response": INSB, "full_well": 7e6, "bits": 14, "terms": terms, **fields}
-    return Camera(psf=psf, lower_limit=lower_limit, detector=Detector(**made))
+    return cam.Camera(psf=psf, lower_limit=lower_limit, detector=cam.Detector(**made))
 
 
 def images(kelvins, count=1, shape=(30, 40)):
@@ -63,13 +42,13 @@ def exposure(start=0.0):
     radiance = np.asarray(BAND.radiance(np.where(x > 0, 650.0, 600.0)))
     single = radiance.astype(np.float32)
     kelvins = np.full(SCENE.shape, 650.0, np.float32)
-    return Exposure(start, 10e-6, SCENE, radiance, single, kelvins, radiance)
+    return cam.Exposure(start, 10e-6, SCENE, radiance, single, kelvins, radiance)
 
 
 @settings(max_examples=30)
 @given(radiance=arrays(np.float64, (90, 120), elements=st.floats(0.0, 900.0)))
 def test_without_a_detector_images_are_read_as_they_are(radiance):
-    for psf in (None, AnnularAperturePSF()):
+    for psf in (None, cam.AnnularAperturePSF()):
         image = replace(PLAIN, psf=psf).form_image(radiance, SCENE)[None]
         read, flags = replace(PLAIN, psf=psf).read(image, times(1))
         assert read is image
@@ -95,7 +74,7 @@ def test_an_ideal_detector_gives_the_radiance_back_within_its_counts():
 
 def test_two_points_leave_nothing_of_the_patterns_of_a_linear_detector():
     """And one point leaves the gains, at radiances other than that of its source."""
-    patterns = GainPattern(0.05), OffsetPattern(20_000.0)
+    patterns = cam.GainPattern(0.05), cam.OffsetPattern(20_000.0)
     radiance = images(680.0)
     left = {}
     for correction in ("two-point", "one-point", "none"):
@@ -112,7 +91,7 @@ def test_two_points_leave_nothing_of_the_patterns_of_a_linear_detector():
 
 def test_non_linearity_remains_between_the_points():
     """n (1 − f n / N) by a line through 0.1 N and 0.8 N, at half: f 0.4 · 0.3 / (1 − 0.9 f)."""
-    made = camera(NonLinearity(0.05), bits=24)
+    made = camera(cam.NonLinearity(0.05), bits=24)
     full = made.calibration((4, 4)).sources[1] / 0.8
     read, _ = made.read(np.full((1, 4, 4), 0.5 * full), times(1))
     expected = 0.5 + 0.05 * (0.5 - 0.1) * (0.8 - 0.5) / (1 - 0.9 * 0.05)
@@ -121,7 +100,7 @@ def test_non_linearity_remains_between_the_points():
 
 def test_flicker_noise_is_in_the_sources_frames_too():
     """Drift of an hour: the mean of a source's 32 frames, 1/600 s apart, has most of it too."""
-    term, left = FlickerNoise(3000.0, since_correction=3600.0), {}
+    term, left = cam.FlickerNoise(3000.0, since_correction=3600.0), {}
     radiance = images(650.0, shape=(60, 80))
     for correction in ("one-point", "none"):
         made = camera(term, bits=20, correction=correction)
@@ -136,14 +115,14 @@ def test_flicker_noise_is_in_the_sources_frames_too():
 
 def test_dark_electrons_leave_no_error_but_take_room():
     radiance = images(560.0)
-    clear, dark = camera(bits=24), camera(DarkCurrent(1e11), bits=24)
+    clear, dark = camera(bits=24), camera(cam.DarkCurrent(1e11), bits=24)
     np.testing.assert_allclose(dark.read(radiance, times(1))[0], radiance, rtol=1e-5)
     hot = [one.calibration((30, 40)).sources[1] for one in (clear, dark)]
     assert hot[1] / hot[0] == pytest.approx(1 - 1e6 / 7e6, rel=1e-4)
 
 
 def test_flags_say_what_is_saturated_dead_and_under_range():
-    made = camera(DeadElements(0.02), ShotNoise(), ReadNoise(500.0), lower_limit=500.0)
+    made = camera(cam.DeadElements(0.02), cam.ShotNoise(), cam.ReadNoise(500.0), lower_limit=500.0)
     radiance = images(700.0)
     radiance[0, :10] = float(BAND.radiance(1200.0))
     radiance[0, 20:] = float(BAND.radiance(450.0))
@@ -151,11 +130,11 @@ def test_flags_say_what_is_saturated_dead_and_under_range():
     flags, kelvins = measured.flags[0], measured.radiance_temperature()[0]
     dead = made.detector.terms[0].mask((30, 40), made.detector.seed)
     assert dead.any()
-    assert ((flags & (Flag.DEAD | Flag.REPLACED) != 0) == dead).all()
-    assert (flags[:10][~dead[:10]] & Flag.SATURATED != 0).all()
-    assert (flags[20:][~dead[20:]] & Flag.UNDER_RANGE != 0).all()
-    assert not (flags[10:20][~dead[10:20]] & UNUSABLE).any()
-    assert np.isnan(kelvins[flags & UNUSABLE != 0]).all()
+    assert ((flags & (cam.Flag.DEAD | cam.Flag.REPLACED) != 0) == dead).all()
+    assert (flags[:10][~dead[:10]] & cam.Flag.SATURATED != 0).all()
+    assert (flags[20:][~dead[20:]] & cam.Flag.UNDER_RANGE != 0).all()
+    assert not (flags[10:20][~dead[10:20]] & cam.UNUSABLE).any()
+    assert np.isnan(kelvins[flags & cam.UNUSABLE != 0]).all()
     middle = dead & (np.arange(30) > 10)[:, None] & (np.arange(30) < 19)[:, None]
     np.testing.assert_allclose(kelvins[middle], 700.0, atol=1.0)  # its neighbours'
 
@@ -164,7 +143,9 @@ def test_flags_say_what_is_saturated_dead_and_under_range():
 def test_the_netd_is_the_analytic_one(kelvins):
     """σ / (dS/dT): shot noise of the light and the dark, reading, rounding."""
     dark, read = 2e11, 900.0
-    made = camera(DarkCurrent(dark), ShotNoise(), ReadNoise(read), GainPattern(0.02), bits=12)
+    made = camera(
+        cam.DarkCurrent(dark), cam.ShotNoise(), cam.ReadNoise(read), cam.GainPattern(0.02), bits=12
+    )
     calibration = made.calibration((60, 80))
     detector, point = made.detector, calibration.point
     electrons = detector.per_radiance(point) * float(BAND.radiance(kelvins))
@@ -176,9 +157,9 @@ def test_the_netd_is_the_analytic_one(kelvins):
 
 
 def test_the_lower_range_limit_is_where_the_signal_is_so_many_times_its_noise():
-    detector = camera(ShotNoise(), ReadNoise(800.0), least_signal=10.0).detector
-    point = OperationPoint(BAND)
-    limit = lower_range_limit(detector, point)
+    detector = camera(cam.ShotNoise(), cam.ReadNoise(800.0), least_signal=10.0).detector
+    point = cam.OperationPoint(BAND)
+    limit = cam.lower_range_limit(detector, point)
     # n = k √(n + σ²): n = k² / 2 + √(k⁴ / 4 + k² σ²), with rounding in σ.
     variance = 800.0**2 + 1 / 12 / detector.conversion_gain**2
     electrons = 50 + np.sqrt(2500 + 100 * variance)
@@ -188,7 +169,7 @@ def test_the_lower_range_limit_is_where_the_signal_is_so_many_times_its_noise():
 
 
 def test_noise_follows_from_the_seed_and_when_a_frame_begins():
-    made = camera(ShotNoise(), GainPattern(0.02))
+    made = camera(cam.ShotNoise(), cam.GainPattern(0.02))
     radiance = images(650.0, 3)
     first, _ = made.read(radiance, times(3))
     np.testing.assert_array_equal(first, made.read(radiance, times(3))[0])
@@ -202,7 +183,7 @@ def test_noise_follows_from_the_seed_and_when_a_frame_begins():
 
 
 def test_lag_without_a_frame_before_is_said():
-    made = camera(Lag(0.3))
+    made = camera(cam.Lag(0.3))
     at = PLAIN.frame_times(0.0, 2)
     assert "Lag: no two frames" in made.form_measurement(exposure()).notes.warnings[0]
     assert made.form_measurement([exposure(float(start)) for start in at]).notes.warnings == []
@@ -223,7 +204,7 @@ def test_a_microbolometer_lags_by_its_time_constant():
 
 def test_error_images_have_the_noise_in_both_cases_and_the_psf_does_not():
     """The same deviates with and without the point spread function: it alone makes its portion."""
-    noisy = camera(ShotNoise(), ReadNoise(900.0), psf=AnnularAperturePSF())
+    noisy = camera(cam.ShotNoise(), cam.ReadNoise(900.0), psf=cam.AnnularAperturePSF())
     seen, quiet = (
         error_images(one, exposure(), "mean") for one in (noisy, replace(noisy, detector=None))
     )
@@ -260,16 +241,16 @@ def test_a_study_chooses_it(tmp_path):
     path = tmp_path / "study.yaml"
     path.write_text(STUDY)
     study = load_study(path)
-    detector = Detector(
+    detector = cam.Detector(
         response=INSB,
         full_well=7e6,
         bits=14,
         hot=673.15,
-        terms=(GainPattern(0.02), DarkCurrent(5e4), ShotNoise(), ReadNoise(500.0)),
+        terms=(cam.GainPattern(0.02), cam.DarkCurrent(5e4), cam.ShotNoise(), cam.ReadNoise(500.0)),
     )
-    limit = lower_range_limit(detector, OperationPoint(BAND, 20e-6))
+    limit = cam.lower_range_limit(detector, cam.OperationPoint(BAND, 20e-6))
     expected = replace(
-        Camera.paper(), integration_time=20e-6, detector=detector, seed=7, lower_limit=limit
+        cam.Camera.paper(), integration_time=20e-6, detector=detector, seed=7, lower_limit=limit
     )
     assert study.camera.on(SCENE, 7) == expected
     assert not study.is_papers
@@ -281,7 +262,7 @@ def test_a_study_may_give_the_lower_limit_itself():
     section = {"response": {"kind": "energy", "per_radiance": 1e4}, "full_well": 7e6}
     told = Study(camera={"detector": section, "lower_limit": "320 degC"}).camera.build()
     assert told.lower_limit == 593.15
-    assert Study(camera={"detector": "none"}).camera.build() == Camera.paper()
+    assert Study(camera={"detector": "none"}).camera.build() == cam.Camera.paper()
 
 
 def scene(folder):
@@ -347,9 +328,9 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
 
 def test_the_netd_is_at_least_that_of_rounding():
     """14 bits to 900 °C: one count is some kelvins wide at 30 °C, and all frames are the same."""
-    response = RangeResponse(hottest=1173.15)
-    noise = EquivalentNoise(netd=0.02, temperature=303.15)
-    camera = Camera(psf=None, detector=Detector(response=response, bits=14, terms=(noise,)))
+    response = cam.RangeResponse(hottest=1173.15)
+    noise = cam.EquivalentNoise(netd=0.02, temperature=303.15)
+    camera = cam.Camera(psf=None, detector=cam.Detector(response=response, bits=14, terms=(noise,)))
     band = camera.band
     count = float(band.radiance(1173.15)) / (2**14 - 1 - 400)
     rounding = count / np.sqrt(12) / float(band.slope(303.15))
@@ -393,7 +374,7 @@ def test_the_microbolometers_data_sheet_comes_back():
     assert calibration.full_temperature == pytest.approx(413.15, abs=4e-3)
     assert made.lower_limit == pytest.approx(263.15)
     # Of noise and rounding alone it would be colder than the tables of a band.
-    assert lower_range_limit(made.detector, calibration.point) == 200.0
+    assert cam.lower_range_limit(made.detector, calibration.point) == 200.0
     ideal = Study(
         camera={"preset": "flir-lepton-3", "magnification": 1.0, "detector": "none"}
     ).camera.build()

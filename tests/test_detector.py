@@ -6,27 +6,7 @@ import numpy as np
 import pytest
 from scipy.constants import c, h
 
-from chipglow.camera import (
-    RESPONSES,
-    Camera,
-    ColumnNoise,
-    DarkCurrent,
-    DeadElements,
-    Detector,
-    EnergyResponse,
-    EquivalentNoise,
-    FlickerNoise,
-    GainPattern,
-    Lag,
-    Measurement,
-    NonLinearity,
-    OffsetPattern,
-    OperationPoint,
-    PhotonResponse,
-    RangeResponse,
-    ReadNoise,
-    ShotNoise,
-)
+from chipglow import camera as cam
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster
 
@@ -43,7 +23,7 @@ def generator(seed=1):
 
 def detector(*terms, gain=1.0, **others):
     settings = {"offset": 400.0, "bits": 20, **others}
-    return Detector(response=EnergyResponse(1.0), gain=gain, terms=terms, **settings)
+    return cam.Detector(response=cam.EnergyResponse(1.0), gain=gain, terms=terms, **settings)
 
 
 def frames(made, radiance, count=FRAMES, shape=PIXELS, seed=1):
@@ -63,8 +43,8 @@ def assert_mean(counts, expected, variance):
 
 
 def test_photons_make_electrons_by_the_closed_form():
-    point = OperationPoint(BAND, integration_time=20e-6, fill_factor=0.9)
-    found = PhotonResponse(0.8, 15e-6, 2.5, 0.7, 4.5e-6).electrons(point, 1.0)
+    point = cam.OperationPoint(BAND, integration_time=20e-6, fill_factor=0.9)
+    found = cam.PhotonResponse(0.8, 15e-6, 2.5, 0.7, 4.5e-6).electrons(point, 1.0)
     # Energy on the element over that of a photon: π τ sin²θ A t / (h c / λ), sin θ = 1 / 2 N.
     energy = np.pi * 0.7 / 5.0**2 * 0.9 * 225e-12 * 20e-6
     assert found == pytest.approx(0.8 * energy * 4.5e-6 / (h * c), rel=1e-12)
@@ -74,8 +54,8 @@ def test_a_flat_quantum_efficiency_counts_the_photons_of_the_band():
     """By the response λ / λ₀ relative to energy; photons by their own integral of Planck's law."""
     wavelengths = tuple(np.linspace(3.8e-6, 5.1e-6, 3))
     flat = TabulatedResponse(wavelengths, tuple(w / 4e-6 for w in wavelengths))
-    point = OperationPoint(Band(3.8e-6, 5.1e-6, flat))
-    response = PhotonResponse(1.0, 10e-6, 2.0, wavelength=4.6e-6)
+    point = cam.OperationPoint(Band(3.8e-6, 5.1e-6, flat))
+    response = cam.PhotonResponse(1.0, 10e-6, 2.0, wavelength=4.6e-6)
     found = response.electrons(point, 1.0) * point.band.weights(900.0)[1].sum()
     at = np.linspace(3.8e-6, 5.1e-6, 20_001)
     photons = 2 * c / at**4 / np.expm1(h * c / (1.380649e-23 * 900.0 * at))
@@ -84,11 +64,11 @@ def test_a_flat_quantum_efficiency_counts_the_photons_of_the_band():
 
 
 def test_other_responses():
-    point = OperationPoint()
-    assert EnergyResponse(3e4).electrons(point, 1e7) == 3e4
-    per_radiance = RangeResponse(413.15).electrons(point, 1e7)
+    point = cam.OperationPoint()
+    assert cam.EnergyResponse(3e4).electrons(point, 1e7) == 3e4
+    per_radiance = cam.RangeResponse(413.15).electrons(point, 1e7)
     assert per_radiance * float(BAND.radiance(413.15)) == pytest.approx(1e7, rel=1e-12)
-    assert set(RESPONSES.kinds) == {"photon", "energy", "range"}
+    assert set(cam.RESPONSES.kinds) == {"photon", "energy", "range"}
 
 
 def test_quantisation_has_a_variance_of_a_twelfth():
@@ -104,26 +84,26 @@ def test_quantisation_has_a_variance_of_a_twelfth():
 @pytest.mark.parametrize(
     ("terms", "mean", "variance"),
     [
-        ((ShotNoise(),), 0.0, 5000.0),
-        ((ReadNoise(30.0),), 0.0, 900.0),
-        ((ColumnNoise(25.0),), 0.0, 625.0),
-        ((DarkCurrent(3e8), ShotNoise()), 3000.0, 8000.0),
-        ((ShotNoise(), DarkCurrent(3e8)), 3000.0, 8000.0),
-        ((EquivalentNoise(2.0, 500.0),), 0.0, (2.0 * float(BAND.slope(500.0))) ** 2),
-        ((ShotNoise(), ReadNoise(30.0), DarkCurrent(1e8)), 1000.0, 6900.0),
+        ((cam.ShotNoise(),), 0.0, 5000.0),
+        ((cam.ReadNoise(30.0),), 0.0, 900.0),
+        ((cam.ColumnNoise(25.0),), 0.0, 625.0),
+        ((cam.DarkCurrent(3e8), cam.ShotNoise()), 3000.0, 8000.0),
+        ((cam.ShotNoise(), cam.DarkCurrent(3e8)), 3000.0, 8000.0),
+        ((cam.EquivalentNoise(2.0, 500.0),), 0.0, (2.0 * float(BAND.slope(500.0))) ** 2),
+        ((cam.ShotNoise(), cam.ReadNoise(30.0), cam.DarkCurrent(1e8)), 1000.0, 6900.0),
     ],
     ids=lambda value: ", ".join(t.kind for t in value) if isinstance(value, tuple) else "",
 )
 def test_mean_and_variance_over_10_000_frames_are_theorys(terms, mean, variance):
     counts = frames(detector(*terms, gain=2.0), 5000.0)
     expected = 4.0 * variance + 1 / 12
-    columns = counts[:, :1] if isinstance(terms[0], ColumnNoise) else counts
+    columns = counts[:, :1] if isinstance(terms[0], cam.ColumnNoise) else counts
     assert_mean(columns, 400.0 + 2.0 * (5000.0 + mean), expected)
     assert_variance(columns, expected)
 
 
 def test_noise_of_columns_is_the_same_in_a_column_and_independent_between_them():
-    counts = frames(detector(ColumnNoise(200.0)), 1000.0, count=2000, shape=(5, 6))
+    counts = frames(detector(cam.ColumnNoise(200.0)), 1000.0, count=2000, shape=(5, 6))
     np.testing.assert_array_equal(counts, np.broadcast_to(counts[:, :1], counts.shape))
     together = np.corrcoef(counts[:, 0].T)
     assert np.abs(together - np.eye(6)).max() < 5 / np.sqrt(2000)
@@ -131,8 +111,8 @@ def test_noise_of_columns_is_the_same_in_a_column_and_independent_between_them()
 
 def test_flicker_noise_has_the_spectrum_of_1_over_f():
     """Where the limits of frequency, 0.01 Hz and 50 Hz, are a decade away."""
-    term = FlickerNoise(100.0, since_correction=100.0)
-    point = OperationPoint(frame_rate=100.0)
+    term = cam.FlickerNoise(100.0, since_correction=100.0)
+    point = cam.OperationPoint(frame_rate=100.0)
     made = detector(term, offset=1e5)
     radiance = np.zeros((4096, 16, 16))
     counts = made.counts(radiance, generator(), point).astype(float)
@@ -152,7 +132,7 @@ def test_flicker_noise_has_the_spectrum_of_1_over_f():
 
 def test_lag_is_a_filter_of_first_order():
     """A step's answer, and the transfer function (1 − a) / (1 − a exp(−iω)) of a sine."""
-    made = detector(Lag(0.2), gain=100.0, bits=32)
+    made = detector(cam.Lag(0.2), gain=100.0, bits=32)
     step = np.where(np.arange(12) >= 4, 5000.0, 1000.0)[:, None, None] * np.ones((1, 2, 2))
     found = made.counts(step, generator())[:, 0, 0] - 400.0
     after = np.maximum(np.arange(12) - 3, 0)
@@ -169,7 +149,7 @@ def test_lag_is_a_filter_of_first_order():
 
 def test_elements_differ_by_their_patterns_and_dead_ones_see_nothing():
     made = detector(
-        GainPattern(0.02), OffsetPattern(5.0), DeadElements(0.01), gain=10.0, offset=1e3
+        cam.GainPattern(0.02), cam.OffsetPattern(5.0), cam.DeadElements(0.01), gain=10.0, offset=1e3
     )
     shape = (200, 200)
     dark, light = (frames(made, r, 1, shape, seed)[0] for r, seed in ((0.0, 1), (100.0, 2)))
@@ -185,13 +165,13 @@ def test_elements_differ_by_their_patterns_and_dead_ones_see_nothing():
 
 
 def test_a_signal_falls_short_by_the_non_linearity():
-    made = detector(NonLinearity(0.1), full_well=10_000.0)
+    made = detector(cam.NonLinearity(0.1), full_well=10_000.0)
     found = [frames(made, r, 1)[0, 0, 0] - 400 for r in (0.0, 1000.0, 5000.0, 10_000.0)]
     assert found == [0, 990, 4750, 9000]
 
 
 def test_full_well_and_digitiser_end_the_counts():
-    well = detector(ShotNoise(), ReadNoise(50.0), full_well=5000.0, gain=2.0)
+    well = detector(cam.ShotNoise(), cam.ReadNoise(50.0), full_well=5000.0, gain=2.0)
     over = frames(well, 6000.0)
     # The charge is full, so its shot noise is gone: the read noise is what is left.
     assert_mean(over, 400.0 + 2 * 5000.0, 4 * 2500.0 + 1 / 12)
@@ -208,21 +188,27 @@ def test_full_well_and_digitiser_end_the_counts():
 
 
 def test_the_order_of_the_list_does_not_matter():
-    terms = (ReadNoise(5.0), ShotNoise(), DarkCurrent(1e6), GainPattern(0.1), NonLinearity(0.1))
+    terms = (
+        cam.ReadNoise(5.0),
+        cam.ShotNoise(),
+        cam.DarkCurrent(1e6),
+        cam.GainPattern(0.1),
+        cam.NonLinearity(0.1),
+    )
     counts = [frames(detector(*order), 2e5, 2) for order in (terms, terms[::-1])]
     np.testing.assert_array_equal(*counts)
 
 
 def test_another_term_leaves_the_noise_of_the_others_as_it_was():
-    terms = (ShotNoise(), ReadNoise(20.0), FlickerNoise(10.0))
-    more = (ColumnNoise(0.0), *terms)
+    terms = (cam.ShotNoise(), cam.ReadNoise(20.0), cam.FlickerNoise(10.0))
+    more = (cam.ColumnNoise(0.0), *terms)
     counts = [frames(detector(*some), 2e4, 3) for some in (terms, more)]
     np.testing.assert_array_equal(*counts)
 
 
 def test_a_recording_knows_the_camera():
     radiance = BAND.radiance(np.full((2, 4, 5), 800.0))
-    measured = Measurement.from_radiance(
+    measured = cam.Measurement.from_radiance(
         radiance, BAND, np.array([0.0, 1e-3]), Raster(0, 0, 6e-6, 4, 5),
         attributes={"integration_time": 10e-6},
     )  # fmt: skip
@@ -232,7 +218,7 @@ def test_a_recording_knows_the_camera():
     assert recording.quantity == "counts"
     assert recording.times.tolist() == [0.0, 1e-3]
     assert (recording.integration_time, recording.pitch) == (10e-6, 6e-6)
-    assert (recording.band, recording.saturation) == (Camera().band, 4094)
+    assert (recording.band, recording.saturation) == (cam.Camera().band, 4094)
     measured.data.attrs["detector"] = "another"
     with pytest.raises(ValueError, match="the measurement already contains one"):
         made.record(measured, generator())

@@ -15,15 +15,7 @@ from typed import typed
 
 from chipglow.camera import CalibrationErrors, Camera, Flag
 from chipglow.io import write_measurement
-from chipglow.laboratory.emissivity import (
-    Heating,
-    determine_emissivity,
-    emissivity_covariance,
-    emissivity_line,
-    emissivity_trend,
-    read_emissivity_lines,
-    read_emissivity_map,
-)
+from chipglow.laboratory import emissivity as em
 from chipglow.laboratory.emissivity.emissivity import COMMON
 from chipglow.scene import FIELD_UNITS, Area, Polygon, Raster, Region, Scene, areas
 from chipglow.study import Study
@@ -31,7 +23,7 @@ from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import CHIP_1, FeatureTrends, MapSurface, TrendSurface
 
 TRUTH = 391.0 + CELSIUS
-HEATING = Heating(TRUTH)
+HEATING = em.Heating(TRUTH)
 WHOLE = Area("all", "all", np.ones(RASTER.shape, bool), True)
 EVEN = np.full(RASTER.shape, 0.5)
 REGION_LIST = (
@@ -42,11 +34,11 @@ REGION_LIST = (
 
 
 def of_whole(image, heating=HEATING):
-    return determine_emissivity([image], heating).of(WHOLE)
+    return em.determine_emissivity([image], heating).of(WHOLE)
 
 
 def rows_of(image, heating=HEATING):
-    found = determine_emissivity([image], heating)
+    found = em.determine_emissivity([image], heating)
     return {area.name: found.of(area) for area in areas(REGION_LIST, found.raster)}
 
 
@@ -71,7 +63,7 @@ def slopes():
 def test_equation_2_is_undone(emissivity, reference, reflected):
     small = Raster(0.0, 0.0, 6e-6, 2, 2)
     image = measured(np.full((2, 2), emissivity), reference, reflected, raster=small)
-    found = determine_emissivity([image], Heating(reference, reflected))
+    found = em.determine_emissivity([image], em.Heating(reference, reflected))
     np.testing.assert_allclose(found.emissivity, emissivity, rtol=1e-12)
 
 
@@ -87,7 +79,7 @@ def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, band, ce
     scene = Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
     camera = Camera(psf=None, lower_limit=None, reflected=293.0)
     image = camera.measure(scene, MapSurface(put_in, RASTER), 0.0)
-    rows = rows_of(image, Heating(celsius + CELSIUS))
+    rows = rows_of(image, em.Heating(celsius + CELSIUS))
     # A camera without blur whose pixels are the samples; emissivities are float32 on their way.
     parts = {"chip body": put_in[:, np.r_[:16, 24:40]], "shear band": put_in[:, 17:23]}
     for name, (mean, standard_deviation) in (("chip body", body), ("shear band", band)):
@@ -105,7 +97,7 @@ def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, band, ce
 
 
 def test_the_budget_is_that_of_the_derivatives():
-    heating = Heating(TRUTH, 293.0, 2.0, 1.5, 0.8)
+    heating = em.Heating(TRUTH, 293.0, 2.0, 1.5, 0.8)
     row = of_whole(measured(EVEN), heating)
     (hot, cold), (hot_slope, cold_slope) = slopes()
     contrast = hot - cold
@@ -136,12 +128,12 @@ def coverage(observe, repeats=100):
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    heating = Heating(TRUTH, 293.0, 2.0, 1.0, 1.5)
+    heating = em.Heating(TRUTH, 293.0, 2.0, 1.0, 1.5)
 
     def observe(put_in, generator):
         true, around, wrong = generator.normal((TRUTH, 293.0, 0.0), (2.0, 1.0, 1.5))
         image = measured(put_in, true, around, frames=4, noise=3.0, seed=generator, drift=0.5)
-        return determine_emissivity([off_by(image, wrong)], heating)
+        return em.determine_emissivity([off_by(image, wrong)], heating)
 
     # 95 of 100 expected, standard deviation 2.2: three of them. Of intervals half as wide 67 would
     # hold, and of those twice as wide all with a probability of 0.99.
@@ -152,7 +144,7 @@ def test_drift_and_noise_are_told_apart():
     noise, drift, frames = 4.0, 1.0, 400
     (hot, cold), _ = slopes()
     image = measured(EVEN, frames=frames, noise=noise, drift=drift)
-    found = determine_emissivity([image], HEATING)
+    found = em.determine_emissivity([image], HEATING)
     row, contrast = found.of(WHOLE), hot - cold
     # The standard deviation of 400 frames is known to 3.5 %, that of 480 000 pixels to 0.1 %.
     expected = drift / frames**0.5 / contrast
@@ -177,7 +169,7 @@ def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
 
 
 def test_the_difference_of_two_regions_is_known_better_than_either():
-    heating = Heating(TRUTH, 293.0, 4.0, 2.0, 3.0)
+    heating = em.Heating(TRUTH, 293.0, 4.0, 2.0, 3.0)
     put_in = table_1((0.42, 0.001), (0.53, 0.001))
     generator, differences = np.random.default_rng(8), []
     for _ in range(100):
@@ -185,7 +177,7 @@ def test_the_difference_of_two_regions_is_known_better_than_either():
         image = measured(put_in, true, around, frames=3, drift=5.0, seed=generator)
         rows = rows_of(off_by(image, wrong), heating)
         differences.append(rows["shear band"].mean - rows["chip body"].mean)
-    (a, b), (_, d) = emissivity_covariance([rows["shear band"], rows["chip body"]])
+    (a, b), (_, d) = em.emissivity_covariance([rows["shear band"], rows["chip body"]])
     stated = np.sqrt(a - 2 * b + d)
     # 100 differences: the standard deviation is known to 7 %; three of them.
     assert np.std(differences) == pytest.approx(stated, rel=0.21)
@@ -201,9 +193,9 @@ def heated_series(generator, temperatures, errors):
     for temperature in temperatures:
         emissivity = np.full(RASTER.shape, 0.4 + 2e-4 * (temperature - 700.0))
         image = measured(emissivity, temperature, frames=4, drift=1.0, seed=generator)
-        heating = Heating(temperature + errors[0], 293.0, 2.0, 0.0, 1.0)
+        heating = em.Heating(temperature + errors[0], 293.0, 2.0, 0.0, 1.0)
         rows.append(of_whole(off_by(image, errors[1]), heating).line)
-    return emissivity_line(rows)
+    return em.emissivity_line(rows)
 
 
 @pytest.mark.parametrize("temperatures", [(600.0, 800.0), (600.0, 700.0, 800.0, 900.0)])
@@ -223,10 +215,10 @@ def test_the_line_is_as_uncertain_as_it_says(temperatures):
 
 def test_scatter_about_the_line_counts():
     rows = [
-        of_whole(measured(np.full(RASTER.shape, e), t), Heating(t)).line
+        of_whole(measured(np.full(RASTER.shape, e), t), em.Heating(t)).line
         for e, t in ((0.4, 600.0), (0.5, 700.0), (0.4, 800.0))
     ]
-    line = emissivity_line(rows)
+    line = em.emissivity_line(rows)
     # Sum of squares about the mean 13/30: 0.02/3; one degree of freedom.
     assert line.residual == pytest.approx((0.02 / 3) ** 0.5, rel=1e-6)
     expected = line.residual / np.sqrt([3.0, 20000.0])
@@ -242,7 +234,7 @@ def test_flagged_pixels_are_left_out_counted_and_doubted():
     flags[1, 0, :10] = Flag.DEAD
     flags[2, 1, :100] = Flag.SATURATED
     flags[:, 2, :5] = Flag.REPLACED
-    found = determine_emissivity([measured(put_in, frames=3, flags=flags)], HEATING)
+    found = em.determine_emissivity([measured(put_in, frames=3, flags=flags)], HEATING)
     row = found.of(WHOLE)
     out = (flags & (Flag.DEAD | Flag.SATURATED)).any(axis=0)
     np.testing.assert_array_equal(np.isnan(found.emissivity), out)
@@ -350,14 +342,14 @@ def test_the_command_writes_table_map_and_picture(folder):
     said = typed(f"{COMMAND} a.nc {spread} {outputs}").stdout
     assert said.splitlines()[-3:] == ["one.nc", "t.csv", "p.png"]
     lines = pd.read_csv("t.csv", index_col="region")
-    image, heating = measured(table_1(), frames=5, noise=1.0), Heating(TRUTH, 293.0, 2.0, 1.0)
+    image, heating = measured(table_1(), frames=5, noise=1.0), em.Heating(TRUTH, 293.0, 2.0, 1.0)
     for name, row in rows_of(image, heating).items():
         expanded = row.estimate.expanded_uncertainty()
         assert lines["mean"][name] == pytest.approx(row.mean, rel=1e-6)
         assert lines["expanded_uncertainty"][name] == pytest.approx(expanded, rel=1e-6)
     chip = study_of(said).surface.chips["measured chip"]
     assert chip.body.mean == pytest.approx(lines["mean"]["chip body"], abs=6e-5)
-    surface, found = read_emissivity_map("one.nc"), determine_emissivity([image], heating)
+    surface, found = em.read_emissivity_map("one.nc"), em.determine_emissivity([image], heating)
     known = (pytest.approx(BAND.lower), pytest.approx(BAND.upper)), "Ti-6Al-4V"
     for one in (surface, *surfaces_of(study_of(said).surface, 1).values()):
         assert (one.origin.band, one.origin.metal) == known
@@ -404,8 +396,8 @@ def shown(surface, *of_scene):
 
 @pytest.mark.usefixtures("two")
 def test_a_study_takes_the_line_of_a_region():
-    line = read_emissivity_lines("two.nc")["chip body"]
-    trend = emissivity_trend(line)
+    line = em.read_emissivity_lines("two.nc")["chip body"]
+    trend = em.emissivity_trend(line)
     np.testing.assert_allclose(trend.covariance, line.estimate.covariance(), rtol=1e-9)
     assert trend.measured == line.temperatures
     study = Study(surface={"kind": "measured", "file": "two.nc", "region": "chip body"})
@@ -417,8 +409,8 @@ def test_a_study_takes_the_line_of_a_region():
 
 @pytest.mark.usefixtures("two")
 def test_draws_of_a_line_have_its_covariance():
-    lines = read_emissivity_lines("two.nc")
-    body, band = (emissivity_trend(lines[name]) for name in ("chip body", "shear band"))
+    lines = em.read_emissivity_lines("two.nc")
+    body, band = (em.emissivity_trend(lines[name]) for name in ("chip body", "shear band"))
     surface = TrendSurface(body)
     assert surface.redrawn(0) is surface
     assert surface.redrawn(3).redrawn(2) == surface.redrawn(5)
@@ -445,7 +437,7 @@ def test_a_measured_chip_is_its_features_by_their_lines(strain, rate, parts):
     section = {"measured": {"heated": "two.nc"}, "follow": "none"}
     study = Study(surface=section, analysis={"rake_chip": "heated", "band_chip": "heated"})
     surface = surfaces_of(study.surface, 1)["heated"]
-    lines = read_emissivity_lines("two.nc")
+    lines = em.read_emissivity_lines("two.nc")
     cold, hot = (shown(surface, kelvins, strain, rate) for kelvins in (664.15, 850.0))
     # The texture is the same; what is between two temperatures are the lines alone.
     expected = sum(
@@ -458,7 +450,7 @@ def test_a_measured_chip_is_its_features_by_their_lines(strain, rate, parts):
 
 @pytest.mark.usefixtures("two")
 def test_a_map_of_several_temperatures_has_a_line_in_each_pixel():
-    surface = read_emissivity_map("two.nc")
+    surface = em.read_emissivity_map("two.nc")
     with xr.open_dataset("two.nc", engine="h5netcdf") as data:
         for kelvins, one in zip((TRUTH, 500.0 + CELSIUS), data["emissivity"].values, strict=True):
             np.testing.assert_allclose(shown(surface, kelvins), np.clip(one, 0, 1), atol=1e-6)

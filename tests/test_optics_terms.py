@@ -7,23 +7,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from chipglow.camera import (
-    BlurredPSF,
-    Camera,
-    Distortion,
-    FieldBlur,
-    GaussianPSF,
-    Jitter,
-    Narcissus,
-    OpticalElement,
-    PupilPSF,
-    Veil,
-)
+from chipglow import camera as cam
 from chipglow.scene import Raster
 from chipglow.study import Study, load_study, study_text
 
 SCENE = Raster(-300e-6, 270e-6, 2e-6, 270, 300)
-IDEAL = Camera(psf=None, lower_limit=None)
+IDEAL = cam.Camera(psf=None, lower_limit=None)
 BAND = IDEAL.band
 
 
@@ -41,20 +30,20 @@ def rough():
 
 def test_an_element_in_the_calibration_and_one_that_is_not():
     hot, warm, cool = (float(BAND.radiance(t)) for t in (1000.0, 330.0, 300.0))
-    window = OpticalElement(0.8, 330.0)
+    window = cam.OpticalElement(0.8, 330.0)
     np.testing.assert_allclose(seen(even(1000.0), window), 0.8 * hot + 0.2 * warm, rtol=1e-12)
     # In a cavity of one temperature nothing is to be seen of it.
     np.testing.assert_allclose(seen(even(330.0), window), warm, rtol=1e-9)
-    lens = OpticalElement(0.8, 330.0, calibrated_at=300.0)
+    lens = cam.OpticalElement(0.8, 330.0, calibrated_at=300.0)
     shown = hot + (warm - cool) * 0.2 / 0.8
     np.testing.assert_allclose(seen(even(1000.0), lens), shown, rtol=1e-12)
     image = rough()
-    same = OpticalElement(0.8, 300.0, calibrated_at=300.0)
+    same = cam.OpticalElement(0.8, 300.0, calibrated_at=300.0)
     np.testing.assert_array_equal(seen(image, same), seen(image))
 
 
 def test_narcissus_is_missing_light_round_the_axis():
-    term = Narcissus(0.02, 120e-6, housing=320.0, detector=80.0)
+    term = cam.Narcissus(0.02, 120e-6, housing=320.0, detector=80.0)
     missing = 0.02 * float(BAND.radiance(320.0) - BAND.radiance(80.0))
     camera = replace(IDEAL, shape=(89, 99))
     loss = even(700.0)[0, 0] - seen(even(700.0), term, camera=camera)
@@ -74,18 +63,18 @@ def test_veil_of_a_disc():
     middle = x[150], y[135, 0]
     disc = np.where(np.hypot(x - middle[0], y - middle[1]) <= radius, 400.0, 0.0)
     lit = replace(IDEAL, pitch=2e-6)
-    image = seen(disc, Veil(scattered, half), camera=lit)
+    image = seen(disc, cam.Veil(scattered, half), camera=lit)
     expected = 1 - scattered / sqrt(1 + 3 * radius**2 / half**2)
     # A disc of squares of 2 um.
     assert image[135, 150] / 400 == pytest.approx(expected, abs=2e-4)
     assert image[135, 5] > 0.2
-    np.testing.assert_allclose(seen(even(800.0), Veil(0.3, 1e-3)), even(800.0)[0, 0], rtol=1e-9)
-    np.testing.assert_array_equal(seen(disc, Veil(0.0, half)), seen(disc))
+    np.testing.assert_allclose(seen(even(800.0), cam.Veil(0.3, 1e-3)), even(800.0)[0, 0], rtol=1e-9)
+    np.testing.assert_array_equal(seen(disc, cam.Veil(0.0, half)), seen(disc))
 
 
 @pytest.mark.parametrize("camera", [IDEAL, replace(IDEAL, psf_order="detector")])
 def test_distortion_moves_where_pixels_see(camera):
-    term = Distortion(0.02, 250e-6)
+    term = cam.Distortion(0.02, 250e-6)
     sensors = camera.pixels(SCENE)
     x, y = sensors.x, sensors.y[:, None]
     ramp = 700.0 + SCENE.x / 1e-6 + 0.5 * SCENE.y[:, None] / 1e-6
@@ -99,7 +88,7 @@ def test_distortion_moves_where_pixels_see(camera):
 
 
 def test_the_blur_of_an_edge_grows_with_the_square_of_the_distance_from_the_axis():
-    term, spacing = FieldBlur(20e-6, 250e-6), SCENE.spacing
+    term, spacing = cam.FieldBlur(20e-6, 250e-6), SCENE.spacing
     border = SCENE.x[220] - spacing / 2
     edge = np.where(SCENE.x > border, 400.0, 0.0) * np.ones(SCENE.shape)
     camera = replace(IDEAL, pitch=spacing)
@@ -110,11 +99,11 @@ def test_the_blur_of_an_edge_grows_with_the_square_of_the_distance_from_the_axis
     # Between variances that double: the mixture of two Gaussians is off by 0.8 % at most.
     np.testing.assert_allclose(image, expected, atol=0.01 * 400)
     np.testing.assert_allclose(seen(even(800.0), term), even(800.0)[0, 0], rtol=1e-12)
-    np.testing.assert_array_equal(seen(rough(), FieldBlur(0.0, 250e-6)), seen(rough()))
+    np.testing.assert_array_equal(seen(rough(), cam.FieldBlur(0.0, 250e-6)), seen(rough()))
 
 
 def test_form_image_stands_alone():
-    camera, radiance = Camera(psf=GaussianPSF(8e-6)), rough()
+    camera, radiance = cam.Camera(psf=cam.GaussianPSF(8e-6)), rough()
     image = camera.form_image(radiance, SCENE)
     assert image.shape == camera.pixels(SCENE).shape
     frames = camera.measurement(image[None], np.zeros(1), SCENE)
@@ -147,17 +136,17 @@ def test_a_study_chooses_them(tmp_path):
     path.write_text(STUDY)
     study = load_study(path)
     camera = study.camera.build()
-    pupil = PupilPSF(BAND, 0.28, 0.35, 10e-6, ((8, -0.12e-6), (11, 0.2e-6)))
+    pupil = cam.PupilPSF(BAND, 0.28, 0.35, 10e-6, ((8, -0.12e-6), (11, 0.2e-6)))
     assert camera == replace(
-        Camera.paper(),
-        psf=BlurredPSF(pupil, (Jitter(1e-6),)),
+        cam.Camera.paper(),
+        psf=cam.BlurredPSF(pupil, (cam.Jitter(1e-6),)),
         optics=(
-            OpticalElement(0.9, 313.15, 298.15),
-            Narcissus(0.01, 150e-6),
-            Veil(0.03, 300e-6),
-            Distortion(0.01, 300e-6),
+            cam.OpticalElement(0.9, 313.15, 298.15),
+            cam.Narcissus(0.01, 150e-6),
+            cam.Veil(0.03, 300e-6),
+            cam.Distortion(0.01, 300e-6),
         ),
     )
     path.write_text(study_text(study))
     assert load_study(path) == study
-    assert Study().camera.build() == Camera.paper()
+    assert Study().camera.build() == cam.Camera.paper()

@@ -12,6 +12,7 @@ from scipy.integrate import simpson
 from scipy.optimize import brentq
 from typed import refused, typed
 
+from chipglow import camera as cam
 from chipglow.analysis import (
     CAUSES,
     Plan,
@@ -21,21 +22,6 @@ from chipglow.analysis import (
     ratio_errors,
     wavelength_errors,
     wavelengths_frame,
-)
-from chipglow.camera import (
-    AnnularAperturePSF,
-    BlurredPSF,
-    Camera,
-    Detector,
-    GaussianPSF,
-    Jitter,
-    PupilPSF,
-    RangeResponse,
-    RatioCamera,
-    ReadNoise,
-    ShotNoise,
-    View,
-    expose,
 )
 from chipglow.io import write_scene
 from chipglow.radiometry import Band, RatioThermometer, spectral_radiance
@@ -49,7 +35,7 @@ NARROW = Band(0.9e-6, 0.9002e-6), Band(1.0e-6, 1.0002e-6)
 LAMBDA = 1 / (1 / 0.9001e-6 - 1 / 1.0001e-6)
 METAL = HagenRubens(6e-7)
 RASTER = Raster(left=-60e-6, top=40e-6, spacing=1e-6, rows=80, columns=120)
-CAMERA = Camera(pitch=4e-6, psf=None, integration_time=2e-6, lower_limit=None)
+CAMERA = cam.Camera(pitch=4e-6, psf=None, integration_time=2e-6, lower_limit=None)
 GRADIENT, RATE = 1e6, 1e6
 
 
@@ -71,7 +57,7 @@ def warming():
 
 
 def two(bands=(SHORT, LONG), camera=CAMERA, **settings):
-    return RatioCamera(*(camera.in_band(band) for band in bands), **settings)
+    return cam.RatioCamera(*(camera.in_band(band) for band in bands), **settings)
 
 
 @pytest.fixture(scope="module")
@@ -138,28 +124,28 @@ def test_bands_of_which_one_holds_the_other_have_a_range():
 def test_views_of_several_bands_are_those_of_each_alone(analytic_scene):
     surfaces = [replace(chip, follow="mean").prepare(analytic_scene) for chip in (CHIP_1, CHIP_2)]
     views = [
-        View(surface, band, reflected)
+        cam.View(surface, band, reflected)
         for surface in surfaces
         for band, reflected in ((SHORT, None), (LONG, 400.0), (SHORT, 900.0))
     ]
-    together = expose(analytic_scene, views, analytic_scene.times[0], 5e-6)
+    together = cam.expose(analytic_scene, views, analytic_scene.times[0], 5e-6)
     for view, found in zip(views, together, strict=True):
-        (alone,) = expose(analytic_scene, [view], found.start, 5e-6)
+        (alone,) = cam.expose(analytic_scene, [view], found.start, 5e-6)
         for name in ("mean_radiance", "centre_radiance", "peak_radiance", "peak_temperature"):
             np.testing.assert_array_equal(getattr(found, name), getattr(alone, name))
 
 
 def test_diffraction_grows_with_the_wavelength_and_other_blurs_do_not():
     far = Band(8e-6, 14e-6)
-    annular = AnnularAperturePSF(4.5e-6)
+    annular = cam.AnnularAperturePSF(4.5e-6)
     assert annular.in_band(far).fwhm == pytest.approx(annular.fwhm * 11 / 4.5)
-    assert PupilPSF(LONG, 0.28).in_band(far) == PupilPSF(far, 0.28)
-    assert GaussianPSF(9e-6).in_band(far) == GaussianPSF(9e-6)
-    blurred = BlurredPSF(annular, (Jitter(1e-6),))
+    assert cam.PupilPSF(LONG, 0.28).in_band(far) == cam.PupilPSF(far, 0.28)
+    assert cam.GaussianPSF(9e-6).in_band(far) == cam.GaussianPSF(9e-6)
+    blurred = cam.BlurredPSF(annular, (cam.Jitter(1e-6),))
     assert blurred.in_band(far) == replace(blurred, psf=annular.in_band(far))
-    camera = Camera().in_band(far)
+    camera = cam.Camera().in_band(far)
     assert (camera.band, camera.lower_limit) == (far, None)
-    assert Camera(psf=None).in_band(far).psf is None
+    assert cam.Camera(psf=None).in_band(far).psf is None
 
 
 # --- emissivity that is not grey
@@ -199,7 +185,7 @@ def test_the_odds_of_emission_follow_the_law():
 
 def test_a_uniform_grey_scene_has_no_error():
     camera = two(
-        shift=(1.3e-6, -0.7e-6), delay=0.5e-6, camera=replace(CAMERA, psf=GaussianPSF(8e-6))
+        shift=(1.3e-6, -0.7e-6), delay=0.5e-6, camera=replace(CAMERA, psf=cam.GaussianPSF(8e-6))
     )
     flat = scene(900.0)
     measured = camera.measure(flat, UniformSurface(0.3), [0.0, 1e-6])
@@ -263,7 +249,7 @@ def test_what_is_not_grey_is_an_error_of_the_emissivity():
 
 
 def test_the_causes_add_up_to_what_is_measured():
-    noisy = replace(CAMERA, psf=GaussianPSF(9e-6), detector=detector())
+    noisy = replace(CAMERA, psf=cam.GaussianPSF(9e-6), detector=detector())
     camera = two(camera=noisy, shift=(1.5e-6, -1e-6), delay=1e-6)
     slope = scene(900.0 + GRADIENT * RASTER.x + RATE * np.arange(4)[:, None, None] * 1e-6)
     errors = ratio_errors(camera, slope, METAL, 0.0)
@@ -275,11 +261,11 @@ def test_the_causes_add_up_to_what_is_measured():
 
 
 def detector():
-    return Detector(
-        response=RangeResponse(1400.0),
+    return cam.Detector(
+        response=cam.RangeResponse(1400.0),
         full_well=1e6,
         bits=14,
-        terms=(ShotNoise(), ReadNoise(standard_deviation=200.0)),
+        terms=(cam.ShotNoise(), cam.ReadNoise(standard_deviation=200.0)),
         frames=64,
     )
 
@@ -329,7 +315,7 @@ def test_a_study_of_bands_beside_the_loop_of_figure_6():
     x, y = np.meshgrid(RASTER.x, RASTER.y)
     shape = 900.0 + 200.0 * np.exp(-((x - 3e-6) ** 2 + y**2) / (9e-6) ** 2)
     values = shape + RATE * np.arange(4)[:, None, None] * 1e-6
-    camera = replace(CAMERA, psf=GaussianPSF(10e-6), psf_order="detector")
+    camera = replace(CAMERA, psf=cam.GaussianPSF(10e-6), psf_order="detector")
     point = np.array([5.2e-6, 2.2e-6])  # the pixel of column 16, row 9: its centre at 6 um, 2 um
     plan = WavelengthPlan((LONG, SHORT), 1e-6, 1e-6, 0.1, 0.15)
     study = wavelength_errors(
@@ -341,7 +327,7 @@ def test_a_study_of_bands_beside_the_loop_of_figure_6():
         1,
         1,
     )
-    kernel = GaussianPSF(10e-6).kernel(4e-6)
+    kernel = cam.GaussianPSF(10e-6).kernel(4e-6)
     # The pixel's middle is the corner of four samples.
     truth = float(values.astype(np.float32)[1, 37:39, 65:67].mean(dtype=np.float64))
 
@@ -394,7 +380,7 @@ def ratio_at(kelvins):
 
 
 def test_spots_of_a_cut(analytic_scene):
-    spots = cut_spots(analytic_scene, Camera.paper(), Plan(exposures=2))
+    spots = cut_spots(analytic_scene, cam.Camera.paper(), Plan(exposures=2))
     assert [(spot.place, spot.surface) for spot in spots] == [
         ("rake face", "chip 2"),
         ("shear band", "chip 1"),

@@ -10,27 +10,17 @@ from typed import typed, words
 
 from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement, fit_calibration
 from chipglow.io import write_measurement
-from chipglow.laboratory.emissivity import (
-    EmissivityLine,
-    Heating,
-    RegionEmissivities,
-    determine_emissivity,
-    emissivity_line,
-    read_emissivity_lines,
-    reflected_temperature,
-    true_temperature,
-    write_emissivity,
-)
+from chipglow.laboratory import emissivity as em
 from chipglow.scene import Area
 from chipglow.uncertainty import Estimate, from_xarray
 
 ROOM = 293.0
 WHOLE = Area("chip", "chip", np.ones(RASTER.shape, dtype=bool), True)
 HOT = 600.0 + CELSIUS
-HEATING = Heating(391.0 + CELSIUS, ROOM, 2.0, 5.0)
+HEATING = em.Heating(391.0 + CELSIUS, ROOM, 2.0, 5.0)
 BODIES = np.arange(200.0, 701.0, 100.0) + CELSIUS
 OFFSET, GAIN = 400.0, 1.8
-KNOWN = EmissivityLine.constant(0.42)
+KNOWN = em.EmissivityLine.constant(0.42)
 
 
 def image(emissivity=0.42, kelvins=HOT, reflected=ROOM, **more):
@@ -64,8 +54,8 @@ def developed(calibration, kelvins, emissivity, frames=1, noise=0.0, seed=0, roo
 @pytest.mark.parametrize("emissivity", [0.05, 0.42, 1.0])
 @pytest.mark.parametrize("celsius", [60.0, 391.0, 1200.0])
 def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius):
-    found = true_temperature(
-        [image(emissivity, celsius + CELSIUS)], WHOLE, EmissivityLine.constant(emissivity)
+    found = em.true_temperature(
+        [image(emissivity, celsius + CELSIUS)], WHOLE, em.EmissivityLine.constant(emissivity)
     )
     assert found.estimate.values == pytest.approx(celsius + CELSIUS, abs=1e-3)
     assert found.mean_of_pixels == pytest.approx(found.estimate.values, abs=1e-6)
@@ -90,13 +80,13 @@ def hotter(kelvins):
     [
         (
             "emissivity",
-            {"emissivity": EmissivityLine.constant(0.42, 1e-4)},
-            {"emissivity": EmissivityLine.constant(0.4199)},
+            {"emissivity": em.EmissivityLine.constant(0.42, 1e-4)},
+            {"emissivity": em.EmissivityLine.constant(0.4199)},
         ),
         (
             "reflected",
-            {"surroundings": reflected_temperature(ROOM, 0.01)},
-            {"surroundings": reflected_temperature(ROOM - 0.01)},
+            {"surroundings": em.reflected_temperature(ROOM, 0.01)},
+            {"surroundings": em.reflected_temperature(ROOM - 0.01)},
         ),
         ("calibration", {"seen": of_gain(1.0, 1e-4)}, {"seen": of_gain(1.0001)}),
         ("calibration", {"camera_uncertainty": 0.1}, {"seen": hotter(0.1)}),
@@ -107,8 +97,8 @@ def test_a_part_of_the_uncertainty_is_that_of_a_small_change(cause, stated, chan
 
     def found(seen=None, emissivity=KNOWN, surroundings=None, **more):
         seen = [image()] if seen is None else [seen]
-        around = surroundings or reflected_temperature(ROOM)
-        return true_temperature(seen, WHOLE, emissivity, around, **more).estimate
+        around = surroundings or em.reflected_temperature(ROOM)
+        return em.true_temperature(seen, WHOLE, emissivity, around, **more).estimate
 
     change = found(**changed).values - found().values
     assert found(**stated).contribution(cause) == pytest.approx(change, rel=1e-2)
@@ -116,10 +106,10 @@ def test_a_part_of_the_uncertainty_is_that_of_a_small_change(cause, stated, chan
 
 def test_cold_surroundings_are_part_of_the_uncertainty():
     """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
-    known = EmissivityLine.constant(0.05)
+    known = em.EmissivityLine.constant(0.05)
     cold, warmer = (
         true_of(known, around, emissivity=0.05, kelvins=330.0, reflected=190.0).estimate
-        for around in (reflected_temperature(190.0, 1.0), reflected_temperature(191.0))
+        for around in (em.reflected_temperature(190.0, 1.0), em.reflected_temperature(191.0))
     )
     assert cold.values == pytest.approx(330.0, abs=1e-3)
     change = cold.values - warmer.values
@@ -129,11 +119,11 @@ def test_cold_surroundings_are_part_of_the_uncertainty():
 
 def test_few_images_widen_the_interval():
     images = [image(drift=2.0, seed=seed) for seed in range(3)]
-    found = true_temperature(images, WHOLE, KNOWN).estimate
+    found = em.true_temperature(images, WHOLE, KNOWN).estimate
     # Three repetitions, two degrees of freedom: Student's 4.3.
     assert found.degrees_of_freedom == pytest.approx(2.0)
     assert found.coverage_factor() == pytest.approx(4.303, abs=0.01)
-    alone = true_temperature(images[:1], WHOLE, KNOWN).estimate
+    alone = em.true_temperature(images[:1], WHOLE, KNOWN).estimate
     assert np.isnan(alone.contribution("repeatability"))
 
 
@@ -157,8 +147,8 @@ def test_errors_that_emissivity_and_image_share_cancel():
     """At the temperature of the heating itself, only the thermocouple's error is left."""
     calibration = fitted(common=1.0)
     heated = developed(calibration, HEATING.reference, 0.42)
-    emissivity = determine_emissivity([heated], HEATING).of(WHOLE).line
-    found = true_temperature([heated], WHOLE, emissivity, calibration=calibration)
+    emissivity = em.determine_emissivity([heated], HEATING).of(WHOLE).line
+    found = em.true_temperature([heated], WHOLE, emissivity, calibration=calibration)
     assert found.estimate.values == pytest.approx(HEATING.reference, abs=1e-4)
     assert found.correlation == pytest.approx(1.0)
     assert found.estimate.contribution("calibration") == pytest.approx(0.0, abs=1e-3)
@@ -166,11 +156,11 @@ def test_errors_that_emissivity_and_image_share_cancel():
     assert found.estimate.contribution("reference") == pytest.approx(
         HEATING.reference_uncertainty, rel=1e-3
     )
-    apart = true_temperature([heated], WHOLE, emissivity)
+    apart = em.true_temperature([heated], WHOLE, emissivity)
     assert apart.correlation is None
     assert apart.estimate.contribution("calibration") > 0.5
-    elsewhere = true_temperature(
-        [heated], WHOLE, emissivity, reflected_temperature(ROOM, 5.0), calibration
+    elsewhere = em.true_temperature(
+        [heated], WHOLE, emissivity, em.reflected_temperature(ROOM, 5.0), calibration
     )
     assert elsewhere.estimate.contribution("reflected") > 0.01
 
@@ -190,8 +180,8 @@ def test_stated_intervals_hold_the_truth():
         seed = int(generator.integers(1 << 30))
         heated = developed(calibration, oven, 0.42, 4, 5.0, seed, room)
         hot = developed(calibration, HOT, 0.42, 4, 5.0, seed + 1, room)
-        emissivity = determine_emissivity([heated], HEATING).of(WHOLE).line
-        found = true_temperature([hot], WHOLE, emissivity, calibration=calibration)
+        emissivity = em.determine_emissivity([heated], HEATING).of(WHOLE).line
+        found = em.true_temperature([hot], WHOLE, emissivity, calibration=calibration)
         within += abs(found.estimate.values - HOT) <= found.estimate.expanded_uncertainty()
         scores.append((found.estimate.values - HOT) / found.estimate.standard_uncertainty)
     assert 181 <= within <= 199
@@ -217,8 +207,8 @@ def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most)
         )
         read = replace(heating, reference=HEATING.reference + 0.5 * generator.standard_normal(),
                        reference_uncertainty=0.5, reflected_uncertainty=0.0)  # fmt: skip
-        row = determine_emissivity([heated], read).of(WHOLE)
-        found = true_temperature([hot], WHOLE, row.line, drift=stated)
+        row = em.determine_emissivity([heated], read).of(WHOLE)
+        found = em.true_temperature([hot], WHOLE, row.line, drift=stated)
         within += abs(found.estimate.values - HOT) < found.estimate.expanded_uncertainty()
     assert least <= within / 60 <= most
     assert np.isnan(row.estimate.contribution("drift")) is np.bool_(stated is None)
@@ -230,10 +220,10 @@ def test_several_recordings_show_the_drift_themselves():
         Measurement.from_radiance(f * one.radiance, BAND, np.zeros(1), RASTER)
         for f, one in zip((0.97, 0.99, 1.01, 1.03), images, strict=True)
     ]
-    row = determine_emissivity(shown, HEATING).of(WHOLE)
+    row = em.determine_emissivity(shown, HEATING).of(WHOLE)
     assert row.estimate.contribution("drift") == 0.0
     assert row.estimate.contribution("repeatability") == pytest.approx(0.42 * 0.0258 / 2, rel=0.05)
-    more = determine_emissivity(shown, replace(HEATING, drift=0.1)).of(WHOLE)
+    more = em.determine_emissivity(shown, replace(HEATING, drift=0.1)).of(WHOLE)
     # A tenth of the radiance over the root of four, of which the repeatability holds a part.
     together = np.hypot(
         more.estimate.contribution("drift"), more.estimate.contribution("repeatability")
@@ -260,19 +250,19 @@ def rows_of_line(slope=SLOPE, temperatures=HEATED, **errors):
     """Areas of an object whose emissivity is on a line, at several temperatures."""
     for kelvins in temperatures:
         heated = image(on_the_line(kelvins, slope), kelvins)
-        found = determine_emissivity([heated], replace(HEATING, reference=kelvins, **errors))
+        found = em.determine_emissivity([heated], replace(HEATING, reference=kelvins, **errors))
         yield found, found.of(WHOLE)
 
 
 def line_of(*arguments, **more):
-    return emissivity_line([row.line for _, row in rows_of_line(*arguments, **more)])
+    return em.emissivity_line([row.line for _, row in rows_of_line(*arguments, **more)])
 
 
 @pytest.mark.parametrize("kelvins", [650.0, 823.0, 1000.0])
 @pytest.mark.parametrize("slope", [-4e-4, 0.0, 4e-4])
 def test_a_line_is_taken_at_the_temperature_that_is_found(slope, kelvins):
     seen = image(on_the_line(kelvins, slope), kelvins)
-    found = true_temperature([seen], WHOLE, line_of(slope))
+    found = em.true_temperature([seen], WHOLE, line_of(slope))
     # Radiances in float32 are good to 6e-8 of 40 K a relative change of the radiance.
     assert found.estimate.values == pytest.approx(kelvins, abs=1e-3)
     assert found.emissivity == pytest.approx(on_the_line(kelvins, slope), abs=1e-6)
@@ -286,19 +276,19 @@ def test_a_line_is_taken_at_the_temperature_that_is_found(slope, kelvins):
 def test_the_budget_by_a_line_is_that_of_small_changes(kelvins):
     seen = image(on_the_line(kelvins), kelvins)
     line = line_of(reference_uncertainty=2.0, reflected_uncertainty=0.0)
-    found = true_temperature([seen], WHOLE, line)
+    found = em.true_temperature([seen], WHOLE, line)
     shifted = []
     for sign in (-1.0, 1.0):
         # The same images, by someone whose thermocouple is 2 K off.
         rows = [
-            determine_emissivity(
+            em.determine_emissivity(
                 [image(on_the_line(one), one)], replace(HEATING, reference=one + 2.0 * sign)
             )
             .of(WHOLE)
             .line
             for one in HEATED
         ]
-        shifted.append(true_temperature([seen], WHOLE, emissivity_line(rows)).estimate.values)
+        shifted.append(em.true_temperature([seen], WHOLE, em.emissivity_line(rows)).estimate.values)
     # Terms of second order in 2 K of 700 K are some 1e-5 of the first.
     assert found.estimate.effect("reference") == pytest.approx(
         (shifted[1] - shifted[0]) / 2, rel=1e-3
@@ -307,9 +297,9 @@ def test_the_budget_by_a_line_is_that_of_small_changes(kelvins):
 
 def test_a_line_comes_back_from_its_file_with_its_covariance(tmp_path):
     maps, rows = zip(*rows_of_line(drift=0.01, reference_uncertainty=2.0), strict=True)
-    line = emissivity_line([row.line for row in rows])
-    write_emissivity(RegionEmissivities(maps, tuple((r,) for r in rows)), tmp_path / "e.nc")
-    stored = read_emissivity_lines(tmp_path / "e.nc")["chip"]
+    line = em.emissivity_line([row.line for row in rows])
+    em.write_emissivity(em.RegionEmissivities(maps, tuple((r,) for r in rows)), tmp_path / "e.nc")
+    stored = em.read_emissivity_lines(tmp_path / "e.nc")["chip"]
     assert stored.heatings == tuple(replace(one, drift=None) for one in line.heatings)
     np.testing.assert_allclose(stored.estimate.values, line.estimate.values, rtol=1e-12)
     np.testing.assert_allclose(stored.estimate.covariance(), line.estimate.covariance(), rtol=1e-9)
@@ -323,15 +313,15 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     halves = [Area("left", "left", left, True), Area("right", "right", ~left, True)]
     values = np.where(halves[0].mask, 0.42, 1.05)
     heating = replace(HEATING, drift=0.01, camera_uncertainty=1.0)
-    found = determine_emissivity([measured(values, HEATING.reference, ROOM, frames=5)], heating)
+    found = em.determine_emissivity([measured(values, HEATING.reference, ROOM, frames=5)], heating)
     rows = [found.of(area) for area in halves]
-    write_emissivity(RegionEmissivities((found,), (tuple(rows),)), tmp_path / "e.nc")
+    em.write_emissivity(em.RegionEmissivities((found,), (tuple(rows),)), tmp_path / "e.nc")
     with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
         estimate = from_xarray(data.load(), "region_mean")
     expected = Estimate.stack([row.estimate for row in rows])
     np.testing.assert_allclose(estimate.covariance(), expected.covariance(), rtol=1e-9, atol=1e-18)
     # A hotter room makes a grey surface darker, and one that is over 1 brighter.
-    stored = read_emissivity_lines(tmp_path / "e.nc")
+    stored = em.read_emissivity_lines(tmp_path / "e.nc")
     signs = [np.sign(own(one).effect("reflected")) for one in stored.values()]
     assert signs == [-1.0, 1.0]
     both = own(stored["left"]) - rows[0].estimate
@@ -339,8 +329,10 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
 
 
 def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
-    emissivity = EmissivityLine.constant(0.42, 0.05)
-    one, other = (true_temperature([image(seed=n)], WHOLE, emissivity).estimate for n in range(2))
+    emissivity = em.EmissivityLine.constant(0.42, 0.05)
+    one, other = (
+        em.true_temperature([image(seed=n)], WHOLE, emissivity).estimate for n in range(2)
+    )
     assert (one - other).standard_uncertainty < 1e-6 * one.standard_uncertainty
 
 
@@ -348,26 +340,26 @@ def test_doubts_are_warnings(tmp_path):
     half = np.where(np.arange(RASTER.columns) < 20, HOT, HOT + 300.0)
     uneven = measured(np.full(RASTER.shape, 0.42), reference=HOT)
     uneven.data["radiance"].values[:] = 0.42 * BAND.radiance(half) + 0.58 * BAND.radiance(ROOM)
-    found = true_temperature([uneven], WHOLE, EmissivityLine.constant(0.42, 0.01))
+    found = em.true_temperature([uneven], WHOLE, em.EmissivityLine.constant(0.42, 0.01))
     assert any("is uneven" in warning for warning in found.estimate.warnings)
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[:, :, :10] = Flag.SATURATED
-    found = true_temperature([image(flags=flags)], WHOLE, KNOWN)
+    found = em.true_temperature([image(flags=flags)], WHOLE, KNOWN)
     assert found.used.left_out == 300
     assert any(
         "300 of 1200 pixels are left out (300 saturated)" in one for one in found.estimate.warnings
     )
-    assert true_temperature([image()], WHOLE, KNOWN).estimate.warnings == ()
+    assert em.true_temperature([image()], WHOLE, KNOWN).estimate.warnings == ()
     # Those of the emissivity travel to the temperature, also through its file.
-    found = determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
-    write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
-    stored = read_emissivity_lines(tmp_path / "e.nc")["chip"]
-    (warning,) = true_temperature([image()], WHOLE, stored).estimate.warnings
+    found = em.determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
+    em.write_emissivity(em.RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
+    stored = em.read_emissivity_lines(tmp_path / "e.nc")["chip"]
+    (warning,) = em.true_temperature([image()], WHOLE, stored).estimate.warnings
     assert warning.startswith("Emissivity: chip: 300 of 1200 pixels are left out")
 
 
 def true_of(line=KNOWN, surroundings=None, **more):
-    return true_temperature([image(**more)], WHOLE, line, surroundings)
+    return em.true_temperature([image(**more)], WHOLE, line, surroundings)
 
 
 # The command
@@ -402,7 +394,7 @@ def write_lines(maps, rows):
     """Write e.nc, in which each of the regions has the emissivity of the rows."""
     names = ("body left", "body right", "shear band 1", "shear band 2")
     tables = tuple(tuple(replace(row, name=name) for name in names) for row in rows)
-    write_emissivity(RegionEmissivities(tuple(maps), tables), "e.nc")
+    em.write_emissivity(em.RegionEmissivities(tuple(maps), tables), "e.nc")
 
 
 @pytest.mark.usefixtures("folder")
