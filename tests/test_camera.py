@@ -156,20 +156,18 @@ def test_no_emissivity_is_not_no_material():
     assert np.isnan(nothing.peak_temperature).all()
 
 
-@pytest.mark.parametrize("start", [3.0, 4.5, 6.0, 9.0])
-def test_an_exposure_in_a_gap_is_refused(start):
-    """Frames at 0 to 4 and 10 to 14: the one before a gap stands for one step, not for six."""
-    times = STEP * np.array([0, 1, 2, 3, 4, 10, 11, 12, 13, 14], float)
-    with pytest.raises(ValueError, match="overlaps a gap of the scene"):
-        frame_weights(times, STEP, start * STEP, 3 * STEP)
+GAP = STEP * np.array([0, 1, 2, 3, 4, 10, 11, 12, 13, 14], float)
+"""Times of frames; the one before the gap stands for one step, not for six."""
 
 
 def test_exposures_beside_a_gap_are_taken():
-    times = STEP * np.array([0, 1, 2, 3, 4, 10, 11, 12, 13, 14], float)
     for start, expected in ((2.0, range(2, 5)), (10.0, range(5, 8)), (12.0, range(7, 10))):
-        indices, weights = frame_weights(times, STEP, start * STEP, 3 * STEP)
+        indices, weights = frame_weights(GAP, STEP, start * STEP, 3 * STEP)
         assert indices == expected
         np.testing.assert_allclose(weights, 1 / 3)
+    for start in (3.0, 4.5, 6.0, 9.0):
+        with pytest.raises(ValueError, match="overlaps a gap of the scene"):
+            frame_weights(GAP, STEP, start * STEP, 3 * STEP)
 
 
 @given(st.floats(0, 81e-6), st.floats(0.01e-6, 10e-6))
@@ -447,19 +445,6 @@ def test_a_measurement_keeps_a_response_that_is_no_box(tmp_path):
         again.band.radiance(800.0)
 
 
-@pytest.mark.parametrize("broken", ["radiance", "units", "pitch", "band_upper"])
-def test_broken_measurements_are_refused(broken):
-    data = Camera().measure(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0).data.copy()
-    if broken == "radiance":
-        data = data.drop_vars("radiance")
-    elif broken == "units":
-        data["radiance"] = data["radiance"].assign_attrs(units="W")
-    else:
-        del data.attrs[broken]
-    with pytest.raises(ValueError, match=r"measurement: .*(radiance|pitch|band_upper)"):
-        Measurement(data).radiance_temperature(flagged=True)
-
-
 @pytest.mark.parametrize("lower_limit", [300.0, 250, 370.0])
 def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
     with pytest.warns(
@@ -470,14 +455,6 @@ def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
     assert w[0].filename == __file__
     # Warnings are errors in tests: others are not doubted.
     assert Camera(lower_limit=lower_limit + 3.15).lower_limit == lower_limit + 3.15
-
-
-@pytest.mark.parametrize("look", [Camera.expose, Camera.measure])
-@pytest.mark.parametrize("surface", ["chip-1", 0.6, None])
-def test_what_is_no_surface_is_refused(look, surface):
-    scene = make_scene(np.full((1, 18, 18), 900.0))
-    with pytest.raises(ValueError, match=f"surface: {surface!r} is not a Surface"):
-        look(Camera(), scene, surface, 0.0)
 
 
 def test_the_papers_camera_is_that_of_a_study():
@@ -493,30 +470,58 @@ def test_what_is_the_papers_comes_with_its_camera_only():
         AnnularAperturePSF(None).kernel(1e-6)
 
 
-@pytest.mark.parametrize(
-    ("camera", "start", "message"),
-    [
-        (Camera(pitch=50e-6), 0.0, r"pitch of 50 um .* scene of 12 x 12 um"),
-        (Camera(offset=(11e-6, 0.0)), 0.0, r"offset of 11, 0 um does not fit"),
-        (Camera(shape=(3, 1)), 0.0, r"shape is 3 x 1 pixels, but only 2 x 2"),
-        (Camera(), 0.0, r"0 us to 10 us is not within the scene, which covers 0 us to 1 us"),
-        (Camera(integration_time=STEP), -STEP, "not within the scene"),
-        (Camera(integration_time=STEP), 4.5 * STEP, "not within the scene"),
-        (Camera(integration_time=STEP), float("nan"), "not within the scene"),
-    ],
-)
-def test_what_does_not_fit_the_scene_is_refused(camera, start, message):
-    scene = make_scene(np.full((5, 18, 18), 900.0))
+SMALL, LARGE = (make_scene(np.full((1, 9, columns), 900.0)) for columns in (9, 18))
+TOO_BRIGHT = Painted(SMALL.times, np.full((1, 9, 9), 1.5, dtype=np.float32))
+SHORT = Camera(integration_time=STEP)
+
+
+def seen(camera, start=0.0, surface=BLACK):
+    return camera.measure(make_scene(np.full((5, 18, 18), 900.0)), surface, start)
+
+
+def formed(*scenes):
+    return Camera().form_measurement([Camera().expose(scene, BLACK, 0.0) for scene in scenes])
+
+
+def without(name):
+    data = Camera().measure(SMALL, BLACK, 0.0).data.copy()
+    if name == "radiance":
+        data = data.drop_vars(name)
+    else:
+        del data.attrs[name]
+    return Measurement(data).radiance_temperature(flagged=True)
+
+
+def in_watts():
+    data = Camera().measure(SMALL, BLACK, 0.0).data.copy()
+    data["radiance"] = data["radiance"].assign_attrs(units="W")
+    return Measurement(data)
+
+
+REFUSED = {
+    "pitch of 50 um .* scene of 12 x 12 um": lambda: seen(Camera(pitch=50e-6)),
+    "offset of 11, 0 um does not fit": lambda: seen(Camera(offset=(11e-6, 0.0))),
+    "shape is 3 x 1 pixels, but only 2 x 2": lambda: seen(Camera(shape=(3, 1))),
+    "0 us to 10 us is not within the scene, which covers 0 us to 1 us": lambda: seen(Camera()),
+    "-0.2 us to .* not within the scene": lambda: seen(SHORT, -STEP),
+    "0.9 us to .* not within the scene": lambda: seen(SHORT, 4.5 * STEP),
+    "nan .* not within the scene": lambda: seen(SHORT, float("nan")),
+    "surface: 'chip-1' is not a Surface": lambda: seen(SHORT, 0.0, "chip-1"),
+    "surface: None is not a Surface": lambda: seen(SHORT, 0.0, None),
+    "surface: 0.6 is not a Surface": lambda: Camera().expose(SMALL, 0.6, 0.0),
+    "or emissivity not within 0 to 1 at 81 samples": lambda: Camera().measure(
+        SMALL, TOO_BRIGHT, 0.0
+    ),
+    "at least one exposure": lambda: formed(),
+    "exposure, all of the same grid": lambda: formed(SMALL, LARGE),
+    "measurement: .*radiance": lambda: without("radiance"),
+    "measurement: .*pitch": lambda: without("pitch"),
+    "measurement: .*band_upper": lambda: without("band_upper"),
+    "measurement: units of 'radiance'": in_watts,
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_the_impossible_is_refused(message):
     with pytest.raises(ValueError, match=message):
-        camera.measure(scene, BLACK, start)
-
-
-def test_what_has_no_radiance_or_grid_is_refused():
-    small, large = (make_scene(np.full((1, 9, columns), 900.0)) for columns in (9, 18))
-    surface = Painted(small.times, np.full((1, 9, 9), 1.5, dtype=np.float32))
-    with pytest.raises(ValueError, match="or emissivity not within 0 to 1 at 81 samples"):
-        Camera().measure(small, surface, 0.0)
-    exposures = [Camera().expose(scene, BLACK, 0.0) for scene in (small, large)]
-    for wrong in (exposures, []):
-        with pytest.raises(ValueError, match="at least one exposure, all of the same grid"):
-            Camera().form_measurement(wrong)
+        REFUSED[message]()

@@ -344,18 +344,20 @@ def test_noise_that_grows_with_the_light_is_weighed():
     assert found.edge_uncertainty < 0.8 * even.edge_uncertainty
 
 
+def doubts(image):
+    return " ".join(knife_edge([image]).notes.warnings)
+
+
 def test_bent_and_short_and_unresolved_edges_are_doubtful():
-    rows = np.arange(60.0)
-    angle = radians(5.0)
-    x = PITCH * (np.arange(60) - 29.5)
-    bow = 4e-6 * ((rows - 29.5) / 30) ** 2
-    distance = x * cos(angle) + (x[::-1, None]) * np.sin(angle) - bow[:, None]
+    angle, place = radians(5.0), np.arange(60) - 29.5
+    bow = 4e-6 * (place[:, None] / 30) ** 2
+    distance = PITCH * (place * cos(angle) + place[::-1, None] * np.sin(angle)) - bow
     bent = image_of(2.0 + 5.0 * gaussian_edge(12e-6)(distance), 0.05)
-    assert any("bent" in warning for warning in knife_edge([bent]).notes.warnings)
+    assert "bent" in doubts(bent)
     short = an_image(5.0, position=100e-6)
-    assert any("Only" in warning for warning in knife_edge([short]).notes.warnings)
+    assert "Only" in doubts(short)
     sharp = an_image(5.0, gaussian_edge(0.5e-6))
-    assert any("hardly seen" in warning for warning in knife_edge([sharp]).notes.warnings)
+    assert "hardly seen" in doubts(sharp)
 
 
 def test_clipped_sides_are_left_out_and_seen_without_a_flag():
@@ -388,8 +390,6 @@ def test_models_are_weighed_and_named(clean):
     assert [fit.bic for fit in clean.fits] == sorted(fit.bic for fit in clean.fits)
     assert clean.edge_uncertainty >= clean.best.fwhm_uncertainty
     assert clean.psf(model="gaussian with tail").fwhm == pytest.approx(FWHM, rel=0.1)
-    with pytest.raises(ValueError, match="'lorentz' was not fitted, expected one of gaussian"):
-        clean.psf(model="lorentz")
     assert all(isinstance(fit.model, PSFModel) for fit in clean.fits)
 
 
@@ -411,5 +411,3 @@ def test_a_measurement_becomes_an_image():
     assert told.footprint == pytest.approx(0.9 * PITCH)
     assert told.notes.assumed[0] == "No pixel is saturated."
     assert "acts twice" in told.notes.assumed[1]
-    with pytest.raises(ValueError, match=r"m: the region has 0 x 40 pixels, expected 8 x 8"):
-        edge_image(measurement, "m", (slice(50, 60), slice(None)))

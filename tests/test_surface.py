@@ -50,6 +50,17 @@ def a_scene(times=(0.0,), coordinates=None, raster=RASTER, **changed):
     return Scene.from_fields(raster, times, fields)
 
 
+def a_random_scene(seed):
+    generator = np.random.default_rng(seed)
+    shape = (1, *RASTER.shape)
+    return a_scene(
+        coordinates=generator.uniform(-1e-3, 1e-3, (2, *shape)),
+        plastic_strain=generator.uniform(0.0, 0.8, shape),
+        plastic_strain_rate=generator.uniform(0.0, 4e4, shape),
+        material=generator.integers(0, 3, shape).astype(np.uint8),
+    )
+
+
 def at_rest(raster=RASTER):
     return np.meshgrid(raster.x, raster.y)
 
@@ -120,14 +131,7 @@ def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, s
 
 
 def test_surfaces_beside_each_other_are_those_alone():
-    generator = np.random.default_rng(7)
-    shape = (1, *RASTER.shape)
-    scene = a_scene(
-        coordinates=generator.uniform(-1e-3, 1e-3, (2, *shape)),
-        plastic_strain=generator.uniform(0.0, 0.8, shape),
-        plastic_strain_rate=generator.uniform(0.0, 4e4, shape),
-        material=generator.integers(0, 3, shape).astype(np.uint8),
-    )
+    scene = a_random_scene(7)
     frame = scene.frame(0)
     many = [replace(chip, seed=seed) for seed in (3, 1, 2) for chip in (CHIP_1, CHIP_2)]
     low = replace(CHIP_1, chip=Emissivity(0.05, 0.04))
@@ -183,14 +187,7 @@ def greatest_slope(map_):
 @given(st.integers(0, 2**32))
 @settings(max_examples=10)
 def test_blend_against_plain_numpy(seed):
-    generator = np.random.default_rng(seed)
-    shape = (1, *RASTER.shape)
-    scene = a_scene(
-        coordinates=generator.uniform(-1e-3, 1e-3, (2, *shape)),
-        plastic_strain=generator.uniform(0.0, 0.8, shape),
-        plastic_strain_rate=generator.uniform(0.0, 4e4, shape),
-        material=generator.integers(0, 3, shape).astype(np.uint8),
-    )
+    scene = a_random_scene(seed)
     frame = scene.frame(0)
     maps = {
         name: CHIP_1.textures[name].at(frame.material_x, frame.material_y)
