@@ -268,47 +268,6 @@ def test_motion_blur_of_a_moving_step_is_a_ramp():
     np.testing.assert_allclose(measured, cold + fraction * (hot - cold), rtol=1e-6)
 
 
-def edge_response(order, fwhm, pitch, spacing=0.5e-6, columns=480):
-    """Where the pixels are from a knife edge, in order, and how much of its step they see.
-
-    The edge stands at every sample of one pixel in turn: a slanted edge.
-    """
-    distance, response = [], []
-    for edge in range(columns // 2, columns // 2 + round(pitch / spacing)):
-        temperature = np.where(np.arange(columns) < edge, 600.0, 1300.0)
-        scene = make_scene(np.broadcast_to(temperature, (1, 24, columns)), spacing=spacing)
-        camera = Camera(pitch=pitch, psf=GaussianPSF(fwhm), psf_order=order)
-        measured = camera.measure(scene, BLACK, 0.0)
-        low, high = camera.band.radiance(600.0), camera.band.radiance(1300.0)
-        distance.append(measured.raster.x - (scene.raster.left + spacing * edge))
-        response.append((measured.radiance[0, 1] - low) / (high - low))
-    ascending = np.argsort(np.concatenate(distance))
-    return np.concatenate(distance)[ascending], np.concatenate(response)[ascending]
-
-
-def gaussian_edge(x, fwhm):
-    return (1 + erf(2 * sqrt(log(2)) * x / fwhm)) / 2
-
-
-def test_knife_edge_with_the_optics_first():
-    fwhm, pitch = 14e-6, 6e-6
-    x, response = edge_response("optics", fwhm, pitch)
-    nodes, weights = np.polynomial.legendre.leggauss(12)
-    expected = gaussian_edge(x[:, None] + pitch / 2 * nodes, fwhm) @ weights / 2
-    # The kernel leaves out 1e-4 of the energy, and the samples have a width.
-    np.testing.assert_allclose(response, expected, atol=3e-4)
-
-
-def test_knife_edge_with_the_sensors_first():
-    fwhm, pitch = 14e-6, 6e-6
-    x, response = edge_response("detector", fwhm, pitch)
-    # Pixels see a ramp one pixel wide; the blur from pixel to pixel makes of it straight
-    # lines between the Gaussian's edge at the pixels' middles.
-    middles = pitch * (np.arange(-60, 60) + 0.5)
-    expected = np.interp(x, middles, gaussian_edge(middles, fwhm))
-    np.testing.assert_allclose(response, expected, atol=3e-4)
-
-
 @pytest.mark.parametrize("order", ["optics", "detector"])
 @pytest.mark.parametrize("psf", PSFS, ids=repr)
 def test_a_pixel_does_not_depend_on_how_many_others_are_read_out(psf, order):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import dblquad
 from scipy.ndimage import convolve
-from scipy.special import j1
+from scipy.special import erf, j1
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
 from chipglow.camera.optics.convolution import blur, images
@@ -236,3 +236,12 @@ def test_where_there_is_no_light_there_is_none_after_the_blur():
     radiance = np.zeros((60, 60))
     radiance[:, 40:] = 1e4
     assert (blur(radiance, GaussianPSF(4e-6), 1e-6)[:, :20] == 0).all()
+
+
+def test_knife_edge_of_a_gaussian():
+    spacing, psf = 0.5e-6, GaussianPSF(9e-6)
+    edge = np.where(np.arange(200) < 100, 0.0, 1.0) * np.ones((50, 1))
+    x = spacing * (np.arange(200) - 99.5)
+    expected = (1 + erf(x / (sqrt(2) * psf.fwhm / FWHM_PER_SIGMA))) / 2
+    # Exact for a field that is even within each sample.
+    np.testing.assert_allclose(blur(edge, psf, spacing)[25], expected, atol=1e-9)

@@ -12,16 +12,15 @@ import pytest
 import synthetic_laboratory
 import yaml
 from synthetic_laboratory import QUANTITIES, Evaluation, Laboratory, hits, kept, main
-from typer.testing import CliRunner
+from typed import typed
 
 from chipglow.camera import MeasuredPSF
-from chipglow.cli import app
 
 REPEATS = 7
-TYPED = ["--set", "flat_field.low=cold.hcc", "--set", "flat_field.high=hot.hcc"]
+TYPED = "--set flat_field.low=cold.hcc --set flat_field.high=hot.hcc --set bad_pixels=find"
+DEVELOPED = f"{TYPED} --set calibration=calibration.yaml --set 'pitch=6 um'"
+STACKED = f"{DEVELOPED} --set unit=counts --set 'interval=2 ms' --set saturation=4094"
 TYPED += ["--set", "bad_pixels=find"]
-DEVELOPED = [*TYPED, "--set", "calibration=calibration.yaml", "--set", "pitch=6 um"]
-STACKED = [*DEVELOPED, "--set", "unit=counts", "--set", "interval=2 ms", "--set", "saturation=4094"]
 
 
 @pytest.fixture(scope="module")
@@ -117,39 +116,30 @@ def test_the_same_seed_makes_the_same_files(tmp_path):
     assert files[0]["cold.hcc"] != files[2]["cold.hcc"]
 
 
-def typed(*arguments):
-    result = CliRunner().invoke(app, list(map(str, arguments)), env={"COLUMNS": "160"})
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
 @pytest.mark.slow
 def test_the_commands_find_the_same_as_the_functions(experiment, tmp_path):
     """What a user types on the same files: the numbers are those of `Evaluation`."""
     typed(
-        "calibrate", "points.csv", "--band", "3.8-5.1 um", "--common-uncertainty", "0.4 K",
-        "--integration-time", "10 us", *TYPED, "--out", "calibration.yaml",
-    )  # fmt: skip
-    heated = [f"heated-{number}.nc" for number in (1, 2, 3, 4)]
+        "calibrate points.csv --band '3.8-5.1 um' --common-uncertainty '0.4 K' "
+        f"--integration-time '10 us' {TYPED} --out calibration.yaml"
+    )
+    heated = [f"heated-{number}" for number in (1, 2, 3, 4)]
     for name in heated:
-        typed("convert", name.replace(".nc", ".hcc"), *DEVELOPED, "--out", name)
+        typed(f"convert {name}.hcc {DEVELOPED} --out {name}.nc")
     reading = yaml.safe_load((tmp_path / "notes.yaml").read_text())["thermocouple_degC"]
-    typed(
-        "emissivity", *heated, "--reference", f"{reading}degC", "--reference-uncertainty", "2 K",
-        "--reflected-uncertainty", "2 K", "--regions", "regions.yaml", "--out", "emissivity.nc",
-        "--table", "emissivity.csv",
-    )  # fmt: skip
-    chips = [f"chip-{number}.npy" for number in (1, 2, 3, 4)]
-    typed(
-        "temperature", *chips, "--regions", "regions.yaml", "--emissivity", "emissivity.nc",
-        "--calibration", "calibration.yaml", *STACKED, "--table", "temperature.csv",
-    )  # fmt: skip
-    typed("psf", "edge-1.npy", "edge-2.npy", *STACKED, "--out", "psf.nc")
+    spread = "--reference-uncertainty '2 K' --reflected-uncertainty '2 K'"
+    files = "--regions regions.yaml --out emissivity.nc --table emissivity.csv"
+    images = " ".join(f"{name}.nc" for name in heated)
+    typed(f"emissivity {images} --reference {reading}degC {spread} {files}")
+    chips = " ".join(f"chip-{number}.npy" for number in (1, 2, 3, 4))
+    known = "--regions regions.yaml --emissivity emissivity.nc --calibration calibration.yaml"
+    typed(f"temperature {chips} {known} {STACKED} --table temperature.csv")
+    typed(f"psf edge-1.npy edge-2.npy {STACKED} --out psf.nc")
     found = Evaluation(tmp_path).results()
     emissivity = {row["region"]: row for row in read("emissivity.csv")}
     temperature = {row["region"]: row for row in read("temperature.csv")}
-    for name, region in (("body", "body"), ("shear band", "shear band")):
-        expected = found[f"emissivity of the {name}"]
+    for region in ("body", "shear band"):
+        expected = found[f"emissivity of the {region}"]
         assert float(emissivity[region]["mean"]) == pytest.approx(expected.value, rel=1e-6)
         stated = float(emissivity[region]["expanded_uncertainty"])
         assert stated == pytest.approx(expected.expanded, rel=1e-4)
