@@ -265,19 +265,16 @@ def test_a_study_may_give_the_lower_limit_itself():
     assert Study(camera={"detector": "none"}).camera.build() == cam.Camera.paper()
 
 
-def scene(folder):
-    """A warm plate with a hot spot, three frames."""
-    raster = Raster(-60e-6, 60e-6, 2e-6, 60, 60)
-    spot = np.exp(-(raster.x**2 + raster.y[:, None] ** 2) / (20e-6) ** 2)
-    path = folder / "scene.nc"
-    frames = np.stack([620.0 + 60.0 * spot] * 3)
+PHOTON = {"kind": "photon", "quantum_efficiency": 0.8, "element": "15 um"}
+
+
+def looked_at(folder, kelvins, **camera):
+    """Errors in the middle of a plate of some temperatures, shape (60, 60)."""
+    raster, path = Raster(-60e-6, 60e-6, 2e-6, 60, 60), folder / "scene.nc"
+    frames = np.stack([kelvins] * 3)
     write_scene(Scene.from_fields(raster, [0.0, 10e-6, 20e-6], {"temperature": frames}), path)
-    return path
-
-
-def looked_at(folder, **camera):
     study = Study(
-        scene=str(scene(folder)),
+        scene=str(path),
         surface={"kind": "uniform", "emissivity": 0.9},
         camera={"psf": "none", **camera},
         analysis={"exposures": 1, "phases": 2, "points": {"spot": ["0 um", "0 um"]}},
@@ -288,26 +285,23 @@ def looked_at(folder, **camera):
 def test_the_errors_of_a_scene_have_the_noise_of_each_draw(undrawn, tmp_path):
     """Pixel phases differ by their noise too; the same study gives the same numbers again."""
     section = {
-        "response": {
-            "kind": "photon",
-            "quantum_efficiency": 0.8,
-            "element": "15 um",
-            "f_number": 4.0,
-        },
+        "response": PHOTON | {"f_number": 4.0},
         "full_well": 7e6,
         "bits": 14,
         "terms": [{"kind": "shot-noise"}, {"kind": "read-noise", "standard_deviation": 6000.0}],
     }
+    place = 2e-6 * (np.arange(60) - 29.5)
+    spot = 620.0 + 60.0 * np.exp(-(place**2 + place[:, None] ** 2) / (20e-6) ** 2)
     quiet, noisy, again = (
-        looked_at(tmp_path, detector=detector, lower_limit="none")
+        looked_at(tmp_path, spot, detector=detector, lower_limit="none")
         for detector in ("none", section, section)
     )
 
-    def spot(result):
-        return headline(result.data, "spot, pixel").error.values
-
-    np.testing.assert_array_equal(spot(noisy), spot(again))
-    noise = (spot(noisy) - spot(quiet)).ravel()
+    was, same, without = (
+        headline(result.data, "spot, pixel").error.values for result in (noisy, again, quiet)
+    )
+    np.testing.assert_array_equal(was, same)
+    noise = (was - without).ravel()
     assert np.unique(noise).size == 4
     calibration = noisy.camera.calibration(noisy.camera.pixels(noisy.raster).shape)
     assert np.abs(noise).max() < 5 * calibration.netd(600.0)
@@ -344,19 +338,11 @@ def test_the_netd_is_at_least_that_of_rounding():
 
 
 def test_the_answer_says_where_the_camera_is_saturated(tmp_path):
-    hot = Raster(left=-60e-6, top=60e-6, spacing=2e-6, rows=60, columns=60)
-    path = tmp_path / "hot.nc"
-    write_scene(Scene.from_fields(hot, [0.0], {"temperature": np.full((1, 60, 60), 900.0)}), path)
     said = {}
     for hottest in ("350 degC", "900 degC"):
         response = {"kind": "range", "hottest": hottest}
-        study = Study(
-            scene=str(path),
-            surface={"kind": "uniform", "emissivity": 1.0},
-            camera={"detector": {"response": response, "bits": 14}, "psf": None},
-            analysis={"points": {"here": ("0 um", "0 um")}, "phases": 2, "exposures": 1},
-        )
-        facts = Facts(errors(study))
+        detector = {"response": response, "bits": 14}
+        facts = Facts(looked_at(tmp_path, np.full((60, 60), 900.0), detector=detector))
         rows = all_rows(facts)["errors"]
         said[hottest] = answer(facts, rows)[0].text, " ".join(changes(facts, rows))
         assert f"to {hottest.split()[0]} °C" in facts.settings["Range"]
