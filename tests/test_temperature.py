@@ -404,7 +404,7 @@ def write_lines(maps, rows):
         ((HEATING.reference,), "391 °C at which its emissivity was determined", True),
         ((HOT - 20.0,), "580 °C at which its emissivity was determined", False),
         ((560.0, 660.0), "287 °C to 387 °C", True),
-        (HEATED, "327 °C to 527 °C", False),
+        ((800.0, 900.0), "527 °C to 627 °C", False),
     ],
 )
 def test_an_emissivity_of_other_temperatures_is_doubtful(temperatures, range_, doubtful):
