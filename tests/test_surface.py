@@ -144,11 +144,8 @@ def test_surfaces_beside_each_other_are_those_alone():
 
 
 def test_same_seed_same_maps_and_each_feature_its_own():
-    first, again, other = (
-        CHIP_1.textures,
-        replace(CHIP_1).textures,
-        replace(CHIP_1, seed=2).textures,
-    )
+    again, other = replace(CHIP_1), replace(CHIP_1, seed=2)
+    first, again, other = (chip.textures for chip in (CHIP_1, again, other))
     for name in first:
         np.testing.assert_array_equal(first[name].nodes, again[name].nodes)
         assert not np.array_equal(first[name].nodes, other[name].nodes)
@@ -234,27 +231,22 @@ def test_texture_moves_with_the_material(feature, follow):
     across, up = 3, 0 if feature == "workpiece" else 2
     step, times = RASTER.spacing, np.array([0.0, 1e-6, 2e-6, 3e-6])
     velocity = (across * step / 1e-6, up * step / 1e-6)
-    x, y = at_rest()
-    coordinates = [
-        grid - speed * times[:, None, None] for grid, speed in zip((x, y), velocity, strict=True)
-    ]
-    strain, rate = STATES[feature]
-    scene = a_scene(
-        times,
-        coordinates,
-        plastic_strain=strain,
-        plastic_strain_rate=rate,
-        velocity_x=velocity[0],
-        velocity_y=velocity[1],
-    )
+    pairs = zip(at_rest(), velocity, strict=True)
+    coordinates = [grid - speed * times[:, None, None] for grid, speed in pairs]
+    names = ("plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+    state = dict(zip(names, (*STATES[feature], *velocity), strict=True))
+    scene = a_scene(times, coordinates, **state)
     field = replace(CHIP_1, follow=follow).prepare(scene)
     first, *_, last = (field.emissivity(frame) for frame in scene.frames())
     down, right = RASTER.rows - 3 * up, RASTER.columns - 3 * across
     # Positions in float32 are good to 1e-11 m, and the texture changes by 0.01 a micrometre.
-    np.testing.assert_allclose(
-        last[:down, 3 * across :], first[3 * up :, :right], rtol=0, atol=2e-6
-    )
+    moved, still = last[:down, 3 * across :], first[3 * up :, :right]
+    np.testing.assert_allclose(moved, still, rtol=0, atol=2e-6)
     assert first.std() > 0.01
+
+
+def mean_shift(scene):
+    return replace(CHIP_1, follow="mean").prepare(scene).bare.shift
 
 
 def test_mean_shift_is_velocity_times_time():
@@ -268,28 +260,25 @@ def test_mean_shift_is_velocity_times_time():
         velocity_x=np.where(upper, np.where(middle, 2.0, 1.0), 4.0),
         velocity_y=np.where(upper, np.where(middle, 1.5, 3.0), 0.5),
     )
-    field = replace(CHIP_1, follow="mean").prepare(scene)
+    shift = mean_shift(scene)
     velocity = np.array([[4.0, 0.0], [1.0, 3.0], [2.0, 1.5]])
     for time in (0.0, 0.4e-6, 2e-6, 4e-6):
-        np.testing.assert_allclose(field.bare.shift(time), velocity * time, rtol=1e-6, atol=1e-18)
+        np.testing.assert_allclose(shift(time), velocity * time, rtol=1e-6, atol=1e-18)
 
 
 def test_mean_shift_integrates_a_changing_velocity():
     times = np.linspace(0.0, 4e-6, 5)
     speed = 2.0 + 1e6 * times
-    scene = a_scene(times, velocity_x=speed[:, None, None])
-    field = replace(CHIP_1, follow="mean").prepare(scene)
+    found = mean_shift(a_scene(times, velocity_x=speed[:, None, None]))(4e-6)
     # The trapezoidal rule is exact for a velocity that rises linearly.
-    np.testing.assert_allclose(field.bare.shift(4e-6)[0], [2.0 * 4e-6 + 0.5e6 * 4e-6**2, 0.0])
-    np.testing.assert_array_equal(field.bare.shift(4e-6)[1:], 0.0)
+    np.testing.assert_allclose(found, [[2.0 * 4e-6 + 0.5e6 * 4e-6**2, 0.0], [0.0] * 2, [0.0] * 2])
 
 
 def test_a_feature_keeps_its_velocity_while_it_is_not_seen():
     times = np.array([0.0, 1e-6, 2e-6])
     rate = np.array([5e4, 0.0, 5e4])[:, None, None]
     scene = a_scene(times, plastic_strain=0.9, plastic_strain_rate=rate, velocity_y=3.0)
-    field = replace(CHIP_1, follow="mean").prepare(scene)
-    np.testing.assert_allclose(field.bare.shift(2e-6)[2], [0.0, 6e-6])
+    np.testing.assert_allclose(mean_shift(scene)(2e-6)[2], [0.0, 6e-6])
 
 
 def test_a_uniform_surface_is_black_but_for_the_void():
