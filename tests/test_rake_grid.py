@@ -73,6 +73,7 @@ def test_squares_on_the_pixels_are_plain_means_of_nine():
         assert abs(grid.standard_deviation[0, m, n] - square.std(ddof=1)) < EXACT
     np.testing.assert_allclose(grid.along[:2], [9e-6, 27e-6])
     np.testing.assert_allclose(grid.depth, 18e-6 * (np.arange(5) + 0.5))
+    np.testing.assert_allclose(grid.corners()[2, 5] - foot, [-36e-6, 90e-6], atol=1e-12)
 
 
 @pytest.mark.parametrize("flag", [Flag.UNDER_RANGE, Flag.SATURATED, Flag.DEAD])
