@@ -20,7 +20,6 @@ REPEATS = 7
 TYPED = "--set flat_field.low=cold.hcc --set flat_field.high=hot.hcc --set bad_pixels=find"
 DEVELOPED = f"{TYPED} --set calibration=calibration.yaml --set 'pitch=6 um'"
 STACKED = f"{DEVELOPED} --set unit=counts --set 'interval=2 ms' --set saturation=4094"
-TYPED += ["--set", "bad_pixels=find"]
 
 
 @pytest.fixture(scope="module")
