@@ -187,6 +187,27 @@ def test_full_well_and_digitiser_end_the_counts():
     assert filled.conversion_gain == pytest.approx((16383 - 400) / 1e6)
 
 
+def test_the_photon_transfer_curve_gives_gain_and_read_noise_back():
+    """EMVA 1288, 6.6: the slope of the variance over the mean is the gain, at no light the dark."""
+    gain, read = 0.02, 400.0
+    made = detector(cam.ShotNoise(), cam.ReadNoise(read), gain=gain, offset=100.0, bits=14)
+    means, variances = [], []
+    levels = np.linspace(0.0, 7e5, 15)
+    for i, electrons in enumerate(levels):
+        # Two frames each, as the standard measures: what is fixed falls out of the difference.
+        first, second = frames(made, electrons, 2, (300, 300), seed=i)
+        means.append((first.mean() + second.mean()) / 2)
+        variances.append(np.mean((first - second) ** 2) / 2)
+    dark_mean, dark_variance = means[0], variances[0]
+    slope, offset = np.polyfit(np.array(means) - dark_mean, variances, 1)
+    # Each variance is of 90 000 differences: √(2/90 000) = 0.5 %; of 15 levels the slope is
+    # within 0.3 %, and three times that is allowed.
+    assert slope == pytest.approx(gain, rel=0.01)
+    found = np.sqrt((dark_variance - 1 / 12) / slope**2)
+    assert found == pytest.approx(read, rel=0.02)
+    assert offset == pytest.approx(gain**2 * read**2 + 1 / 12, abs=0.05 * max(variances))
+
+
 def test_the_order_of_the_list_does_not_matter():
     terms = (
         cam.ReadNoise(5.0),

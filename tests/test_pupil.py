@@ -1,6 +1,6 @@
 """Point spread functions of a pupil against closed forms and an independent Hankel transform."""
 
-from math import pi, sqrt
+from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
@@ -101,6 +101,24 @@ def test_defocus_and_spherical_aberration(obscuration, defocus, zernike):
     own = slice(middle - half, middle + half + 1)
     # A pupil of 256 samples across: the error falls with the square of their size.
     assert variation(kernel[own, own], radial_kernel(psf, spacing, half)) < 5e-4
+
+
+def density_in_the_middle(psf):
+    step = CUTOFF / 24
+    frequency = step * np.arange(-24, 25)
+    return psf.transfer(frequency, frequency[:, None]).real.sum()
+
+
+def test_strehl_ratio_of_small_aberrations():
+    perfect = density_in_the_middle(pupil())
+    for indices in ((5,), (8,), (11,), (6, 7, 12)):
+        rms = 0.04 * WAVELENGTH / sqrt(len(indices))
+        psf = pupil(zernike=tuple((index, rms) for index in indices))
+        phase = 2 * pi * 0.04
+        # Maréchal: 1 − φ² but for φ⁴, and coefficients add as their squares.
+        ratio = density_in_the_middle(psf) / perfect
+        assert ratio == pytest.approx(exp(-(phase**2)), abs=phase**4)
+        assert ratio < 1 - 0.9 * phase**2
 
 
 def test_coma_moves_the_light_by_the_mean_slope():
