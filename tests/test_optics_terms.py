@@ -8,6 +8,7 @@ import pytest
 from scipy.special import ndtr
 
 from chipglow import camera as cam
+from chipglow.camera.optics.sampling import integrate, whole_raster
 from chipglow.scene import Raster
 from chipglow.study import Study, load_study, study_text
 
@@ -26,6 +27,28 @@ def even(kelvins):
 
 def rough():
     return np.random.default_rng(1).uniform(0.0, 900.0, SCENE.shape)
+
+
+@pytest.mark.parametrize("order", ["optics", "detector"])
+@pytest.mark.parametrize("psf", [None, cam.AnnularAperturePSF()], ids=repr)
+def test_without_terms_it_is_the_camera_without_them(order, psf):
+    camera = cam.Camera(psf=psf, psf_order=order, shape=(60, 70), offset=(30e-6, 24e-6))
+    radiance = rough()
+    sensors = camera.pixels(SCENE)
+    if psf is None:
+        expected = integrate(radiance, SCENE, sensors, 1.0)
+    elif order == "optics":
+        expected = integrate(cam.blur(radiance, psf, SCENE.spacing), SCENE, sensors, 1.0)
+    else:
+        whole, own = whole_raster(SCENE, sensors)
+        expected = cam.blur(integrate(radiance, SCENE, whole, 1.0), psf, camera.pitch)[own]
+    found = camera.form_image(radiance, SCENE)
+    if psf is not None and order == "optics":
+        # The pixels' sums are taken before the last transform: rounding.
+        np.testing.assert_allclose(found, expected, rtol=1e-13)
+    else:
+        np.testing.assert_array_equal(found, expected)
+    assert camera.optics == ()
 
 
 def test_an_element_in_the_calibration_and_one_that_is_not():
