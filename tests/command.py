@@ -1,6 +1,7 @@
 """The command line in this process, and a disk that fills up."""
 
 import resource
+import shlex
 from contextlib import contextmanager
 
 from typer.testing import CliRunner
@@ -13,6 +14,23 @@ def chipglow(*arguments, code=0, **environment):
     result = CliRunner().invoke(app, [str(one) for one in arguments], env=environment)
     assert result.exit_code == code, result.output
     return result
+
+
+def typed(command, code=0):
+    """What a command line prints, which must end with this code."""
+    return chipglow(*shlex.split(command), code=code, COLUMNS="160")
+
+
+def words(text):
+    """A text without the breaks of its lines."""
+    return " ".join(text.split())
+
+
+def refusal(command):
+    """The one line with which a command line ends that is refused."""
+    lines = typed(command, code=2).output.strip().splitlines()
+    assert [line for line in lines if line.startswith("chipglow: ")] == lines[-1:]
+    return lines[-1]
 
 
 def refused(arguments, *parts, code=2):

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from command import typed
 from hypothesis import given, settings, strategies as st
 from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
-from typed import typed
 
 from chipglow.camera import Flag, Measurement
 from chipglow.io import read_measurement, write_measurement

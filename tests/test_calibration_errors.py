@@ -6,8 +6,8 @@ from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
+from command import typed
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
-from typed import typed
 
 from chipglow.camera import LinearCalibration, Measurement, SakumaHattori, fit_calibration
 from chipglow.io import read_measurement, write_measurement

@@ -7,11 +7,11 @@ from math import erf, hypot, sqrt
 
 import numpy as np
 import pytest
+from command import typed
 from hypothesis import given, strategies as st
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from PIL import Image
 from scipy.ndimage import gaussian_filter
-from typed import typed
 
 from chipglow.camera import Flag, Measurement
 from chipglow.io import write_measurement

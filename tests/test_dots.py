@@ -5,12 +5,12 @@ from math import pi, radians
 
 import numpy as np
 import pytest
+from command import typed, words
 from dot_target import DotTarget
 from hypothesis import given, settings, strategies as st
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f
-from typed import typed, words
 
 from chipglow.camera import Measurement
 from chipglow.io import write_measurement

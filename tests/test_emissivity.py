@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 import xarray as xr
 import yaml
+from command import typed
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from hypothesis import given, settings, strategies as st
-from typed import typed
 
 from chipglow.camera import CalibrationErrors, Camera, Flag
 from chipglow.io import write_measurement

@@ -5,8 +5,8 @@ from math import degrees, radians
 import numpy as np
 import pytest
 import xarray as xr
+from command import typed
 from seen_chip import BAND, FLOOR, look, noisy
-from typed import typed
 
 from chipglow.camera import Measurement
 from chipglow.io import write_measurement

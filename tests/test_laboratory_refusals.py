@@ -7,6 +7,7 @@ import measured_band
 import numpy as np
 import pytest
 import xarray as xr
+from command import refusal
 from heated_chip import RASTER, REGIONS, table_1
 from measured_band import TOOL, BandImage
 from PIL import Image
@@ -17,7 +18,6 @@ from synthetic_edge import (
     image_of,
     measurement_of,
 )
-from typed import refused
 
 from chipglow.camera import Flag, Measurement
 from chipglow.io import write_measurement
@@ -343,7 +343,7 @@ COMMANDS = {
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_refuses_in_one_line_and_writes_nothing(folder, command):
     before = sorted(folder.iterdir())
-    assert COMMANDS[command] in refused(command)
+    assert COMMANDS[command] in refusal(command)
     assert sorted(folder.iterdir()) == before
 
 
@@ -360,7 +360,7 @@ def test_a_command_refuses_in_one_line_and_writes_nothing(folder, command):
 )
 def test_a_table_of_points_that_is_none_is_refused(folder, text, expected):
     (folder / "bad.csv").write_text(text)
-    assert expected in refused(f"{REGISTER} --points bad.csv")
+    assert expected in refusal(f"{REGISTER} --points bad.csv")
 
 
 @pytest.mark.parametrize(

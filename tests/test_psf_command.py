@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from command import typed
 from synthetic_edge import (
     BAND,
     annular_edge,
@@ -12,7 +13,6 @@ from synthetic_edge import (
     measurement_of,
     tailed_edge,
 )
-from typed import typed
 
 from chipglow.camera import Flag, MeasuredPSF
 from chipglow.io import write_measurement

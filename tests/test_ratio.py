@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from analytic_chip import AnalyticChip
+from command import refusal, typed
 from figure6 import figure_6
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import simpson
 from scipy.optimize import brentq
-from typed import refused, typed
 
 from chipglow import camera as cam
 from chipglow.analysis import (
@@ -432,6 +432,6 @@ def test_the_command_reads_a_users_points(tmp_path, monkeypatch):
     assert (frame.draws == 2).all()
     assert (tmp_path / "bands.png").stat().st_size > 10_000
     (tmp_path / "study.yaml").write_text(text % "")
-    said = refused("wavelengths study.yaml")
+    said = refusal("wavelengths study.yaml")
     assert "scene.nc: No rake face is read" in said
     assert "Expected points to read (analysis.points)" in said

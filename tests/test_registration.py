@@ -5,11 +5,11 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 from camera_files import cine
+from command import refusal, typed, words
 from dual_spectrum import DualSpectrum
 from hypothesis import given, settings, strategies as st
 from PIL import Image
 from scipy.stats import f, t
-from typed import refused, typed, words
 
 from chipglow.camera import Measurement
 from chipglow.io import read_measurement, write_measurement
@@ -302,7 +302,7 @@ def test_the_command_aligns_the_clocks(folder):
     pages = [Image.fromarray(page.astype(np.uint8)).resize((120, 80)) for page in values]
     pages[0].save("visible.tif", save_all=True, append_images=pages[1:])
     command = f"register infrared.nc visible.tif --points points.csv {ALIGN}"
-    assert "--visible-interval" in refused(command)
+    assert "--visible-interval" in refusal(command)
     result = typed(f"{command} --visible-interval '200 us'")
     assert "Assumed: A visible exposure lasts as long as its frame, 200 us." in result.stderr
     assert "Assumed" not in result.stdout

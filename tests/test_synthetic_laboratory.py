@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 import synthetic_laboratory
 import yaml
+from command import typed
 from synthetic_laboratory import QUANTITIES, Evaluation, Laboratory, hits, kept, main
-from typed import typed
 
 from chipglow.camera import MeasuredPSF
 

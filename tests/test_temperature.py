@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from command import typed, words
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
-from typed import typed, words
 
 from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement, fit_calibration
 from chipglow.io import write_measurement

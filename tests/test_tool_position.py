@@ -6,10 +6,10 @@ from math import degrees, hypot, radians
 import numpy as np
 import pytest
 import xarray as xr
+from command import typed
 from hypothesis import given, settings, strategies as st
 from measured_band import RASTER, TOOL, measured
 from seen_chip import look, noisy
-from typed import typed
 
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, find_tool, rake_grid
