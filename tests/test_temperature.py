@@ -128,7 +128,7 @@ def test_few_images_widen_the_interval():
 
 
 def test_an_uncertain_emissivity_has_an_asymmetric_interval():
-    found = true_temperature([image()], WHOLE, EmissivityLine.constant(0.42, 0.08))
+    found = em.true_temperature([image()], WHOLE, em.EmissivityLine.constant(0.42, 0.08))
     # The temperature falls with the emissivity, so quantiles are those of the emissivity.
     ends = 0.42 - 0.08 * 1.959964, 0.42 + 0.08 * 1.959964
     radiance = BAND.radiance(np.array([HOT, ROOM]))
@@ -139,7 +139,7 @@ def test_an_uncertain_emissivity_has_an_asymmetric_interval():
     # The interval is stable to half a unit of the second digit of u, here 0.5 K.
     assert (found.distribution.low, found.distribution.high) == pytest.approx((low, high), abs=1.0)
     assert not found.distribution.validates(found.estimate)
-    exact = true_temperature([image()], WHOLE, EmissivityLine.constant(0.42, 0.005))
+    exact = em.true_temperature([image()], WHOLE, em.EmissivityLine.constant(0.42, 0.005))
     assert exact.distribution.validates(exact.estimate)
 
 
