@@ -10,15 +10,9 @@ from pathlib import Path
 import numpy as np
 
 import chipglow
-from chipglow.laboratory.chip import (
-    band_profile,
-)
+from chipglow.laboratory.chip import band_profile
 from chipglow.laboratory.chip.figures import draw_band_profile
-from chipglow.laboratory.comparison import (
-    Comparison,
-    StatedUncertainties,
-    compare,
-)
+from chipglow.laboratory.comparison import Comparison, StatedUncertainties, compare
 from chipglow.laboratory.comparison.figure import draw_comparison
 
 HERE = Path(__file__).parent

@@ -7,10 +7,7 @@ import numpy as np
 
 from chipglow.camera import Measurement
 from chipglow.io import open_scene
-from chipglow.laboratory.chip import (
-    find_tool,
-    rake_grid,
-)
+from chipglow.laboratory.chip import find_tool, rake_grid
 from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.study import Study, cut
 

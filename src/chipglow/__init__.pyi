@@ -56,18 +56,13 @@ from .io import (
     write_measurement as write_measurement,
     write_scene as write_scene,
 )
-from .io.cameras import (
-    read_recording as read_recording,
-    write_hcc as write_hcc,
-)
+from .io.cameras import read_recording as read_recording, write_hcc as write_hcc
 from .laboratory.chip import (
     band_profile as band_profile,
     find_tool as find_tool,
     rake_grid as rake_grid,
 )
-from .laboratory.comparison import (
-    compare as compare,
-)
+from .laboratory.comparison import compare as compare
 from .laboratory.emissivity import (
     Heating as Heating,
     determine_emissivity as determine_emissivity,
@@ -75,9 +70,7 @@ from .laboratory.emissivity import (
     read_emissivity_map as read_emissivity_map,
     true_temperature as true_temperature,
 )
-from .laboratory.measurement import (
-    load_measurement as load_measurement,
-)
+from .laboratory.measurement import load_measurement as load_measurement
 from .laboratory.psf import (
     edge_image as edge_image,
     knife_edge as knife_edge,
@@ -91,23 +84,10 @@ from .laboratory.registration import (
     load_registration as load_registration,
     simultaneous_frames as simultaneous_frames,
 )
-from .quantities import (
-    Parameter as Parameter,
-    Quantity as Quantity,
-)
-from .radiometry import (
-    Band as Band,
-    RatioThermometer as RatioThermometer,
-)
-from .report import (
-    write_report as write_report,
-)
-from .scene import (
-    Raster as Raster,
-    Scene as Scene,
-    ToolGeometry as ToolGeometry,
-    areas as areas,
-)
+from .quantities import Parameter as Parameter, Quantity as Quantity
+from .radiometry import Band as Band, RatioThermometer as RatioThermometer
+from .report import write_report as write_report
+from .scene import Raster as Raster, Scene as Scene, ToolGeometry as ToolGeometry, areas as areas
 from .study import (
     Study as Study,
     cut as cut,
@@ -124,8 +104,6 @@ from .surface import (
     MapSurface as MapSurface,
     UniformSurface as UniformSurface,
 )
-from .uncertainty import (
-    Estimate as Estimate,
-)
+from .uncertainty import Estimate as Estimate
 
 __version__: str

@@ -48,9 +48,7 @@ def looked_at(source, settings, study):
 # Eight frames of a melt pool from above, 5 µs apart, and a camera of InGaAs:
 
 pool = looked_at(
-    "pool_*.vtu",
-    ["units.length=um", "interval=5 us", "field_of_view.spacing=2 um"],
-    "pool.yaml",
+    "pool_*.vtu", ["units.length=um", "interval=5 us", "field_of_view.spacing=2 um"], "pool.yaml"
 )
 with style():
     figure = error_images(pool)

@@ -40,9 +40,5 @@ figure = draw_comparison(result)
 # %%
 # The sentences that ``chipglow compare`` prints:
 
-for text in (
-    *result.sentences,
-    result.statement,
-    *result.notes.warnings,
-):
+for text in (*result.sentences, result.statement, *result.notes.warnings):
     print(text)

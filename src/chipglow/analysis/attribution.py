@@ -61,7 +61,7 @@ class AttributionPlan(Part):
         tuple[str, ...],
         Parameter(
             "Effects: any of " + ", ".join(EFFECTS) + ", or the kind of a term of the camera's "
-            "optics or detector; the others form a group. Empty: all that the camera has.",
+            "optics or detector; the others form a group. Empty: all that the camera has."
         ),
     ] = ()
     reference: Annotated[
@@ -289,11 +289,7 @@ class _Model:
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        sources: _Sources,
-        plan: AttributionPlan,
-        check: Check | None = None,
+        self, camera: Camera, sources: _Sources, plan: AttributionPlan, check: Check | None = None
     ) -> None:
         self.check = check
         seen = sources.exposures[0]

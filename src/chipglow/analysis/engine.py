@@ -10,14 +10,7 @@ import numpy as np
 import xarray as xr
 
 from chipglow.analysis.attribution import attribute, read_attribution
-from chipglow.analysis.cut import (
-    Cut,
-    Progress,
-    cutting_forces,
-    find_cut,
-    lacking,
-    spread_starts,
-)
+from chipglow.analysis.cut import Cut, Progress, cutting_forces, find_cut, lacking, spread_starts
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect

@@ -76,12 +76,7 @@ def heated_objects(
     """
     # The laboratory's camera has neither the cut's range nor a detector that may saturate.
     oven = replace(
-        camera,
-        lower_limit=None,
-        reflected=LABORATORY,
-        shape=None,
-        offset=(0.0, 0.0),
-        detector=None,
+        camera, lower_limit=None, reflected=LABORATORY, shape=None, offset=(0.0, 0.0), detector=None
     )
     known = {name: s for name, s in surfaces.items() if isinstance(s, FeatureSurface)}
     width = max(band_width, camera.pitch)

@@ -115,10 +115,7 @@ class Looked:
                     self._read_scene((number, i), place, index, images.exposure, noisy[0])
                 others = enumerate(schedule.vary if texture == 0 else (), 1)
                 kept = [noisy[phase] for phase in schedule.varied_phases]
-                looks = [
-                    *product([(0, None)], enumerate(noisy)),
-                    *product(others, enumerate(kept)),
-                ]
+                looks = [*product([(0, None)], enumerate(noisy)), *product(others, enumerate(kept))]
                 for step, ((case, change), (phase, camera)) in enumerate(looks):
                     progress((finished + step / len(looks)) / textures)
                     changed = change(camera) if change else camera

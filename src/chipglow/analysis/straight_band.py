@@ -100,11 +100,7 @@ def read_straight_band(camera: Camera, emissivity: float, band: StraightBand) ->
 
 
 def band_chart(
-    camera: Camera,
-    emissivity: float,
-    band: StraightBand,
-    widths: ArrayLike,
-    rises: ArrayLike,
+    camera: Camera, emissivity: float, band: StraightBand, widths: ArrayLike, rises: ArrayLike
 ) -> xr.Dataset:
     """Return the `READINGS` over widths (m) and rises (K) of a band that is otherwise the same."""
     axes = np.asarray(widths, np.float64), np.asarray(rises, np.float64)

@@ -26,15 +26,7 @@ from chipglow.scene import Material, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
 
-CAUSES: Final = (
-    "emissivity",
-    "motion",
-    "footprint",
-    "optics",
-    "misregistration",
-    "delay",
-    "noise",
-)
+CAUSES: Final = ("emissivity", "motion", "footprint", "optics", "misregistration", "delay", "noise")
 """Causes of the error in the order in which they are added."""
 
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
@@ -358,8 +350,7 @@ def _draws(
         _compared(plan, cameras, bands, truth, local, pixels, at_centres) for bands in plan.ratios
     ]
     return xr.concat(compared, "ratio").assign(
-        truth=("draw", at_centres(truth)),
-        radiance=(("band", "draw"), np.stack(pixels)[:, _FORMED]),
+        truth=("draw", at_centres(truth)), radiance=(("band", "draw"), np.stack(pixels)[:, _FORMED])
     )
 
 
@@ -380,10 +371,7 @@ def _compared(
     if len(bands) > 1:
         thermometer = plan.thermometer(bands)
         on_samples = in_pixels = thermometer.temperature
-        gain, uncertainty = (
-            1 / thermometer.sensitivity(own),
-            thermometer.uncertainty(own),
-        )
+        gain, uncertainty = (1 / thermometer.sensitivity(own), thermometer.uncertainty(own))
     else:
         band, environment = first.band, surroundings_radiance(first.band, first.reflected)
         emissivity = (local[bands[0]][0] - environment) / (band.radiance(truth) - environment)
@@ -421,10 +409,7 @@ def _by_emissivity(band: Band, environment: float, emissivity: Array, radiance: 
 
 
 def _of_place(
-    name: str,
-    parts: Sequence[xr.Dataset],
-    cameras: Sequence[Camera],
-    plan: WavelengthPlan,
+    name: str, parts: Sequence[xr.Dataset], cameras: Sequence[Camera], plan: WavelengthPlan
 ) -> xr.Dataset:
     """Return all draws of a place but those without material at the pixel's centre."""
     data = xr.concat(parts, "draw").dropna("draw", subset=["truth"])

@@ -88,10 +88,7 @@ from chipglow.camera.optics.psf import (
     PointSpreadFunction as PointSpreadFunction,
     PSFChoice as PSFChoice,
 )
-from chipglow.camera.optics.pupil import (
-    Pupil as Pupil,
-    PupilPSF as PupilPSF,
-)
+from chipglow.camera.optics.pupil import Pupil as Pupil, PupilPSF as PupilPSF
 from chipglow.camera.optics.terms import (
     OPTICS_TERMS as OPTICS_TERMS,
     Distortion as Distortion,
@@ -105,7 +102,4 @@ from chipglow.camera.ratio_camera import (
     RatioCamera as RatioCamera,
     RatioMeasurement as RatioMeasurement,
 )
-from chipglow.camera.recording import (
-    PlanckConversion as PlanckConversion,
-    Recording as Recording,
-)
+from chipglow.camera.recording import PlanckConversion as PlanckConversion, Recording as Recording

@@ -70,8 +70,7 @@ class Camera(Part):
         default_factory=lambda: Band(3.8e-6, 5.1e-6)
     )
     pitch: Annotated[
-        float,
-        Parameter("Distance between pixels on the scene.", LENGTH, over=0.0, most=1e-2),
+        float, Parameter("Distance between pixels on the scene.", LENGTH, over=0.0, most=1e-2)
     ] = 6e-6
     shape: Annotated[
         tuple[int, int] | None,
@@ -88,11 +87,7 @@ class Camera(Part):
     ] = (0.0, 0.0)
     fill_factor: Annotated[
         float,
-        Parameter(
-            "Sensitive fraction of the pixel area, a centred square.",
-            over=0.0,
-            most=1.0,
-        ),
+        Parameter("Sensitive fraction of the pixel area, a centred square.", over=0.0, most=1.0),
     ] = 1.0
     psf: Annotated[
         PointSpreadFunction | None,

@@ -61,10 +61,7 @@ class RatioCamera(Part):
             "look on the scene, though they are taken to look at the same places."
         ),
     ] = (0.0, 0.0)
-    delay: Annotated[
-        float,
-        Parameter("Delay of the second channel's integration.", INSTANT),
-    ] = 0.0
+    delay: Annotated[float, Parameter("Delay of the second channel's integration.", INSTANT)] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

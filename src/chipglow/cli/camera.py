@@ -40,7 +40,7 @@ def calibrate(
         float | None,
         opt.kelvins(
             "Standard uncertainty common to all blackbody temperatures, e.g. '0.5 K' from the "
-            "certificate.",
+            "certificate."
         ),
     ] = None,
     emissivity: Annotated[
@@ -50,8 +50,7 @@ def calibrate(
         float, opt.value("NUMBER", "Standard uncertainty of the emissivity.")
     ] = 0.0,
     surroundings: Annotated[
-        float | None,
-        opt.temperature("Temperature that the blackbody reflects. Default: 20 degC."),
+        float | None, opt.temperature("Temperature that the blackbody reflects. Default: 20 degC.")
     ] = None,
     integration_time: Annotated[
         float | None, opt.duration("Integration time, e.g. '10 us'.")

@@ -25,7 +25,7 @@ def rake(
         float | None,
         opt.length(
             "Standard uncertainty of the tool's position along and across its face. Default: that "
-            "of a found tool, otherwise none.",
+            "of a found tool, otherwise none."
         ),
     ] = None,
     out: Annotated[Path | None, opt.table("Write the squares of every frame")] = None,
@@ -107,7 +107,7 @@ def shearband(
         float | None,
         opt.length(
             "Standard uncertainty of the curve's position. Default: that of a pixel, its side / "
-            "√12, and that of the edge of a found tool.",
+            "√12, and that of the edge of a found tool."
         ),
     ] = None,
     out: Annotated[Path | None, opt.table("Write the temperatures along the band")] = None,

@@ -35,18 +35,17 @@ def compare(
         float | None,
         opt.kelvins(
             "Standard uncertainty of the measured radiance temperatures, e.g. '10 K', if the "
-            "measurement does not state it.",
+            "measurement does not state it."
         ),
     ] = None,
     emissivity_uncertainty: Annotated[
-        float,
-        opt.value("FRACTION", "Relative standard uncertainty of the simulated emissivities."),
+        float, opt.value("FRACTION", "Relative standard uncertainty of the simulated emissivities.")
     ] = 0.0,
     position: Annotated[
         float | None,
         opt.length(
             "Standard uncertainty of positions in the measured image. Default: that of a found "
-            "tool and of a pixel, its side / √12.",
+            "tool and of a pixel, its side / √12."
         ),
     ] = None,
     out: Annotated[

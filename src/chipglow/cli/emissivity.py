@@ -17,7 +17,7 @@ def emissivity(
         list[float],
         opt.temperature(
             "True temperature of the object, e.g. 391degC: once for all images, or once per image. "
-            "Images at one temperature are repetitions.",
+            "Images at one temperature are repetitions."
         ),
     ],
     regions: opt.RegionsFile,
@@ -145,7 +145,7 @@ def temperature(
         float | None,
         opt.temperature(
             "Temperature of the surroundings that the object reflects. Default: as in the "
-            "determination of the emissivity, with the same error, or 293 K.",
+            "determination of the emissivity, with the same error, or 293 K."
         ),
     ] = None,
     reflected_uncertainty: opt.ReflectedUncertainty = None,

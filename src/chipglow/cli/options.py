@@ -82,7 +82,7 @@ ReferenceFrame: TypeAlias = Annotated[
     float | None,
     time(
         "Measured frame with the fully developed band. Default: the place of the given curve, or "
-        "the hottest and longest band that begins near the cutting edge.",
+        "the hottest and longest band that begins near the cutting edge."
     ),
 ]
 ToolChoice: TypeAlias = Annotated[

@@ -39,8 +39,7 @@ def register(
         ),
     ] = None,
     known: Annotated[
-        Path | None,
-        opt.value("FILE", "Use a map written by --out, e.g. of a target.", "--map"),
+        Path | None, opt.value("FILE", "Use a map written by --out, e.g. of a target.", "--map")
     ] = None,
     tool: Annotated[
         Path | None,
@@ -61,8 +60,7 @@ def register(
         ),
     ] = None,
     visible_interval: Annotated[
-        float | None,
-        opt.duration("Interval of the visible frames, if the file does not state it."),
+        float | None, opt.duration("Interval of the visible frames, if the file does not state it.")
     ] = None,
     out: Annotated[
         Path | None, opt.file("Write the map for later use, .yaml.", ".yaml", ".yml")

@@ -65,10 +65,7 @@ class Screen:
             _write(text, stream)
 
     def say(
-        self,
-        sentence: str,
-        values: Mapping[str, Any] | None = None,
-        stream: TextIO | None = None,
+        self, sentence: str, values: Mapping[str, Any] | None = None, stream: TextIO | None = None
     ) -> None:
         """Print a sentence of the result; the JSON object also gets its numbers."""
         self.heading(sentence, stream)

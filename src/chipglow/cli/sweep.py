@@ -45,8 +45,7 @@ def sweep(
         opt.value("NUMBER", "Processes on this machine. Default: one per core. 0: this process."),
     ] = None,
     scheduler: Annotated[
-        str | None,
-        opt.value("ADDRESS", "Scheduler of a Dask cluster, e.g. tcp://node1:8786."),
+        str | None, opt.value("ADDRESS", "Scheduler of a Dask cluster, e.g. tcp://node1:8786.")
     ] = None,
 ) -> None:
     """Run a study at many settings and tabulate the errors."""

@@ -5,14 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Final, Self
 
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import (
-    CUT_LENGTH,
-    HEAT_TRANSFER,
-    LENGTH,
-    SPEED,
-    TEMPERATURE,
-    TIME,
-)
+from chipglow.quantities.units import CUT_LENGTH, HEAT_TRANSFER, LENGTH, SPEED, TEMPERATURE, TIME
 from chipglow.scene import Raster
 
 CELLS_NEEDED: Final = 5.0
@@ -106,13 +99,7 @@ class Surroundings(Part):
         ),
     ] = 0.0
     temperature: Annotated[
-        float,
-        Parameter(
-            "Temperature of air and surroundings.",
-            TEMPERATURE,
-            over=0.0,
-            most=1500.0,
-        ),
+        float, Parameter("Temperature of air and surroundings.", TEMPERATURE, over=0.0, most=1500.0)
     ] = 293.15
 
 

@@ -11,12 +11,7 @@ from pydantic import ValidationError
 
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.flow_stress import FLOW_LAWS
-from chipglow.cutting.material import (
-    RateTable,
-    TemperatureTable,
-    ToolMaterial,
-    WorkpieceMaterial,
-)
+from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.quantities import Parameter, adapter, of_other_packages, problem
 from chipglow.quantities.units import KELVINS, STRAIN_RATE
 from chipglow.text import read_yaml

@@ -83,12 +83,7 @@ class SteadyTool:
 
 
 def steady_temperature(
-    grid: Grid,
-    fraction: Field,
-    tool_heat: ToolHeat,
-    body: ToolBody,
-    heat: Field,
-    draining: Field,
+    grid: Grid, fraction: Field, tool_heat: ToolHeat, body: ToolBody, heat: Field, draining: Field
 ) -> Field:
     """Return the temperature in K of a tool's nodes under a steady heat, shape (columns, rows).
 

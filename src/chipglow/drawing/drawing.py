@@ -193,11 +193,7 @@ def draw_tool(axes: Axes, tool: Tool, factor: float = 1e6) -> None:
 
 
 def draw_line(
-    axes: Axes,
-    points: NDArray[np.float64],
-    colour: str,
-    label: str = "",
-    factor: float = 1e6,
+    axes: Axes, points: NDArray[np.float64], colour: str, label: str = "", factor: float = 1e6
 ) -> None:
     """Draw a curve in m on axes of another unit, visible on dark and light backgrounds."""
     axes.plot(*(points * factor).T, color="white", linewidth=3.0)

@@ -54,8 +54,7 @@ class ImportDescription(Part):
     kind: Annotated[  # type: ignore[misc]
         Literal["movie", "mesh", "points", "grid"] | None,
         Parameter(
-            "Kind of the source; none: by the file name.",
-            allowed="movie, mesh, points, grid",
+            "Kind of the source; none: by the file name.", allowed="movie, mesh, points, grid"
         ),
     ] = None  # type: ignore[assignment]
     fields: Annotated[

@@ -11,17 +11,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from inspect import isabstract
 from pathlib import Path
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    Final,
-    Literal,
-    NotRequired,
-    Self,
-    TypeVar,
-    get_args,
-)
+from typing import Annotated, Any, ClassVar, Final, Literal, NotRequired, Self, TypeVar, get_args
 from warnings import warn
 
 import numpy as np

@@ -9,11 +9,7 @@ from .frame import (
     SampledFrame as SampledFrame,
     SceneError as SceneError,
 )
-from .lines import (
-    Line as Line,
-    sample as sample,
-    straight_line as straight_line,
-)
+from .lines import Line as Line, sample as sample, straight_line as straight_line
 from .raster import Raster as Raster
 from .regions import (
     Area as Area,
@@ -23,18 +19,6 @@ from .regions import (
     areas as areas,
     shared_pixels as shared_pixels,
 )
-from .scene import (
-    ENERGY_UNITS as ENERGY_UNITS,
-    Scene as Scene,
-    is_gap as is_gap,
-)
-from .tool import (
-    Chamfer as Chamfer,
-    Hone as Hone,
-    Tool as Tool,
-    ToolGeometry as ToolGeometry,
-)
-from .tool_outline import (
-    ToolOutline as ToolOutline,
-    ToolOutlineError as ToolOutlineError,
-)
+from .scene import ENERGY_UNITS as ENERGY_UNITS, Scene as Scene, is_gap as is_gap
+from .tool import Chamfer as Chamfer, Hone as Hone, Tool as Tool, ToolGeometry as ToolGeometry
+from .tool_outline import ToolOutline as ToolOutline, ToolOutlineError as ToolOutlineError

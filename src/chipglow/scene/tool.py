@@ -168,8 +168,7 @@ class Hone(Part):
     """
 
     rake: Annotated[
-        float,
-        Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH, over=0.0),
+        float, Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH, over=0.0)
     ]
     clearance: Annotated[float, Parameter("The same on the flank face.", LENGTH, over=0.0)]
 

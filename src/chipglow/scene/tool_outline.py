@@ -9,14 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.scene.tool import (
-    SMALLEST_WEDGE,
-    Chamfer,
-    Hone,
-    Tool,
-    ToolGeometry,
-    check_angles,
-)
+from chipglow.scene.tool import SMALLEST_WEDGE, Chamfer, Hone, Tool, ToolGeometry, check_angles
 from chipglow.scene.tool_surface import FACE_LENGTH
 
 MOST_POINTS: Final = 1000

@@ -20,11 +20,7 @@ from chipglow.analysis import (
     point_spots,
     wavelength_errors,
 )
-from chipglow.cutting import (
-    SOLVER_VERSION,
-    Checkpoint,
-    SolverError,
-)
+from chipglow.cutting import SOLVER_VERSION, Checkpoint, SolverError
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.atomic import uninterrupted
 from chipglow.io.digest import is_intact
@@ -113,11 +109,7 @@ def kept_progress(study: Study) -> float:
     )
 
 
-def run(
-    study: Study,
-    progress: Progress | None = None,
-    resume: bool = False,
-) -> Analysis:
+def run(study: Study, progress: Progress | None = None, resume: bool = False) -> Analysis:
     """Run a study: cut or open its scene, measure and analyse.
 
     Parameters
@@ -147,21 +139,13 @@ def run(
         return replace(analysis, assumed=tuple(fitted.notes.assumed))
 
 
-def errors(
-    study: Study,
-    progress: Progress | None = None,
-    resume: bool = False,
-) -> Analysis:
+def errors(study: Study, progress: Progress | None = None, resume: bool = False) -> Analysis:
     """Return the measurement error of any scene, exposure by exposure, at the study's places."""
     any_scene = unchecked(study, analysis=unchecked(study.analysis, cut=False))
     return run(any_scene, progress, resume)
 
 
-def wavelengths(
-    study: Study,
-    progress: Progress | None = None,
-    resume: bool = False,
-) -> xr.Dataset:
+def wavelengths(study: Study, progress: Progress | None = None, resume: bool = False) -> xr.Dataset:
     """Compute the errors of the study's spectral bands, alone and as ratios of two.
 
     They are read at the rake face and in the shear band of a cut, or at the points of the section

@@ -4,15 +4,7 @@ from collections.abc import Iterable, Mapping
 from math import ceil, degrees, radians, tan
 from typing import Any, Final
 
-from chipglow.quantities.units import (
-    ANGLE,
-    CUT_LENGTH,
-    LENGTH,
-    POSITION,
-    SPEED,
-    TIME,
-    Quantity,
-)
+from chipglow.quantities.units import ANGLE, CUT_LENGTH, LENGTH, POSITION, SPEED, TIME, Quantity
 
 _FEED, _SPEED, _PITCH, _EXPOSURE = 0.3e-3, 250 / 60, 6e-6, 10e-6
 _RAKE: Final = radians(-7.0)

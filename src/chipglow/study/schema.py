@@ -65,8 +65,7 @@ class Study(Part):
     ] = field(default_factory=AttributionPlan)
 
     wavelengths: Annotated[
-        WavelengthPlan,
-        Parameter("Bands that chipglow wavelengths compares, alone and as ratios."),
+        WavelengthPlan, Parameter("Bands that chipglow wavelengths compares, alone and as ratios.")
     ] = field(default_factory=WavelengthPlan)
 
     def _repr_html_(self) -> str:

@@ -350,11 +350,7 @@ def as_estimate(value: Any) -> Estimate:
     return value if isinstance(value, Estimate) else Estimate(value)
 
 
-def chain(
-    values: Array,
-    inputs: Sequence[Estimate],
-    partials: Sequence[Array],
-) -> Estimate:
+def chain(values: Array, inputs: Sequence[Estimate], partials: Sequence[Array]) -> Estimate:
     """Return the estimate of values that were computed from inputs, element by element.
 
     The inputs, and their partial derivatives, broadcast to the shape of the values.

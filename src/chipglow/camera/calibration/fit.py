@@ -31,8 +31,7 @@ class Blackbody(Part):
         float, Parameter("Emissivity in the camera's band.", over=0.0, most=1.0)
     ] = 1.0
     emissivity_uncertainty: Annotated[
-        float,
-        Parameter("Its standard uncertainty, common to all points.", least=0.0, under=1.0),
+        float, Parameter("Its standard uncertainty, common to all points.", least=0.0, under=1.0)
     ] = 0.0
     surroundings: Annotated[float, Parameter("Reflected temperature.", TEMPERATURE, over=0.0)] = (
         293.15

@@ -85,8 +85,7 @@ class PhotonResponse(DetectorResponse):
         float, Parameter("Side of an element's square, on the detector.", LENGTH, over=0.0)
     ]
     f_number: Annotated[
-        float,
-        Parameter("F-number of the light at the detector, set by the cold stop.", least=0.5),
+        float, Parameter("F-number of the light at the detector, set by the cold stop.", least=0.5)
     ]
     transmittance: Annotated[
         float, Parameter("Fraction of the light that optics and filter pass.", over=0.0, most=1.0)

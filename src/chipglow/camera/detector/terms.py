@@ -217,8 +217,7 @@ class NonLinearity(DetectorTerm):
     example = "{kind: non-linearity, fraction: 0.01}"
     stage = Stage.TRANSFER
     fraction: Annotated[
-        float,
-        Parameter("Shortfall of the largest signal; negative: excess.", least=-0.4, most=0.4),
+        float, Parameter("Shortfall of the largest signal; negative: excess.", least=-0.4, most=0.4)
     ]
 
     def apply(self, electrons: Array, readout: Readout) -> Array:

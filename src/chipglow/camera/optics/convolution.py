@@ -149,10 +149,7 @@ def _transformed(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int
     # Values of the field are never farther apart.
     reach = tuple(min(n // 2, size - 1) for n, size in zip(kernel.shape, shape, strict=True))
     inner = resized(kernel, *reach)
-    padded = (
-        fft.next_fast_len(rows + reach[0]),
-        fft.next_fast_len(columns + reach[1], real=True),
-    )
+    padded = (fft.next_fast_len(rows + reach[0]), fft.next_fast_len(columns + reach[1], real=True))
     whole = np.zeros(padded)
     whole[: inner.shape[0], : inner.shape[1]] = inner
     centred = np.roll(whole, (-reach[0], -reach[1]), axis=(0, 1))

@@ -100,8 +100,7 @@ class Narcissus(OpticsTerm):
         "    corrected_at: 25 degC}"
     )
     reflectance: Annotated[
-        float,
-        Parameter("Total reflectance of the lens surfaces.", least=0.0, most=1.0),
+        float, Parameter("Total reflectance of the lens surfaces.", least=0.0, most=1.0)
     ]
     radius: Annotated[
         float, Parameter("Radius at half of the maximum, on the scene.", LENGTH, over=0.0)

@@ -3,9 +3,4 @@
 from chipglow.io.cameras.formats import CameraFormat, camera_formats, read_recording
 from chipglow.io.cameras.hcc import write_hcc
 
-__all__ = [
-    "CameraFormat",
-    "camera_formats",
-    "read_recording",
-    "write_hcc",
-]
+__all__ = ["CameraFormat", "camera_formats", "read_recording", "write_hcc"]

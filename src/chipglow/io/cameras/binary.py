@@ -58,12 +58,7 @@ def layout(length: int, /, **fields: tuple[str, int]) -> np.dtype[Any]:
     """Return the type of a header of `length` bytes: kind and first byte of each field."""
     kinds, places = zip(*fields.values(), strict=True)
     return np.dtype(
-        {
-            "names": list(fields),
-            "formats": list(kinds),
-            "offsets": list(places),
-            "itemsize": length,
-        }
+        {"names": list(fields), "formats": list(kinds), "offsets": list(places), "itemsize": length}
     )
 
 

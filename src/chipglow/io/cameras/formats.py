@@ -82,9 +82,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "mat": _hdf5("MATLAB, versions 5 to 7.3", (".mat",), _starts(b"MATLAB ")),
     "netcdf": _hdf5("NetCDF", (".nc", ".nc4", ".cdf"), _starts(b"CDF\x01", b"CDF\x02", b"CDF\x05")),
     "hdf5": _hdf5(
-        "HDF5",
-        (".h5", ".hdf5", ".hdf", ".he5"),
-        lambda head: _HDF5 in (head[:8], head[512:520]),
+        "HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: _HDF5 in (head[:8], head[512:520])
     ),
     "zarr": _array("Zarr, a folder or zipped", (".zarr", ".zip")),
     "csv": _array("table of numbers in text, one file per frame", (".csv", ".txt", ".dat")),

@@ -3,12 +3,4 @@
 from chipglow.io.sources.conventions import COMMON_NAMES, Placement, Units, match_names
 from chipglow.io.sources.source import Source, SourceError, Survey
 
-__all__ = [
-    "COMMON_NAMES",
-    "Placement",
-    "Source",
-    "SourceError",
-    "Survey",
-    "Units",
-    "match_names",
-]
+__all__ = ["COMMON_NAMES", "Placement", "Source", "SourceError", "Survey", "Units", "match_names"]

@@ -56,8 +56,7 @@ class CloudSource(Source, Part):
         ),
     ] = None
     tool_parts: Annotated[
-        tuple[int, ...],
-        Parameter("Values of the part field that belong to the tool, such as [2]."),
+        tuple[int, ...], Parameter("Values of the part field that belong to the tool, such as [2].")
     ] = ()
     depth: Annotated[
         float, Parameter("Middle of the slab that is seen of points in space.", POSITION)

@@ -134,8 +134,7 @@ class Units(Part):
     velocity: Annotated[
         Annotated[InstanceOf[Unit], *_unit("velocity", "m/s")] | None,
         Parameter(
-            "Unit of velocities; none: from length and time.",
-            allowed="none, m/s, mm/s, m/min, ...",
+            "Unit of velocities; none: from length and time.", allowed="none, m/s, mm/s, m/min, ..."
         ),
     ] = None
     strain_rate: Annotated[

@@ -87,8 +87,7 @@ class FieldMovie(Part):
         ),
     ] = None
     bands: Annotated[
-        int,
-        Parameter("Number of bands of the colour map; 0: no steps.", allowed="0, 2 to 256"),
+        int, Parameter("Number of bands of the colour map; 0: no steps.", allowed="0, 2 to 256")
     ] = 0
     legend: Annotated[
         Box | None,
@@ -190,8 +189,7 @@ class MovieSource(Source, Part):
         ),
     ] = None
     covered: Annotated[
-        tuple[Box, ...],
-        Parameter("Boxes where something else is drawn, such as text."),
+        tuple[Box, ...], Parameter("Boxes where something else is drawn, such as text.")
     ] = ()
     overlay_limit: Annotated[
         float,

@@ -17,12 +17,7 @@ from chipglow.camera import Measurement
 from chipglow.camera.calibration.calibration import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
-from chipglow.laboratory.chip.ridge import (
-    NoShearBandError,
-    across_curve,
-    arc_length,
-    normals_of,
-)
+from chipglow.laboratory.chip.ridge import NoShearBandError, across_curve, arc_length, normals_of
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
@@ -351,10 +346,7 @@ def _toward(moves: Array, line: Line | None, tool: Tool) -> Array:
 
 
 def _developed(
-    measurement: Measurement,
-    found: Sequence[Line | None],
-    numbers: NDArray[np.int64],
-    notes: Notes,
+    measurement: Measurement, found: Sequence[Line | None], numbers: NDArray[np.int64], notes: Notes
 ) -> Line:
     """Choose the fully developed one of the bands found."""
 

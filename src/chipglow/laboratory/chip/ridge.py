@@ -94,11 +94,7 @@ class PolarGrid:
         return self._best(after, allowed, ends, anywhere)
 
     def _best(
-        self,
-        score: Array,
-        allowed: NDArray[np.bool_],
-        ends: NDArray[np.bool_],
-        anywhere: bool,
+        self, score: Array, allowed: NDArray[np.bool_], ends: NDArray[np.bool_], anywhere: bool
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         total = np.where(allowed, score, -np.inf)
         slopes = self.radii * self.angle_step / self.radius_step

@@ -88,10 +88,7 @@ class ShearBand:
 
 
 def find_shear_band(
-    raster: Raster,
-    strain_rate: NDArray[np.floating],
-    workpiece: NDArray[np.bool_],
-    tool: Tool,
+    raster: Raster, strain_rate: NDArray[np.floating], workpiece: NDArray[np.bool_], tool: Tool
 ) -> ShearBand:
     """Find the shear band as the ridge of the strain rate that leads to the free surface.
 

@@ -328,11 +328,7 @@ def _assumptions(
 
 
 def _mean_radiance(
-    values: Array,
-    calibration: float,
-    shared: float,
-    drift: float | None,
-    recordings: int,
+    values: Array, calibration: float, shared: float, drift: float | None, recordings: int
 ) -> Estimate:
     """Return the mean radiance; `shared`: correlation of calibration errors with emissivity."""
     mean = float(values.mean())

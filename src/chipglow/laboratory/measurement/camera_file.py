@@ -153,9 +153,7 @@ def _unevenness(image: Array) -> float:
 
 
 def pixel_correction(
-    description: MeasurementDescription,
-    recording: Recording,
-    read: "FlatFieldReader | None" = None,
+    description: MeasurementDescription, recording: Recording, read: "FlatFieldReader | None" = None
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
     """Return the pixel correction and the bad pixels that a description defines."""
     section, finds = description.flat_field, description.bad_pixels == "find"

@@ -92,8 +92,7 @@ class MeasurementDescription(Part):
     format: Annotated[
         str | None,
         Parameter(
-            "Kind of the file; none: by its content.",
-            allowed="none, flir, ptw, hcc, tiff, ...",
+            "Kind of the file; none: by its content.", allowed="none, flir, ptw, hcc, tiff, ..."
         ),
     ] = None
     frames: Annotated[

@@ -247,9 +247,7 @@ def _over(
 
 
 def _attributes(
-    recording: Recording,
-    calibration: Calibration | None,
-    position: ImagePosition,
+    recording: Recording, calibration: Calibration | None, position: ImagePosition
 ) -> dict[str, float | str]:
     time = recording.integration_time or getattr(calibration, "integration_time", None)
     attributes: dict[str, float | str | None] = {

@@ -65,11 +65,7 @@ def find_edge(image: Array, x: Array, y: Array) -> tuple[EdgeLine, tuple[float, 
 
 
 def _best_step(
-    x: Array,
-    y: Array,
-    value: Array,
-    width: float,
-    angles: Array,
+    x: Array, y: Array, value: Array, width: float, angles: Array
 ) -> tuple[float, float, float]:
     """Return the square of Student's t, normal in rad and position in m of the clearest step."""
     centred = value - value.mean()
@@ -120,11 +116,7 @@ def _refined(
 
 
 def _centroids(
-    derivative: Array,
-    middles: Array,
-    other: Array,
-    expected: Array,
-    pitch: float,
+    derivative: Array, middles: Array, other: Array, expected: Array, pitch: float
 ) -> tuple[Array, Array]:
     """Return the centroids of the derivative near the line, of rows that show all of it."""
     off = (middles[None, :] - expected[:, None]) / (_WINDOW * pitch)

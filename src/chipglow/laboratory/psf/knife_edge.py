@@ -276,11 +276,7 @@ def _models(
 
 
 def _result(
-    best: ModelFit,
-    k: int,
-    image: EdgeImage,
-    pixels: EdgePixels,
-    alone: bool,
+    best: ModelFit, k: int, image: EdgeImage, pixels: EdgePixels, alone: bool
 ) -> EdgeResult:
     own = best
     if not alone:

@@ -398,9 +398,7 @@ def disc_response(frequency: Array, diameter: float, radii: Array, footprint: fl
 
 
 def sampled_kernel(
-    density: Callable[[Array, Array], Array],
-    reach: float,
-    spacing: float,
+    density: Callable[[Array, Array], Array], reach: float, spacing: float
 ) -> tuple[Array, float]:
     """Return the kernel of a density, integrated over squares, and their side in m."""
     spacing = max(spacing, 2 * reach / (_MOST_SIDE - 1))

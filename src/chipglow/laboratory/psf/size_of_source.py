@@ -75,10 +75,7 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     across, up = ((weight * place).sum() / weight.sum() for place in (x, y))
     away = np.hypot(x - across, y - up)
     radius = image.diameter / 2
-    room = min(
-        np.abs(across - image.x[[0, -1]]).min(),
-        np.abs(up - image.y[[0, -1]]).min(),
-    )
+    room = min(np.abs(across - image.x[[0, -1]]).min(), np.abs(up - image.y[[0, -1]]).min())
     seen = pitch * (np.count_nonzero(bright) / np.pi) ** 0.5
     if not 0.6 * radius - pitch < seen < 1.5 * radius + 3 * pitch or room < radius:
         raise ValueError(

@@ -103,11 +103,7 @@ def _rivals(
 
 
 def _hypotheses(
-    first: Array,
-    second: Array,
-    nominal: float,
-    tree: KDTree,
-    spacing: float,
+    first: Array, second: Array, nominal: float, tree: KDTree, spacing: float
 ) -> list[Array]:
     """Return similarities (2, 3) that put a pair of neighbours on another, the best first."""
     middle = np.argsort(np.hypot(*(first - np.median(first, axis=0)).T))[:_BASES]

@@ -83,11 +83,7 @@ def _rendered(
 
 
 def _show(
-    axes: Axes,
-    image: NDArray[Any],
-    colours: Any,
-    limits: tuple[float, float],
-    opacity: float = 1.0,
+    axes: Axes, image: NDArray[Any], colours: Any, limits: tuple[float, float], opacity: float = 1.0
 ) -> None:
     shown: Any = np.ma.masked_invalid(image)
     axes.imshow(shown, cmap=colours, vmin=limits[0], vmax=limits[1], alpha=opacity)

@@ -124,10 +124,7 @@ def _smoothed(signal: Array) -> Array:
 
 
 def _correlations(
-    times: Array,
-    target: Array,
-    visible_times: Array,
-    spline: CubicSpline,
+    times: Array, target: Array, visible_times: Array, spline: CubicSpline
 ) -> tuple[Array, Array]:
     """Return offsets in s on a grid, and the correlation at each."""
     step = float(np.median(np.diff(visible_times))) / 3
