@@ -6,9 +6,9 @@ from contextlib import ExitStack
 import h5py
 import numpy as np
 import pytest
-from test_io import a_file, a_measurement
+from test_io import a_file, a_measurement_file
 
-from chipglow.io import digest, open_scene, read_measurement, write_measurement
+from chipglow.io import digest, open_scene, read_measurement
 from chipglow.io.digest import is_intact
 from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk
 from chipglow.io.scene_file import is_scene
@@ -33,11 +33,6 @@ def without_digest(path):
 def place_of(path, name):
     with h5py.File(path) as file:
         return file[name].id.get_chunk_info(0).byte_offset + 12
-
-
-def a_measurement_file(folder):
-    write_measurement(a_measurement(), folder / "m.nc")
-    return folder / "m.nc"
 
 
 @pytest.mark.parametrize("write", [a_file, a_measurement_file])

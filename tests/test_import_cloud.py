@@ -395,19 +395,6 @@ def test_a_wrong_unit_of_length_is_noticed(tmp_path):
     refused(CloudSource(str(tmp_path / "p.csv")), "volume: must be positive")
 
 
-@pytest.mark.parametrize(
-    ("changed", "text"),
-    [
-        ({"spacing": 0.0}, "spacing"),
-        ({"thickness": -1.0}, "thickness"),
-        ({"depth": float("nan")}, "depth"),
-    ],
-)
-def test_impossible_arguments(changed, text):
-    with pytest.raises(ValueError, match=text):
-        CloudSource(**{"files": "p.csv", **changed})
-
-
 # Dumps of LAMMPS
 
 

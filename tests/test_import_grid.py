@@ -14,7 +14,6 @@ import scipy.io
 import xarray as xr
 from hypothesis import given, settings, strategies as st
 from PIL import Image
-from pointing import POINTING, point_elsewhere
 from refusals import refused_on
 
 from chipglow.io.sources import Placement, Units
@@ -74,22 +73,6 @@ def hdf5(folder, values):
     return folder / "all.h5", {}
 
 
-def netcdf(folder, values, **options):
-    xr.Dataset(
-        {"temperature": (("time", "y", "x"), values, {"units": "K"})},
-        {
-            "time": ("time", TIMES * 1e6, {"units": "us"}),
-            "x": ("x", X * 1e3, {"units": "mm"}),
-            "y": ("y", Y * 1e3, {"units": "mm"}),
-        },
-    ).to_netcdf(folder / "all.nc", **options)
-    return folder / "all.nc", {"spacing": None, "interval": None}
-
-
-def netcdf4(folder, values):
-    return netcdf(folder, values, engine="h5netcdf")
-
-
 def matlab73(folder, values):
     with h5py.File(folder / "all.mat", "w", userblock_size=512) as file:
         file["T"] = values.transpose(1, 2, 0).T  # as MATLAB stores its columns
@@ -105,20 +88,15 @@ def tiff_of_libtiff(folder, values):
     return folder / "T.tif", {}
 
 
-def csv(folder, values, separator=","):
-    for number, frame in enumerate(values):
-        np.savetxt(folder / f"T_{number * 7}.csv", frame, delimiter=separator, fmt="%.9g")
-    return folder / "T_*.csv", {}
-
-
 def csv_semicolons(folder, values):
-    csv(folder, values, ";")
-    for path in folder.glob("*.csv"):
+    for number, frame in enumerate(values):
+        path = folder / f"T_{number * 7}.csv"
+        np.savetxt(path, frame, delimiter=";", fmt="%.9g")
         path.write_text(path.read_text().replace(".", ","))
     return folder / "T_*.csv", {}
 
 
-FORMATS = [npz_fortran, hdf5, netcdf4, matlab73, tiff_of_libtiff, csv, csv_semicolons]
+FORMATS = [npz_fortran, hdf5, matlab73, tiff_of_libtiff, csv_semicolons]
 """Those of test_import_formats.py are further ones."""
 
 
@@ -468,15 +446,6 @@ def test_hdf5_that_claims_too_much(tmp_path, shape, chunks):
     refused(a_source(str(tmp_path / "T.h5")), "T.h5: T", "expected")
 
 
-@pytest.mark.parametrize("kind", POINTING)
-def test_hdf5_that_points_to_other_files(tmp_path, kind):
-    with h5py.File(tmp_path / "T.h5", "w") as file:
-        file["U"] = np.ones((1, ROWS, COLUMNS), np.float32)
-        file["T"] = np.ones((1, ROWS, COLUMNS), np.float32)
-    point_elsewhere(tmp_path / "T.h5", "T", kind)
-    refused(a_source(str(tmp_path / "T.h5")), "T.h5: 'T' is in another file, expected all data")
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -540,22 +509,6 @@ def test_coordinates_that_go_wrong(tmp_path):
     refused(with_coordinates(x=np.geomspace(1, 2, COLUMNS)), "x: steps from", "expected even ones")
     refused(with_coordinates(y=np.where(Y > 0, Y, np.nan)), "y: value 3 is nan")
     refused(with_coordinates(x=X[:-1]), "x: has 6 values, expected 7")
-
-
-@pytest.mark.parametrize(
-    ("changed", "text"),
-    [
-        ({"spacing": 0.0}, "spacing"),
-        ({"row_spacing": 0.0}, "row_spacing"),
-        ({"axes": ("time", "x")}, "axes"),
-        ({"files": {"heat": "T.npy"}}, "unknown field 'heat'"),
-        ({"top": float("inf")}, "top"),
-        ({"placement": Placement("x", "z")}, "no z"),
-    ],
-)
-def test_impossible_arguments(changed, text):
-    with pytest.raises(ValueError, match=text):
-        GridSource(**{"files": "T.npy", **changed})
 
 
 def test_a_list_t_is_the_time_and_an_array_t_the_temperature(tmp_path):

@@ -90,19 +90,6 @@ def test_lab_of_published_colours():
         assert lab(colour) == pytest.approx(value, abs=0.02)
 
 
-@pytest.mark.parametrize("name", ["jet", "rainbow", "turbo", "viridis", "gray", "jet_r"])
-def test_every_colour_of_a_scale_is_read_back(name):
-    scale = ColourScale.named(name, ENDS)
-    picture = np.round(255 * scale.colours).astype(np.uint8)[None]
-    values, distance = scale.invert(picture)
-    # Colours that are the same in 8 bits stand for the middle of their values; half a level is
-    # what rounding to 8 bits moves along the scale.
-    knot = np.abs(scale.knots - values[0][:, None]).argmin(axis=1)
-    width = scale.widths[knot]
-    assert (np.abs(values[0] - scale.values) <= width / 2 + LEVEL / 2).all()
-    assert distance.max() < 1.0
-
-
 @settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["jet", "rainbow", "viridis"]), st.booleans())
 def test_the_nearest_place_is_found(seed, name, banded):
@@ -119,18 +106,6 @@ def test_the_nearest_place_is_found(seed, name, banded):
     if not banded:
         assert (distance >= apart.min(axis=2) - step).all()
     assert values.min() >= ENDS[0] and values.max() <= ENDS[1]
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        *((name, "colours: .* have the same colour") for name in ("hsv", "twilight", "flag")),
-        ("jett", "unknown colour map"),
-    ],
-)
-def test_a_map_that_no_scale_can_have_is_refused(name, said):
-    with pytest.raises(SourceError, match=f"{name}: {said}"):
-        ColourScale.named(name, ENDS)
 
 
 def test_a_scale_may_descend():
@@ -452,26 +427,6 @@ def test_the_nearest_known_pixel_is_found(seed, fraction):
 
 
 # What is refused
-
-
-SAME_POINT = {"scale_from": (1, 1), "scale_to": (1, 1), "scale_length": 1.0, "pixel": None}
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"pixel": 0.0}, "pixel: 0 m, expected|pixel: .* must be more than 0"),
-        ({**SAME_POINT, "files": "a"}, "another point"),
-        ({"every": 0}, "every: 0, expected 1 or more"),
-        ({"tool_colour": (300, 0, 0)}, "colour: .* of 0 to 255"),
-        ({"tool_polygon": ((1, 2),)}, "tool_polygon: 1 corner"),
-        ({"placement": Placement("x", "z")}, "placement: .* expected x and y"),
-        ({"origin": (float("nan"), 0)}, "origin.0: nan, expected a finite number"),
-    ],
-)
-def test_wrong_values_are_refused(change, message):
-    with pytest.raises(ValueError, match=message):
-        a_source(Path("a.avi"), **change)
 
 
 GREY = NamedMap("gray")

@@ -73,20 +73,6 @@ def test_fields_of_nodes_and_elements_in_all_versions_and_orders(tmp_path, kind,
     assert strain[-1, 0] == expected[0]  # the first element is at the lower left
 
 
-def test_it_is_the_same_mesh_as_that_of_an_ascii_file(tmp_path):
-    zone = zone_of()
-    write_tecplot(tmp_path / "chip.plt", NAMES, [zone])
-    text = 'VARIABLES = "X" "Y" "Temperature [K]" "Strain"\nZONE T="chip", ZONETYPE=FEQUADRILATERAL'
-    text += f" NODES={zone.shape[0]} ELEMENTS={zone.shape[1]}, DATAPACKING=BLOCK"
-    text += " VARLOCATION=([4]=CELLCENTERED)\n"
-    text += "\n".join(" ".join(map(repr, column.tolist())) for column in zone.columns)
-    text += "\n" + "\n".join(" ".join(map(str, quad + 1)) for quad in zone.cells)
-    (tmp_path / "chip.dat").write_text(text + "\n")
-    frames = [only_frame(MeshSource(tmp_path / name)) for name in ("chip.plt", "chip.dat")]
-    for name in ("temperature", "plastic_strain"):
-        np.testing.assert_array_equal(*(frame.fields[name] for frame in frames))
-
-
 @pytest.mark.parametrize("ghosts", [False, True])
 def test_values_of_elements_of_points_in_order_with_and_without_the_last_ghosts(tmp_path, ghosts):
     write_tecplot(tmp_path / "chip.plt", NAMES, [ordered_zone(ghosts), ordered_zone(ghosts)])

@@ -13,7 +13,6 @@ from chipglow.io.importing import Import, View, import_scene, kept_import, prosp
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.source import even_times
 from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
 from chipglow.scene.completion import (
     Completion,
@@ -21,7 +20,6 @@ from chipglow.scene.completion import (
     optical_flow,
     strain_rate_along,
 )
-from chipglow.text import Notes
 
 RASTER = Raster(0.0, 100e-6, 2e-6, 50, 60)
 WHOLE = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
@@ -210,12 +208,6 @@ def test_a_size_that_no_chip_has_is_said():
 def test_sources_of_which_no_scene_can_be_made(source, wrong):
     with pytest.raises(SourceError, match=wrong):
         prospect(Import(source))
-
-
-@pytest.mark.parametrize("interval", [0.0, -1e-6, float("nan"), float("inf")])
-def test_an_impossible_interval_is_refused(interval):
-    with pytest.raises(SourceError, match=r"interval: .* expected more than 0"):
-        even_times(3, interval, Notes())
 
 
 def test_read_elsewhere_is_read_the_same(worker_finds_tests):

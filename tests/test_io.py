@@ -348,6 +348,11 @@ def a_measurement():
     return Measurement(data)
 
 
+def a_measurement_file(folder):
+    write_measurement(a_measurement(), folder / "m.nc")
+    return folder / "m.nc"
+
+
 def test_measurement_comes_back(tmp_path):
     measurement = a_measurement()
     write_measurement(measurement, tmp_path / "m.nc")

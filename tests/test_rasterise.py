@@ -128,18 +128,6 @@ def test_the_highest_triangle_is_seen():
     assert first[inside].any() and not first[inside].all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (([(0, 0)], [(0, 0, 1)]), "expected 0 to 0"),
-        (([(0, 0)], [(0, -1, 0)]), "nodes -1 to 0"),
-    ],
-)
-def test_nodes_that_do_not_exist_are_refused(arguments, said):
-    with pytest.raises(ValueError, match=said):
-        rasterise(RASTER, *arguments)
-
-
 def test_a_quad_is_split_where_it_is_shorter():
     # An arrow's head: the long diagonal runs outside.
     points = np.array([(0.0, 0.0), (4.0, 2.0), (0.0, 4.0), (1.0, 2.0)])
