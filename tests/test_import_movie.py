@@ -29,7 +29,7 @@ from chipglow.io.sources.conventions import Placement
 from chipglow.io.sources.legend import find_legend, is_cut, legend_pixels
 from chipglow.io.sources.movie import FieldMovie, MovieSource
 from chipglow.io.sources.moving_pictures import index_movie, pictures
-from chipglow.io.sources.overlays import dark_lines, find_background
+from chipglow.io.sources.overlays import dark_lines
 from chipglow.scene import FILLED, Material, Raster
 from chipglow.scene.nearest import extended, nearest
 
@@ -146,32 +146,21 @@ def with_legend(picture, colours=RAINBOW, box=(100, 10, 108, 80), outline=True):
     return picture
 
 
-@pytest.mark.parametrize("outline", [True, False])
-@pytest.mark.parametrize("colours", [RAINBOW, NamedMap("jet"), NamedMap("rainbow", 10)])
-def test_an_upright_legend_is_found(colours, outline):
-    picture = with_legend(drawn(known_field(0, SHAPE), colours), colours, outline=outline)
-    assert find_legend(picture) == (100, 10, 108, 80)
-
-
 def test_a_lying_legend_is_found():
     picture = with_legend(drawn(known_field(0, SHAPE), RAINBOW))
     turned = np.ascontiguousarray(picture[:, ::-1].transpose(1, 0, 2))
     assert find_legend(turned) == (10, 12, 80, 20)
 
 
-def test_a_picture_without_a_legend_has_none():
-    assert find_legend(drawn(known_field(0, (200, 240)), RAINBOW)) is None
-    assert find_legend(np.full((50, 50, 3), 255, np.uint8)) is None
-
-
 @pytest.mark.parametrize("box", [None, (200, 20, 216, 160)])
 @pytest.mark.parametrize("codec", [RAW, CODECS[2], H264], ids=lambda codec: codec.name)
 def test_values_by_the_legend(tmp_path, codec, box):
     shape = (180, 240)
-    path = a_movie(
-        tmp_path / f"a{codec.suffix}", codec=codec, shape=shape, count=1,
-        change=lambda picture: with_legend(picture, box=(200, 20, 216, 160)),
-    )  # fmt: skip
+
+    def with_bar(picture):
+        return with_legend(picture, box=(200, 20, 216, 160), outline=box is not None)
+
+    path = a_movie(tmp_path / f"a{codec.suffix}", 1, codec, shape=shape, change=with_bar)
     source = a_source(path, box)
     frame = first_frame(source)
     truth = known_field(0, shape)
@@ -233,11 +222,13 @@ def test_frames_times_and_places(tmp_path):
     assert list(source.frames(own_raster(source), start=3)) == []
 
 
-def test_the_playing_time_is_told(tmp_path):
+def test_what_is_assumed_of_a_movie_is_told(tmp_path):
     found = a_source(a_movie(tmp_path / "a.avi")).survey()
     assert found.times == pytest.approx([0, 0.05, 0.1])
-    assert any("playing times of the movie, 0.05 s" in text for text in found.notes.assumed)
-    assert any("standard uncertainty of 1.25 K" in text for text in found.notes.assumed)
+    said = " ".join(found.notes.assumed)
+    assert "playing times of the movie, 0.05 s" in said
+    assert "standard uncertainty of 1.25 K" in said
+    assert "temperature: Background colours at the border: (255, 255, 255)." in said
 
 
 @pytest.mark.parametrize(
@@ -340,11 +331,15 @@ def test_a_movie_that_ffmpeg_drew():
 # What is drawn over the field
 
 
+def with_lines(picture, step):
+    picture = picture.copy()
+    picture[::step] = picture[:, ::step] = 0
+    return picture
+
+
 def with_mesh(picture):
     """Black lines over everything, and a white box with black text on it."""
-    picture = picture.copy()
-    picture[::12] = 0
-    picture[:, ::12] = 0
+    picture = with_lines(picture, 12)
     picture[70:80, 40:70] = 255
     picture[73:77, 45:65:3] = 0
     return picture
@@ -368,17 +363,6 @@ def test_lines_and_text_are_filled_from_their_neighbours(tmp_path, codec, limit)
     # the field changes by 40 K a pixel, and a filled pixel is up to the fourth one.
     assert np.median(error) < limit
     assert np.percentile(error, 99) < 160
-
-
-def test_the_background_is_found_and_told(tmp_path):
-    picture = drawn(known_field(0, SHAPE), RAINBOW)
-    scale = ColourScale.named("rainbow", ENDS)
-    assert find_background(picture, scale) == (((255, 255, 255),), ())
-    grey = drawn(known_field(0, SHAPE), NamedMap("gray"))
-    found, refused = find_background(grey, ColourScale.named("gray", ENDS))
-    assert found == () and (255, 255, 255) in refused
-    found = a_source(a_movie(tmp_path / "a.avi")).survey()
-    assert "temperature: Background colours at the border: (255, 255, 255)." in found.notes.assumed
 
 
 def with_grey_tool(picture):
@@ -547,10 +531,11 @@ def test_lines_of_a_mesh_are_found_and_a_narrow_band_is_none(tmp_path):
 
 
 def test_a_legend_that_is_not_of_the_picture_is_refused(tmp_path):
-    def with_other_legend(picture):
-        return with_legend(picture, NamedMap("viridis"))
-
-    path = a_movie(tmp_path / "a.avi", colours=NamedMap("jet"), change=with_other_legend)
+    path = a_movie(
+        tmp_path / "a.avi",
+        colours=NamedMap("jet"),
+        change=lambda picture: with_legend(picture, NamedMap("viridis")),
+    )
     with pytest.raises(SourceError, match=r"a\.avi: legend: .*100, 10, 108, 80.* of its pixels"):
         a_source(path, None, crop=(0, 0, 88, SHAPE[0])).survey()
     with pytest.raises(SourceError, match="give the box of the legend, or a named map"):
@@ -583,13 +568,8 @@ def test_a_plain_coloured_background_is_no_material(tmp_path):
 
 
 def test_what_lies_under_lines_is_in_the_uncertainty(tmp_path):
-    def meshed(picture):
-        picture = picture.copy()
-        picture[::9] = picture[:, ::9] = 0
-        return picture
-
     plain = a_source(a_movie(tmp_path / "a.avi")).uncertainty()["temperature"]
-    source = a_source(a_movie(tmp_path / "b.avi", change=meshed))
+    source = a_source(a_movie(tmp_path / "b.avi", change=lambda picture: with_lines(picture, 9)))
     found = source.uncertainty()["temperature"]
     assert plain.lines == 0.0
     assert found.lines > 2 * found.colours

@@ -60,16 +60,6 @@ def test_missing_strain_rate_is_the_change_of_strain_along_the_motion():
     assert "Plastic strain rate: from the change" in scene.data.attrs["assumed"]
 
 
-def test_strain_rate_does_not_take_motion_for_straining():
-    x, y = np.meshgrid(RASTER.x, RASTER.y)
-    velocity = (np.full(x.shape, SPEED, np.float32), np.full(x.shape, UP, np.float32))
-    now, before = ((strain_at(x, y, at) - RATE * at).astype(np.float32) for at in (3e-6, 2e-6))
-    still = np.zeros_like(velocity[0]), np.zeros_like(velocity[0])
-    along = strain_rate_along(now, before, velocity, 1e-6, RASTER.spacing)[10:-10, 10:-10]
-    fixed = strain_rate_along(now, before, still, 1e-6, RASTER.spacing)[10:-10, 10:-10]
-    assert along.max() < 0.02 * fixed.max()
-
-
 def test_strain_rate_of_material_that_was_not_there_is_nought():
     strain = np.full(RASTER.shape, 2.0, np.float32)
     before = strain.copy()

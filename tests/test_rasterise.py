@@ -59,18 +59,6 @@ def test_every_sample_of_the_hull_is_covered_once_and_none_outside(mesh):
     np.testing.assert_array_equal((counts == 1)[~near], inside[~near])
 
 
-def test_samples_on_shared_edges_and_nodes_belong_to_one_triangle():
-    # A fan around a sample's centre: 8 edges run through centres, all meet in one.
-    angle = np.arange(8) * np.pi / 4
-    rim = np.round(np.stack((np.cos(angle), np.sin(angle)), axis=1)) * 2.0
-    points = np.array([(0.0, 0.0), *rim]) + np.array((2.125, 3.125))
-    triangles = [(0, 1 + k, 1 + (k + 1) % 8) for k in range(8)]
-    counts = coverings(points, triangles)
-    assert counts.max() == 1
-    # Half-open: the square of 4 by 4 holds 16 by 16 samples, with two of its sides.
-    assert counts.sum() == 256
-
-
 def test_elements_have_their_own_value_without_blending():
     points, triangles = mesh_of(5, 30, on_samples=False)
     values = np.random.default_rng(1).uniform(0, 1, (len(triangles), 2)).astype(np.float32)
