@@ -103,7 +103,6 @@ def turned(page, label, turns):
 
 
 def report(times, opened, process, scene):
-    """Print milliseconds by control, and the memory of the server."""
     heads = "".join(f"{head:>9}" for head in ("median", "95 %", "most", "lines", "exact"))
     print(f"{'control':26}{'turns':>7}{heads}   ms")
     for label, (first, lines, last) in times.items():

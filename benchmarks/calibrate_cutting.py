@@ -148,7 +148,6 @@ class Fit:
         return (self.logs(place) - measured) / widths
 
     def best_place(self):
-        """Return the place of least squares of the differences within the ranges."""
         squares = lambda place: float((self.differences(place) ** 2).sum())  # noqa: E731
         within = [(-1.0, 1.0)] * len(RANGES)
         results = [minimize(squares, np.array(start), bounds=within) for start in design()]
@@ -189,7 +188,6 @@ def best_table(fit, place):
 
 
 def number_table(place, covariance):
-    """Return the table of fitted numbers, standard uncertainties and correlations."""
     deviations = np.sqrt(np.diag(covariance))
     correlations = covariance / np.outer(deviations, deviations)
     numbers = [str(k + 1) for k in range(len(RANGES))]
@@ -203,7 +201,6 @@ def number_table(place, covariance):
 
 
 def valley_table(covariance):
-    """Return the table of the principal axes of the covariance."""
     squares, axes = np.linalg.eigh(covariance)
     rows = [["axis", "standard deviation / %", *(one.name for one in RANGES)]]
     for k in range(len(squares) - 1, -1, -1):

@@ -24,7 +24,6 @@ UP_AND_DOWN = np.concatenate([KELVINS, KELVINS[::-1]])
 
 
 def signal(kelvins, emissivity=1.0):
-    """Return the counts of a blackbody."""
     radiance = emissivity * BAND.radiance(kelvins) + (1 - emissivity) * BAND.radiance(ROOM)
     return OFFSET + GAIN * radiance
 

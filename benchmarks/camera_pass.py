@@ -220,7 +220,6 @@ def print_times(name, wall, busy, more=""):
 
 
 def compare_images(kept, rounds):
-    """Time images and counts of an exposure by chipglow and other programs, and compare them."""
     print("\nImages of 810 x 900 samples, at 90 x 100 pixels")
     images, counts = same_images(kept.mean_radiance), counted(kept.mean_radiance)
     # Not in turn: of so many point spread functions the oldest would be forgotten.

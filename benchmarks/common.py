@@ -38,13 +38,11 @@ def arguments(text, given=None, /, **defaults):
 
 
 def print_head(*heads):
-    """Print the head of a Markdown table."""
     print_row(*heads)
     print("|---" * len(heads) + "|")
 
 
 def print_row(*cells):
-    """Print a row of a Markdown table."""
     print(f"| {' | '.join(cells)} |", flush=True)
 
 
@@ -65,6 +63,11 @@ def print_tables(tables, markdown=False):
 def minus(text):
     """Return a number with a minus sign in place of the hyphen."""
     return text.replace("-", "−")
+
+
+def spread(values, decimals=0):
+    deviation = f" ± {np.std(values, ddof=1):.{decimals}f}" if len(values) > 1 else ""
+    return f"{np.mean(values):.{decimals}f}{deviation}"
 
 
 def timed(call):

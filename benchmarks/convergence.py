@@ -107,7 +107,6 @@ def number(value):
 
 
 def deviation(uncertainty, scale=1e6):
-    """Uncertainty after a mean; nothing for a single value."""
     return f" ± {uncertainty * scale:.0f}" if isfinite(uncertainty) else ""
 
 

@@ -1,6 +1,6 @@
 """Published cuts of AISI 1045 compared with the same cuts computed by chipglow.
 
-    python benchmarks/experiments.py [--cell 20] [--length 2] [--figure F] [--markdown] [NAME ...]
+    python benchmarks/experiments.py [--cell 20] [--length 2] [--markdown] [NAME ...]
 
 The cuts, what is published of them and where it stands are in experiments.yaml. Each cut takes
 minutes at a cell of 20 um; its means are kept in build/experiments, so that an interrupted run goes
@@ -9,7 +9,8 @@ on with the next cut. Cells in um, lengths of cut in mm.
 
 import json
 import sys
-from dataclasses import asdict, dataclass
+from collections import namedtuple
+from dataclasses import dataclass
 from hashlib import sha256
 from inspect import getmodule, getsource
 from math import isfinite
@@ -19,16 +20,8 @@ import numpy as np
 import yaml
 from common import arguments, minus, print_tables, timed
 
-from chipglow.cutting import (
-    SOLVER_VERSION,
-    CuttingConditions,
-    CuttingSimulation,
-    Numerics,
-    OutputWindow,
-    tool_material,
-)
-from chipglow.drawing.drawing import new_figure, style
-from chipglow.drawing.scales import BLUE, GREY, VERMILLION
+from chipglow import cutting
+from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_path
 from chipglow.laboratory.chip import chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity
@@ -64,16 +57,8 @@ NOT_READ = "†"
 METRICS = (chip_metrics, contact_length, segmentation)
 
 
-@dataclass(frozen=True)
-class Published:
-    """A published number: a key of `QUANTITIES`, its value in SI and its source."""
-
-    quantity: str
-    value: float
-    kind: str
-    source: str
-    read: bool
-    note: str = ""
+Published = namedtuple("Published", "quantity value kind source read note", defaults=("",))
+"""A published number: a key of `QUANTITIES`, its value in SI and its source."""
 
 
 @dataclass(frozen=True)
@@ -91,37 +76,27 @@ class Experiment:
     tool: str
     tool_material: str
     assumed: tuple[str, ...]
-    published: tuple[Published, ...]
+    published: tuple
 
     def simulation(self, cell, length):
         """Return the cut at these conditions with the default material, friction and numerics."""
-        return CuttingSimulation(
-            conditions=CuttingConditions(self.speed, self.feed, length),
+        return cutting.CuttingSimulation(
+            conditions=cutting.CuttingConditions(self.speed, self.feed, length),
             tool=ToolGeometry(self.rake, self.clearance, self.edge_radius),
-            tool_material=tool_material(self.tool_material),
+            tool_material=cutting.tool_material(self.tool_material),
             # A chip four times as thick as the feed has room; the default holds the paper's chip.
-            numerics=Numerics(cell, upstream=max(0.75e-3, 4 * self.feed)),
+            numerics=cutting.Numerics(cell, upstream=max(0.75e-3, 4 * self.feed)),
         )
 
 
-@dataclass(frozen=True)
-class Means:
-    """Computed values in SI: forces per width of cut, NaN where the view shows none."""
-
-    cutting_force: float
-    thrust_force: float
-    thickness: float
-    contact: float
-    period: float
-    segments: int
-    degree: float
-    drift: float
-    unaccounted: float
-    seconds: float
+Means = namedtuple(
+    "Means",
+    "cutting_force thrust_force thickness contact period segments degree drift unaccounted seconds",
+)
+"""Computed values in SI: forces per width of cut, NaN where the view shows none."""
 
 
 def in_si(data, units):
-    """Return an entry of a file with its quantities parsed."""
     return {**data, **{name: unit.parse(data[name]) for name, unit in units.items()}}
 
 
@@ -149,7 +124,7 @@ def compute(simulation):
     """Run a cut and return its means after the chip's build-up."""
     conditions, raster, frames = simulation.conditions, view(simulation), []
     length = conditions.cutting_length
-    window = OutputWindow(BUILD_UP * length, length, STEP / conditions.speed, later_bands=0)
+    window = cutting.OutputWindow(BUILD_UP * length, length, STEP / conditions.speed, later_bands=0)
     history, seconds, _ = timed(lambda: simulation.run(window, raster, frames.append))
     frames = frames[::STEPS_A_FRAME]
     fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in FIELD_UNITS}
@@ -184,12 +159,11 @@ def means_of(simulation, name, folder=RESULTS):
     means = compute(simulation)
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(asdict(means), indent=1), encoding="utf-8")
+        temporary.write_text(json.dumps(means._asdict(), indent=1), encoding="utf-8")
     return means
 
 
 def comparison(computed):
-    """Return the table of published and computed numbers, its head first."""
     rows = [["cut", "quantity", "published", "kind", "source", "computed", "difference"]]
     for experiment, means in computed:
         for quantity, unit in QUANTITIES.items():
@@ -208,7 +182,6 @@ def comparison(computed):
 
 
 def cuts(computed):
-    """Return the table of conditions and quality of each cut, its head first."""
     head = ["cut", "speed / (m/min)", "feed / mm", "rake / °", "conditions from", "assumed"]
     rows = [[*head, "segments", "degree / %", "drift / %", "unaccounted work / %", "time / s"]]
     for one, means in computed:
@@ -223,38 +196,8 @@ def cuts(computed):
 
 
 def quality(means):
-    """Return drift and unaccounted work in %, and the time in s."""
     drift, lost = minus(f"{100 * means.drift:+.0f}"), minus(f"{100 * means.unaccounted:.1f}")
     return drift, lost, f"{means.seconds:.0f}"
-
-
-@style()
-def draw_residuals(computed, path):
-    """Draw the relative difference of computed from published forces; write the figure."""
-    rows = [
-        (f"{one.name}, {entry.source.partition('-')[0]}", entry, getattr(means, entry.quantity))
-        for one, means in computed
-        for entry in one.published
-        if QUANTITIES[entry.quantity] is FORCE
-    ]
-    names = list(dict.fromkeys(name for name, _, _ in rows))
-    figure = new_figure(0.8 + 0.27 * len(names))
-    axes = figure.subplots()
-    for quantity, marker, colour in (
-        ("cutting_force", "o", BLUE),
-        ("thrust_force", "s", VERMILLION),
-    ):
-        chosen = [row for row in rows if row[1].quantity == quantity]
-        residuals = [100 * (here / entry.value - 1) for _, entry, here in chosen]
-        places = [names.index(name) for name, _, _ in chosen]
-        axes.plot(residuals, places, marker, color=colour, label=quantity.replace("_", " "))
-    axes.axvline(0.0, color=GREY, linewidth=0.8)
-    axes.set_yticks(range(len(names)), names)
-    axes.invert_yaxis()
-    axes.set_xlabel("computed over published force, less one / %")
-    axes.legend()
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png")
 
 
 def number(value, unit):
@@ -272,15 +215,13 @@ def mark(read):
 def main():
     sources, known = read_experiments()
     names = tuple(one.name for one in known)
-    given = arguments(__doc__, names=names, cell=20.0, length=2.0, figure=Path, markdown=False)
+    given = arguments(__doc__, names=names, cell=20.0, length=2.0, markdown=False)
     computed = []
     for one in known:
         if one.name in given.names:
             print(one.name, file=sys.stderr, flush=True)
             simulation = one.simulation(given.cell * 1e-6, given.length * 1e-3)
             computed.append((one, means_of(simulation, one.name)))
-    if given.figure:
-        draw_residuals(computed, given.figure)
     print(f"Cell {given.cell:g} um, cutting length {given.length:g} mm, solver {SOLVER_VERSION}.")
     print(f"{NOT_READ}: the source was not read, look the number up before you quote it.")
     print_tables((comparison(computed), cuts(computed)), given.markdown)

@@ -18,19 +18,7 @@ from chipglow.laboratory.psf import knife_edge
 from chipglow.laboratory.psf.psf_models import DefocusedDiscModel, GaussianTailModel
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from synthetic_edge import (
-    WAVELENGTH,
-    annular_edge,
-    blurred_disc_edge,
-    disc_edge,
-    edge_radiance,
-    gaussian_edge,
-    gaussian_transfer,
-    image_of,
-    moffat_edge,
-    ring_edge,
-    tailed_edge,
-)
+import synthetic_edge as edges
 
 STEP = 5.0
 MIRROR = (0.28, 0.35)
@@ -49,7 +37,7 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
         uncertainty.append(found.edge_uncertainty)
         if gaussian:
             curves = found.edges[0].curves
-            true = gaussian_transfer(curves["frequency"].values, fwhm, normal)
+            true = edges.gaussian_transfer(curves["frequency"].values, fwhm, normal)
             apart = np.abs(curves["mtf"].values - true) < 1.96 * curves["mtf_uncertainty"].values
             held.append(apart[UP_TO_NYQUIST])
     mtf = f", MTF {100 * np.mean(held):.0f} %" if held else ""
@@ -59,24 +47,29 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
 
 def image(generator, edge, normal, noise, seed, saturation=None):
     place = generator.uniform(-6e-6, 6e-6)
-    radiance = edge_radiance(edge, normal, position=place, step=STEP)
-    return image_of(radiance, noise * STEP, seed, saturation)
+    radiance = edges.edge_radiance(edge, normal, position=place, step=STEP)
+    return edges.image_of(radiance, noise * STEP, seed, saturation)
+
+
+def mirror():
+    """Edge and width of a mirror objective."""
+    optics = edges.WAVELENGTH, *MIRROR
+    return edges.annular_edge(*optics), AnnularAperturePSF(*optics).fwhm
 
 
 def optics():
     """Kinds of optics: edge-spread function by the edge's normal, width, the edges' normals."""
     tail = GaussianTailModel().fwhm(np.array([8e-6, 0.2, 2.5]))
     blurred = DefocusedDiscModel().fwhm(np.array([16e-6, 8e-6]))
-    mirror = AnnularAperturePSF(WAVELENGTH, *MIRROR).fwhm
     kinds = {
-        "Gaussian": (gaussian_edge(10e-6), 10e-6),
-        "Gaussian with tail": (tailed_edge(8e-6, 0.2, 20e-6), tail),
-        "diffraction": (annular_edge(WAVELENGTH, *MIRROR), mirror),
-        "Moffat, exponent 2": (moffat_edge(10e-6, 2.0), 10e-6),
-        "Moffat, exponent 3": (moffat_edge(10e-6, 3.0), 10e-6),
-        "disc out of focus": (disc_edge(12e-6), 24e-6),
-        "blurred disc": (blurred_disc_edge(16e-6, 8e-6), blurred),
-        "ring (mirror out of focus)": (ring_edge(6e-6, 12e-6), 24e-6),
+        "Gaussian": (edges.gaussian_edge(10e-6), 10e-6),
+        "Gaussian with tail": (edges.tailed_edge(8e-6, 0.2, 20e-6), tail),
+        "diffraction": mirror(),
+        "Moffat, exponent 2": (edges.moffat_edge(10e-6, 2.0), 10e-6),
+        "Moffat, exponent 3": (edges.moffat_edge(10e-6, 3.0), 10e-6),
+        "disc out of focus": (edges.disc_edge(12e-6), 24e-6),
+        "blurred disc": (edges.blurred_disc_edge(16e-6, 8e-6), blurred),
+        "ring (mirror out of focus)": (edges.ring_edge(6e-6, 12e-6), 24e-6),
     }
     for name, (edge, fwhm) in kinds.items():
         yield name, lambda normal, edge=edge: edge, fwhm, (0.0,)
@@ -86,9 +79,8 @@ def optics():
 
 
 def oval(normal):
-    """Edge of an oval Gaussian whose long axis lies at 45 degrees."""
     turned = radians(normal - 45.0)
-    return gaussian_edge(np.hypot(OVAL[0] * np.cos(turned), OVAL[1] * np.sin(turned)))
+    return edges.gaussian_edge(np.hypot(OVAL[0] * np.cos(turned), OVAL[1] * np.sin(turned)))
 
 
 def kind_of_optics(repeats, name, edge_of, fwhm, normals):
@@ -115,15 +107,14 @@ def kind_of_optics(repeats, name, edge_of, fwhm, normals):
 
 def levels_of_noise():
     """Optics, noise and clipping: arguments of `coverage`."""
-    gauss = (gaussian_edge(10e-6), 10e-6)
-    mirror = (annular_edge(WAVELENGTH, *MIRROR), AnnularAperturePSF(WAVELENGTH, *MIRROR).fwhm)
+    gauss = (edges.gaussian_edge(10e-6), 10e-6)
     return (
         ("Gaussian", *gauss, 0.01, None, True),
         ("Gaussian", *gauss, 0.1, None, True),
         ("Gaussian, clipped at 90 %", *gauss, 0.01, 6.5, True),
-        ("diffraction", *mirror, 0.01),
-        ("diffraction", *mirror, 0.03),
-        ("diffraction, clipped at 92 %", *mirror, 0.01, 6.6),
+        ("diffraction", *mirror(), 0.01),
+        ("diffraction", *mirror(), 0.03),
+        ("diffraction, clipped at 92 %", *mirror(), 0.01, 6.6),
     )
 
 

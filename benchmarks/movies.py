@@ -14,7 +14,6 @@ from collections import namedtuple
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
 
 import av
 import numpy as np
@@ -32,21 +31,12 @@ SHAPE = (300, 360)
 PIXEL = 1e-6
 
 
-class NamedMap(NamedTuple):
-    """A colour map, and the number of its bands; 0 for one without steps."""
-
-    name: str
-    bands: int = 0
+NamedMap = namedtuple("NamedMap", "name bands", defaults=(0,))
+"""A colour map, and the number of its bands; 0 for one without steps."""
 
 
-class Codec(NamedTuple):
-    """A way to encode; without an encoder of FFmpeg, a GIF with Pillow's palette."""
-
-    name: str
-    suffix: str
-    encoder: str = ""
-    pixels: str = ""
-    options: tuple[tuple[str, str], ...] = ()
+Codec = namedtuple("Codec", "name suffix encoder pixels options", defaults=("", "", ()))
+"""A way to encode; without an encoder of FFmpeg, a GIF with Pillow's palette."""
 
 
 CODECS = (
@@ -91,7 +81,6 @@ def known_field(number, shape=SHAPE):
 
 
 def drawn(field, colours):
-    """Draw a field on white, as a plotting program does: (y, x, 3), uint8."""
     fraction = np.clip((field - COLDEST) / (HOTTEST - COLDEST), 0, 1)
     count = colours.bands or 256
     index = np.minimum(np.nan_to_num(fraction) * count, count - 1).astype(int)
@@ -106,7 +95,6 @@ def drawn(field, colours):
 
 
 def encode(path, pictures, codec, rate=20):
-    """Write pictures of shape (y, x, 3) as a movie."""
     if not codec.encoder:
         first, *others = (Image.fromarray(picture) for picture in pictures)
         first.save(path, save_all=True, append_images=others, duration=1000 // rate)
@@ -156,7 +144,6 @@ true value is within twice the uncertainty.
 
 
 def read_back(source, shape):
-    """Compare a movie's values with the known field."""
     stated = source.uncertainty()["temperature"].total
     errors, extra, missing = [], 0, 0
     for number, frame in enumerate(source.frames(Raster(0.0, shape[0] * PIXEL, PIXEL, *shape))):
@@ -171,7 +158,6 @@ def read_back(source, shape):
 
 
 def read_with_map(path, codec, colours, count, shape=SHAPE):
-    """Draw, encode and read a movie whose colour map is given."""
     encode(path, (drawn(known_field(n, shape), colours) for n in range(count)), codec)
     movie = FieldMovie(str(path), COLDEST, HOTTEST, *colours)
     return read_back(MovieSource(movie, pixel=PIXEL, origin=(0, shape[0])), shape)
@@ -195,7 +181,6 @@ def chosen(given, maps, codecs):
 
 
 def print_codecs(folder, given):
-    """Print the errors by colour map and codec."""
     size = f"{SHAPE[0]} x {SHAPE[1]} pixels"
     print(f"{size}, {COLDEST:g} to {HOTTEST:g} K, {given.pictures} pictures")
     print_head(
@@ -214,7 +199,6 @@ def print_codecs(folder, given):
 
 
 def print_legends(folder, given):
-    """Print whether the stated uncertainty holds by map, bands, edges and codec."""
     print_head("map", "bands", "edges", "codec", "stated u / K", "RMS / K", "within 2 u", "")
     wrong = 0
     maps, codecs = chosen(given, LEGEND_MAPS, LEGEND_CODECS)

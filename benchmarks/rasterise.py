@@ -81,7 +81,6 @@ def probe(points, triangles, values):
 
 
 def whole_frame(points, triangles):
-    """A frame from file to samples: triangles with four fields."""
     grid = surface(points, triangles).cast_to_unstructured_grid()
     grid.point_data["temperature"] = linear(points)
     grid.point_data["velocity"] = np.ones((len(points), 3))

@@ -15,7 +15,7 @@ from math import pi, radians
 from pathlib import Path
 
 import numpy as np
-from common import arguments, print_tables
+from common import arguments, print_tables, spread
 
 from chipglow.camera import Camera
 from chipglow.io import open_scene
@@ -83,7 +83,6 @@ def flat(chip, body, tool):
 
 
 def drawn(emissivity, generator):
-    """A number from a normal distribution, within 0.02 to 0.98."""
     value = generator.normal(emissivity.mean, emissivity.standard_deviation)
     return float(np.clip(value, 0.02, 0.98))
 
@@ -101,10 +100,6 @@ def differences(face, chip, draws):
         bare = flat(chip, drawn(chip.chip, generator), drawn(chip.tool, generator))
         found.append((face.peak(bare), face.peak(bare.modified(wedge))))
     return np.array(found)
-
-
-def spread(values):
-    return f"{values.mean():.0f} ± {values.std(ddof=1):.0f}"
 
 
 def explained(faces, draws):

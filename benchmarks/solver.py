@@ -96,7 +96,6 @@ class Block:
             steps -= now
 
     def sort(self):
-        """Sort the points by cell."""
         spare = np.zeros_like(self.points, POINT)
         count = sort_by_cell(self.points, self.count, self.grid, FAR, FAR, spare, self.starts)
         assert count == self.count

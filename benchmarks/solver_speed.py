@@ -68,7 +68,6 @@ def copy_bandwidth(threads):
 
 
 def measure(side, threads, rounds, bandwidth):
-    """Time one number of points and print its rows."""
     start = sheared_block(side)
     points, failing = start.points.size, np.mean(start.points["damage"] >= 1)
     plastic = np.mean(start.points["increment"] > 0)

@@ -70,7 +70,6 @@ def study_of(folder):
 
 
 def run_client(address, folder, points):
-    """Compute the points on a cluster, and count each computation."""
     from distributed import Client
 
     compute = sweeps.compute_point

@@ -27,24 +27,10 @@ from scipy.integrate import trapezoid
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 
-from chipglow.camera import (
-    AnnularAperturePSF,
-    Camera,
-    DeadElements,
-    Detector,
-    EnergyResponse,
-    GainPattern,
-    GaussianPSF,
-    LinearCalibration,
-    MeasuredPSF,
-    OffsetPattern,
-    ReadNoise,
-    Recording,
-    ShotNoise,
-    fit_calibration,
-)
+from chipglow import camera
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
+from chipglow.laboratory import measurement
 from chipglow.laboratory.emissivity import (
     EmissivityLine,
     determine_emissivity,
@@ -53,13 +39,6 @@ from chipglow.laboratory.emissivity import (
     true_temperature,
 )
 from chipglow.laboratory.emissivity.emissivity import Heating
-from chipglow.laboratory.measurement import (
-    CalibrationDescription,
-    calibration_text,
-    load_calibration,
-    load_measurement,
-    uniform_counts,
-)
 from chipglow.laboratory.psf import edge_image, knife_edge
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, areas
@@ -126,7 +105,7 @@ def gaussian_transfer(sigma, frequency):
 
 def gaussian_optics(fwhm):
     transfer = partial(gaussian_transfer, fwhm / FWHM_PER_SIGMA)
-    return Optics("gaussian", GaussianPSF(fwhm), fwhm, gaussian_edge(fwhm), transfer)
+    return Optics("gaussian", camera.GaussianPSF(fwhm), fwhm, gaussian_edge(fwhm), transfer)
 
 
 def tailed_optics(core, fraction, length):
@@ -143,13 +122,13 @@ def tailed_optics(core, fraction, length):
 
     spacing, reach = 1e-6, 8 * length
     line = spacing * np.arange(-round(reach / spacing), round(reach / spacing) + 1)
-    psf = MeasuredPSF(density(np.hypot(line, line[:, None])), spacing)
+    psf = camera.MeasuredPSF(density(np.hypot(line, line[:, None])), spacing)
     width = 2 * brentq(lambda r: density(r) - density(0.0) / 2, 0.0, 2 * core)
     return Optics("tail", psf, width, tailed_edge(core, fraction, length), transfer)
 
 
 def mirror_optics(aperture, obscuration):
-    psf = AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
+    psf = camera.AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
     unit = WAVELENGTH / (2 * pi * aperture)
     far, line, energy = annular_line(obscuration)
 
@@ -180,17 +159,17 @@ class Laboratory:
         self.edge_format = ".tif" if seed % 10 == 0 else ".npy"
         self.optics = hidden_optics(generator)
         self.slope = generator.uniform(0.85, 1.0)  # counts of 1 W/(m² sr)
-        self.detector = Detector(
-            response=EnergyResponse(self.slope / GAIN),
+        self.detector = camera.Detector(
+            response=camera.EnergyResponse(self.slope / GAIN),
             gain=GAIN,
             offset=generator.uniform(200.0, 400.0),
             bits=12,
             terms=(
-                GainPattern(0.02),
-                DeadElements(0.003),
-                ShotNoise(),
-                OffsetPattern(12.0 / GAIN),
-                ReadNoise(generator.uniform(1.5, 2.5) / GAIN),
+                camera.GainPattern(0.02),
+                camera.DeadElements(0.003),
+                camera.ShotNoise(),
+                camera.OffsetPattern(12.0 / GAIN),
+                camera.ReadNoise(generator.uniform(1.5, 2.5) / GAIN),
             ),
             seed=int(generator.integers(2**31)),
         )
@@ -258,7 +237,7 @@ class Laboratory:
             tifffile.imwrite(path, counts)
         else:
             described = "counts", np.arange(count) / 600.0, "laboratory", INTEGRATION_TIME
-            write_hcc(path, Recording(counts, *described, float(self.detector.saturation)))
+            write_hcc(path, camera.Recording(counts, *described, float(self.detector.saturation)))
 
     def _field(self):
         """Return the true temperature of the hot chip, uniform in the middle."""
@@ -269,12 +248,11 @@ class Laboratory:
         return self.hot - 60.0 * (1 - np.exp(-((beyond / 60e-6) ** 2)))
 
     def _seen(self, kelvins):
-        """Return the radiance of the chip at every pixel."""
         reflected = float(BAND.radiance(np.array(self.room)))
         own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
         radiance = self.emissivity * own + (1 - self.emissivity) * reflected
         raster = Raster(0.0, 0.0, PITCH / SAMPLES, *radiance.shape)
-        return Camera(BAND, PITCH, psf=self.optics.psf).form_image(radiance, raster)
+        return camera.Camera(BAND, PITCH, psf=self.optics.psf).form_image(radiance, raster)
 
     def _edge(self, normal):
         """Return each pixel's radiance of a hot plate half behind a warm blade."""
@@ -307,16 +285,16 @@ class Evaluation:
         """Calibration by the blackbodies, as ``chipglow calibrate`` makes it."""
         points = read_calibration_points(
             self.folder / "points.csv",
-            lambda file: uniform_counts(self.folder / file, self.fields)[0],
+            lambda file: measurement.uniform_counts(self.folder / file, self.fields)[0],
         )
         measured = points["temperature"], points["counts"], BAND
         stated = points["count_uncertainty"], points["temperature_uncertainty"], CERTIFICATE
-        fit = fit_calibration(
-            LinearCalibration, *measured, *stated, integration_time=INTEGRATION_TIME
+        fit = camera.fit_calibration(
+            camera.LinearCalibration, *measured, *stated, integration_time=INTEGRATION_TIME
         )
         path = self.folder / "calibration.yaml"
-        path.write_text(calibration_text(CalibrationDescription.of(fit)))
-        return load_calibration(path)
+        path.write_text(measurement.calibration_text(measurement.CalibrationDescription.of(fit)))
+        return measurement.load_calibration(path)
 
     def images(self, pattern):
         """Return recordings as measurements, as ``chipglow convert`` does."""
@@ -324,7 +302,7 @@ class Evaluation:
         paths = sorted(self.folder.glob(pattern))
         if not pattern.endswith("hcc"):
             fields += STACK_FIELDS
-        return [load_measurement(path, fields) for path in paths]
+        return [measurement.load_measurement(path, fields) for path in paths]
 
     def results(self):
         calibration = self.calibrated()  # whose file the images need
@@ -388,7 +366,6 @@ def kept(seed, folder=RESULTS):
 
 
 def hits(rows, name):
-    """Count the rows whose interval contains the truth."""
     return sum(abs(row[name][1] - row[name][0]) <= row[name][2] for row in rows)
 
 
@@ -404,7 +381,6 @@ def table(rows):
 
 
 def main(given=None):
-    """Repeat, and print the table."""
     given = arguments(
         __doc__, given, first=0, repeats=100, markdown=False, results=RESULTS, write=Path
     )

@@ -10,26 +10,17 @@ is a condition, such as 212.2-0.1 (m/min, mm); cells in um.
 
 import sys
 from collections import namedtuple
-from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite, nan, radians
 from pathlib import Path
-from statistics import fmean, stdev
+from statistics import fmean
 from typing import NamedTuple
 
 import yaml
-from common import arguments, minus, print_tables
+from common import arguments, minus, print_tables, spread
 from experiments import CONDITIONS, FORCE, LENGTH, Means, in_si, means_of, number, quality
 
-from chipglow.cutting import (
-    SOLVER_VERSION,
-    CuttingConditions,
-    CuttingSimulation,
-    Numerics,
-    SolverError,
-    tool_material,
-    workpiece,
-)
+from chipglow import cutting
 from chipglow.quantities.units import Quantity
 from chipglow.scene import ToolGeometry
 
@@ -53,19 +44,10 @@ POINTS = 3  # along a side of a cell: with two, 1.0 to 1.2 % of the work is unac
 FEEDS_A_CUT = 6  # a longer chip curls down on the uncut surface
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One test of the source, in SI; its forces are those of the whole, unknown width."""
-
-    name: str
-    speed: float
-    feed: float
-    cutting_force: float
-    feed_force: float
-    edge_radius: float
-    thickness: float
-    wear: str
-    status: str
+Trial = namedtuple(
+    "Trial", "name speed feed cutting_force feed_force edge_radius thickness wear status"
+)
+"""One test of the source, in SI; its forces are those of the whole, unknown width."""
 
 
 class Condition(NamedTuple):
@@ -95,14 +77,12 @@ Cut = namedtuple("Cut", "cutting_force thrust_force thickness")
 
 
 def read_trials():
-    """Return the source of the tests, and the tests."""
     data = yaml.safe_load(DATA.read_text(encoding="utf-8"))
     trials = [Trial(**in_si(entry, FIELDS)) for entry in data["tests"]]
     return " ".join(data["source"].split()), trials
 
 
 def repeats(trials):
-    """Group the tests by condition, in order of feed and speed."""
     found = {}
     for trial in sorted(trials, key=lambda one: (one.feed, one.speed)):
         found.setdefault(Condition(trial.speed, trial.feed), []).append(trial)
@@ -135,20 +115,18 @@ def ratios(cuts):
 
 
 def simulation(trials, rake, cell):
-    """Return the cut of the tests with the library's materials and default friction."""
     speed, feed = trials[0].speed, trials[0].feed
     edge_radius = fmean(trial.edge_radius for trial in trials)
-    return CuttingSimulation(
-        workpiece=workpiece("ti-6al-4v"),
-        conditions=CuttingConditions(speed, feed, FEEDS_A_CUT * feed),
+    return cutting.CuttingSimulation(
+        workpiece=cutting.workpiece("ti-6al-4v"),
+        conditions=cutting.CuttingConditions(speed, feed, FEEDS_A_CUT * feed),
         tool=ToolGeometry(radians(rake), radians(CLEARANCE), edge_radius),
-        tool_material=tool_material("carbide"),
-        numerics=Numerics(cell, points_per_side=POINTS, upstream=max(0.75e-3, 4 * feed)),
+        tool_material=cutting.tool_material("carbide"),
+        numerics=cutting.Numerics(cell, points_per_side=POINTS, upstream=max(0.75e-3, 4 * feed)),
     )
 
 
 def measurements(tests):
-    """Return the table of measured values, its head first."""
     head = ["speed / (m/min)", "feed / mm", "tests", "wear", "edge radius / µm"]
     rows = [[*head, "Fc / N", "Ff / Fc", "thickness / feed"]]
     for at, trials in tests.items():
@@ -162,14 +140,7 @@ def measurements(tests):
     return rows
 
 
-def spread(values, decimals):
-    """Return the mean, with the standard deviation of repeats."""
-    deviation = f" ± {stdev(values):.{decimals}f}" if len(values) > 1 else ""
-    return f"{fmean(values):.{decimals}f}{deviation}"
-
-
 def comparison(measured, computed):
-    """Return the table of measured ratios and those computed at each rake angle, head first."""
     rows = [["quantity", "measured"]]
     for rake in computed:
         rows[0] += [f"rake {rake:g}°", "difference"]
@@ -183,13 +154,12 @@ def comparison(measured, computed):
 
 
 def cuts_made(outcomes, tests):
-    """Return the table of the quality of each cut, its head first."""
     head = ["speed / (m/min)", "feed / mm", "rake / °", "Fc / (N/mm)", "Ff / (N/mm)"]
     head += ["Fc measured / computed / mm", "segment / µm", "segments", "drift / %"]
     rows = [[*head, "unaccounted work / %", "time / s"]]
     for (at, rake), means in outcomes.items():
         row = [at.m_a_minute, at.mm, f"{rake:g}"]
-        if isinstance(means, SolverError):
+        if isinstance(means, cutting.SolverError):
             rows.append([*row, str(means), *["–"] * 7])
             continue
         forces = (number(one, FORCE) for one in (means.cutting_force, means.thrust_force))
@@ -205,7 +175,7 @@ def outcome_of(trials, rake, cell):
     print(name, file=sys.stderr, flush=True)
     try:
         return means_of(simulation(trials, rake, cell), name, RESULTS)
-    except SolverError as error:
+    except cutting.SolverError as error:
         return error
 
 
@@ -226,7 +196,7 @@ def main():
             computed[rake][at] = means
     there = ratios({at: mean(found) for at, found in tests.items()})
     here = {rake: ratios(cuts) for rake, cuts in computed.items()}
-    print(f"Cell {given.cell:g} um, solver {SOLVER_VERSION}. Measured: {source}")
+    print(f"Cell {given.cell:g} um, solver {cutting.SOLVER_VERSION}. Measured: {source}")
     tables = measurements(tests), comparison(there, here), cuts_made(outcomes, tests)
     print_tables(tables, given.markdown)
 

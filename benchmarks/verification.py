@@ -34,7 +34,6 @@ HEAD = "case", "what", "known", "computed", "error", "tolerance", "reason of the
 
 
 def number(value, unit=""):
-    """A number in four digits with its unit."""
     return f"{value:.4g} {unit}".strip()
 
 

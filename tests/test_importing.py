@@ -11,8 +11,9 @@ from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
 from chipglow.io import open_scene, unfinished_scenes
 from chipglow.io.importing import Import, View, import_scene, kept_import, prospect, read_scene
 from chipglow.io.sandbox import Isolated
-from chipglow.io.sources import SourceError
+from chipglow.io.sources import SourceError, Units
 from chipglow.io.sources.grid import GridSource
+from chipglow.quantities.units import CELSIUS
 from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
 from chipglow.scene.completion import (
     Completion,
@@ -290,23 +291,27 @@ def test_nothing_beside_the_data_is_taken_for_a_module(tmp_path, monkeypatch, wo
     assert Isolated(MovingBlock(WHOLE), "block").survey().found
 
 
-def a_stack(folder, values):
+def a_stack(folder, values, unit="K"):
     np.save(folder / "T.npy", np.broadcast_to(values, (3, 4, 5)))
-    return Import(GridSource(str(folder / "T.npy"), spacing=5e-6, interval=1e-6))
+    units = Units(temperature=CELSIUS) if unit == "degC" else Units()
+    grid = GridSource(str(folder / "T.npy"), spacing=5e-6, interval=1e-6, units=units)
+    return Import(grid, description={"units": {"temperature": unit}})
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
+    ("values", "unit", "said"),
     [
-        (np.nan, "has no number in the frames"),
-        (-5.0, "-5 in T, expected kelvin"),
-        (-500.0, "-500 in T, expected kelvin"),
-        (25.0, "25 in T, expected kelvin .* units.temperature: degC"),
+        (np.nan, "K", "temperature: T has no number in the frames"),
+        (np.inf, "K", "T: has infinite numbers"),
+        (-5.0, "K", "temperature: -5 in T, expected kelvin"),
+        (-500.0, "K", "temperature: -500 in T, expected kelvin"),
+        (25.0, "K", "temperature: 25 in T, expected kelvin .* units.temperature: degC"),
+        (-120.0, "degC", "153.15 in T, expected .*; units.temperature is degC"),
     ],
 )
-def test_what_no_import_could_take_is_refused_at_the_first_look(tmp_path, values, said):
-    with pytest.raises(SourceError, match=f"temperature: .*{said}"):
-        prospect(a_stack(tmp_path, values))
+def test_what_no_import_could_take_is_refused_at_the_first_look(tmp_path, values, unit, said):
+    with pytest.raises(SourceError, match=said):
+        prospect(a_stack(tmp_path, values, unit))
 
 
 def test_a_source_may_have_a_temperature_in_the_middle_of_its_time_only(tmp_path):

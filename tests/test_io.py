@@ -376,22 +376,6 @@ def test_a_foreign_measurement_is_named(tmp_path):
         read_measurement(path)
 
 
-def test_a_scene_goes_on_from_a_checkpoint(tmp_path):
-    path = tmp_path / "scene.nc"
-    frames = [a_frame(i * 1e-6, seed=i) for i in range(3)]
-    with pytest.raises(KeyboardInterrupt), SceneWriter(path, RASTER) as writer:
-        for frame in frames[:2]:
-            writer.append(frame)
-        writer.checkpoint({}, 0.5)
-        raise KeyboardInterrupt
-    (left,) = unfinished_scenes(path)
-    with SceneWriter(path, RASTER, resume=left) as writer:
-        writer.append(frames[2])
-    left.remove()
-    for found, expected in zip(open_scene(path).frames(), frames, strict=True):
-        assert_as_kept(found, expected)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="files are not locked there")
 def test_a_scene_is_held_till_it_is_in_its_place(tmp_path, monkeypatch):
     """Whoever looks for abandoned scenes just then must not find, and delete, this one."""

@@ -12,9 +12,12 @@ from threading import Thread
 
 import numpy as np
 import pytest
+from PIL import Image
 from test_io import a_frame
 from test_preview import assert_same_frames
+from typer.testing import CliRunner
 
+from chipglow.cli import app
 from chipglow.cutting import (
     CuttingConditions,
     CuttingSimulation,
@@ -220,10 +223,6 @@ def test_a_broken_checkpoint_is_as_none(cache, unbroken):
 
 
 def test_after_ctrl_c_the_last_state_is_named(cache, monkeypatch):
-    from typer.testing import CliRunner
-
-    from chipglow.cli import app
-
     stop_after(5, KeyboardInterrupt(), monkeypatch)
     result = CliRunner().invoke(app, ["cut", "study.yaml", "--out", "scene.nc"])
     assert result.exit_code == 130
@@ -233,11 +232,6 @@ def test_after_ctrl_c_the_last_state_is_named(cache, monkeypatch):
 
 
 def test_the_movie_of_a_cut_that_goes_on_shows_what_is_still_to_come(cache, unbroken, monkeypatch):
-    from PIL import Image
-    from typer.testing import CliRunner
-
-    from chipglow.cli import app
-
     command = ["cut", "study.yaml", "--out", "scene.nc", "--preview", "rest.gif"]
     with monkeypatch.context() as patch:
         stop_after(30, KeyboardInterrupt(), patch)

@@ -25,7 +25,6 @@ class Check:
 
     @property
     def error(self):
-        """Difference, as the tolerance counts it."""
         difference = abs(self.computed - self.expected)
         return difference if self.absolute else difference / abs(self.expected)
 

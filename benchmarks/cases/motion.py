@@ -197,16 +197,19 @@ def vibrations(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
     return Case("vibration", "A vibrating strip", checks, draw)
 
 
-def convergence(axes, cells, errors, label, names=(None,), colours=(BLUE,)):
-    """Size of errors over the cell on logarithmic axes, and the slope of second order."""
-    cells, errors = np.array(cells) / MICRO, np.abs(errors)
+def convergence(
+    axes, sizes, errors, label, names=(None,), colours=(BLUE,), unit=MICRO, order=2,
+    size="cell / µm",
+):  # fmt: skip
+    """Errors over the cell, or another size, on logarithmic axes, and the slope of an order."""
+    sizes, errors = np.array(sizes) / unit, np.abs(errors)
     for line, name, colour in zip(errors, names, colours, strict=True):
-        axes.loglog(cells, line, "o-", color=colour, label=name, markersize=4)
-    slope = np.max(errors) * (cells / cells.max()) ** 2
-    axes.loglog(cells, slope, ":", color=GREY, label="second order")
+        axes.loglog(sizes, line, "o-", color=colour, label=name, markersize=4)
+    slope = np.max(errors) * (sizes / sizes.max()) ** order
+    axes.loglog(sizes, slope, ":", color=GREY, label=f"{('first', 'second')[order - 1]} order")
     axes.legend(loc="upper left")
-    axes.set(ylim=(None, 2.5 * np.max(errors)), xlabel="cell / µm", ylabel=label)
-    axes.set_xticks(cells, [f"{cell:.3g}" for cell in cells])
+    axes.set(ylim=(None, 2.5 * np.max(errors)), xlabel=size, ylabel=label)
+    axes.set_xticks(sizes, [f"{each:.3g}" for each in sizes])
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes.minorticks_off()

@@ -8,7 +8,8 @@ from scipy.integrate import solve_ivp
 from solver import DENSITY, ELASTIC, UNBROKEN, Block
 
 from cases import Case, Check
-from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from cases.motion import convergence
+from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 from chipglow.scene import ToolGeometry
 
 RATE = 1e5
@@ -89,15 +90,9 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
         left.set(ylabel="shear stress / MPa", ylim=(0, None))
         left.legend()
         middle.set_ylabel("temperature / K")
-        sizes = np.array(steps) * 1e3
-        right.loglog(sizes, errors, "o-", color=BLUE, markersize=4)
-        right.loglog(sizes, errors[0] * sizes / sizes[0], ":", color=GREY, label="first order")
         right.axhline(lower_limit, color=GREEN, linewidth=0.9, label="whole kelvins")
-        right.set(xlabel="shear in a step / 10⁻³", ylabel="error of the temperature / K")
-        right.set_xticks(sizes, [f"{size:g}" for size in sizes])
-        right.set_yticks([0.05, 0.1, 0.2, 0.4], ["0.05", "0.1", "0.2", "0.4"])
-        right.minorticks_off()
-        right.legend()
+        looks = {"unit": 1e-3, "order": 1, "size": "shear in a step / 10⁻³"}
+        convergence(right, steps, [errors], "error of the temperature / K", **looks)
 
     rise = (expected[1] - 293.0, float(results[-1][2][-1]) - 293.0)
     checks = (

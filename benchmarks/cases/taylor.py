@@ -8,13 +8,13 @@ from collections import namedtuple
 from dataclasses import replace
 
 import numpy as np
-from matplotlib.ticker import FormatStrFormatter, LogLocator
 from peers.elements import Steel, struck_bar
 from solver import UNBROKEN, Block
 
 from cases import Case, Check
+from cases.motion import convergence
 from chipglow.cutting import JohnsonCook, TemperatureTable
-from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 from chipglow.scene import ToolGeometry
 
 HALF, LENGTH, DURATION = 3.2e-3, 32.4e-3, 80e-6
@@ -138,18 +138,9 @@ def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
         left.set(xlim=(0, 12), xlabel="distance from the foot / mm")
         left.set(ylim=(3, None), ylabel="half width / mm")
         left.legend()
-        names, sizes = ("shortening", "width of the foot", "profile, mean"), np.array(cells) / MILLI
-        for line, name, colour in zip(errors, names, (BLUE, VERMILLION, GREEN), strict=True):
-            right.loglog(sizes, line, "o-", color=colour, label=name, markersize=4)
-        slope = 1.2 * np.max(errors) * sizes / sizes[0]
-        right.loglog(sizes, slope, ":", color=GREY, label="first order")
-        right.set(xlabel="cell / mm", ylabel="difference / %")
-        right.set_xticks(sizes, [f"{size:.2f}" for size in sizes])
-        right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        right.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-        right.set_ylim(bottom=0.02)
-        right.minorticks_off()
-        right.legend()
+        names, colours = ("shortening", "width of the foot", "profile"), (BLUE, VERMILLION, GREEN)
+        looks = {"unit": MILLI, "order": 1, "size": "cell / mm"}
+        convergence(right, cells, errors, "difference / %", names, colours, **looks)
 
     profile = profile_difference(shapes[-1], known)
     rows = (

@@ -68,7 +68,6 @@ def damaged(content, other, random):
 
 
 def read(source):
-    """Survey a source and read at most three of its frames."""
     source.survey()
     for _ in islice(source.frames(RASTER), 3):
         pass
