@@ -1,6 +1,7 @@
 """Files of cameras, byte by byte as their formats are described, of pictures that are known."""
 
 import struct
+from functools import partial
 from io import BytesIO
 
 import numpy as np
@@ -23,6 +24,11 @@ def pictures(frames=FRAMES, bits=14):
     return np.round(level * (2**bits - 1)).astype(np.uint16)
 
 
+def writer(raw, order="<"):
+    """Function that puts values of a kind at a place."""
+    return lambda place, kind, *values: struct.pack_into(order + kind, raw, place, *values)
+
+
 # FLIR
 
 
@@ -38,10 +44,7 @@ def plain(image):
 
 def flir_camera(order, stamp, planck=PLANCK, told=OBJECT, rate=30):
     raw = bytearray(2476)
-
-    def put(place, kind, *values):
-        struct.pack_into(order + kind, raw, place, *values)
-
+    put = writer(raw, order)
     put(0, "HHH", 2, COLUMNS, ROWS)
     put(0x20, "fffff", told["emissivity"], 2.0, told["reflected"], told["atmosphere"], 293.15)
     put(0x34, "f", told["window"])
@@ -86,11 +89,7 @@ def flir_jpeg(image, part=1000, **options):
     visible, inside = stream.getvalue(), fff(image, **options)
     parts = [inside[i : i + part] for i in range(0, len(inside), part)]
     segments = b"".join(
-        b"\xff\xe1"
-        + struct.pack(">H", len(one) + 10)
-        + b"FLIR\0\x01"
-        + bytes([number, len(parts) - 1])
-        + one
+        struct.pack(">HH6sBB", 0xFFE1, len(one) + 10, b"FLIR\0\x01", number, len(parts) - 1) + one
         for number, one in enumerate(parts)
     )
     return visible[:2] + segments + visible[2:]
@@ -105,10 +104,7 @@ def ptw(images, period=1 / 600, stamps=None, lock_in=False, words=False):
     extra = 2 * columns if lock_in else 0
     frame = 1016 + extra + 2 * rows * columns
     header = bytearray(3476)
-
-    def put(place, kind, *values):
-        struct.pack_into("<" + kind, header, place, *values)
-
+    put = writer(header)
     header[0:10] = b"CED\0\x005.60\0" if words else b"CEDIP05.60"
     size = 2 if words else 1
     put(11, "IIIII", len(header), 1016, frame // size, (frame - 1016) // size, count)
@@ -139,34 +135,23 @@ def ptw(images, period=1 / 600, stamps=None, lock_in=False, words=False):
 # CINE
 
 
-def _packed_10(codes):
-    a, b, c, d = np.moveaxis(codes.reshape(-1, 4).astype(np.uint64), -1, 0)
-    whole = a << 30 | b << 20 | c << 10 | d
-    return b"".join(int(one).to_bytes(5, "big") for one in whole)
-
-
-def _packed_12(counts):
-    a, b = np.moveaxis(counts.reshape(-1, 2).astype(np.uint64), -1, 0)
-    return b"".join(int(one).to_bytes(3, "big") for one in (a << 12 | b))
+def _packed(counts, bits):
+    """Counts one after another in bits, from the highest on."""
+    shifts = np.arange(bits)[::-1]
+    return np.packbits((counts.reshape(-1, 1) >> shifts & 1).astype(np.uint8)).tobytes()
 
 
 def cine(images, kind="16", rate=30_000, exposures=None, times=True):
     """A recording; 8 and 16 bits lie upside down, as bitmaps do."""
     count, rows, columns = images.shape
-    bits, packing, real = {"8": (8, 0, 8), "16": (16, 0, 12), "10p": (16, 256, 10)}.get(
-        kind, (16, 1024, 12)
-    )
-    pack = {
-        "8": lambda image: image[::-1].astype("u1").tobytes(),
-        "16": lambda image: image[::-1].astype("<u2").tobytes(),
-        "10p": _packed_10,
-        "12p": _packed_12,
+    bits, packing, real, pack = {
+        "8": (8, 0, 8, lambda image: image[::-1].astype("u1").tobytes()),
+        "16": (16, 0, 12, lambda image: plain(image[::-1])),
+        "10p": (16, 256, 10, partial(_packed, bits=10)),
+        "12p": (16, 1024, 12, partial(_packed, bits=12)),
     }[kind]
     setup = bytearray(12432)
-
-    def put(place, form, *values):
-        struct.pack_into("<" + form, setup, place, *values)
-
+    put = writer(setup)
     setup[140:142] = b"ST"
     put(142, "H", len(setup))
     put(743, "I", 12345)
@@ -176,12 +161,9 @@ def cine(images, kind="16", rate=30_000, exposures=None, times=True):
     put(1568, "I", 3000)
     ticks = [(START << 32) + round((0.25 + n / rate) * 2**32) & ~3 | 1 for n in range(count)]
     exposures = [3e-6] * count if exposures is None else exposures
-    blocks = []
-    if times:
-        blocks.append(struct.pack(f"<IHH{count}Q", 8 + 8 * count, 1002, 1, *ticks))
+    tagged = struct.pack(f"<IHH{count}Q", 8 + 8 * count, 1002, 1, *ticks) if times else b""
     lengths = [round(one * 2**32) for one in exposures]
-    blocks.append(struct.pack(f"<IHH{count}I", 8 + 4 * count, 1003, 0, *lengths))
-    tagged = b"".join(blocks)
+    tagged += struct.pack(f"<IHH{count}I", 8 + 4 * count, 1003, 0, *lengths)
     picture = struct.pack("<IiiHHIIiiII", 40, columns, rows, 1, bits, packing, 0, 0, 0, 0, 0)
     places_at = 44 + 40 + len(setup) + len(tagged)
     header = struct.pack(
@@ -194,11 +176,5 @@ def cine(images, kind="16", rate=30_000, exposures=None, times=True):
         places.append(place)
         place += len(one)
         frames.append(one)
-    return (
-        header
-        + picture
-        + bytes(setup)
-        + tagged
-        + struct.pack(f"<{count}q", *places)
-        + b"".join(frames)
-    )
+    table = struct.pack(f"<{count}q", *places)
+    return b"".join([header, picture, setup, tagged, table, *frames])

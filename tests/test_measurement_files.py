@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 from analytic_chip import AnalyticChip
+from commands import run, settings_of
 from PIL import Image
-from typer.testing import CliRunner
 
 from chipglow.camera import (
     DeadElements,
@@ -25,7 +25,6 @@ from chipglow.camera import (
     SakumaHattori,
     fit_calibration,
 )
-from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
@@ -116,18 +115,6 @@ def laboratory(made, monkeypatch):
     """The folder with the files; tests write elsewhere."""
     monkeypatch.chdir(made)
     return made
-
-
-def run(*arguments, code=0):
-    """What a command says, which must end with this code."""
-    result = CliRunner().invoke(app, list(map(str, arguments)), env={"COLUMNS": "160"})
-    assert result.exit_code == code, result.output
-    return result.output
-
-
-def settings_of(fields):
-    """Options that say the same as a description."""
-    return [f"--set={field}" for field in fields]
 
 
 # Files
@@ -298,16 +285,6 @@ def test_a_band_that_the_file_states_is_compared_with_the_calibrations(
     assert (
         "The file states a band of 3.8-5.1 um, the calibration is for 3-5" in warnings
     ) == warned
-
-
-def test_a_setting_names_a_file_beside_the_shell(laboratory, tmp_path, monkeypatch):
-    np.save(tmp_path / "shown.npy", np.full((1, 4, 5), 3000))
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cal.yaml").write_text((laboratory / "calibration.yaml").read_text())
-    settings = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=cal.yaml"]
-    (tmp_path / "camera").mkdir()
-    (tmp_path / "shown.npy").rename(tmp_path / "camera" / "shown.npy")
-    assert load_measurement("camera/shown.npy", settings).band == BAND
 
 
 def test_a_response_takes_the_place_of_limits(tmp_path):
