@@ -368,13 +368,9 @@ def test_a_d3plot_moves_and_its_layers_are_averaged(tmp_path):
     (last,) = source.frames(RASTER, start=2)
     assert last.time == 1.0
     assert (last.material[:, :10] == VOID).all()
-
-
-def test_a_part_of_a_d3plot_is_the_tool(tmp_path):
-    frame = next(MeshSource(d3plot(tmp_path), tool_parts=("2",)).frames(RASTER))
-    at = RASTER.x > np.ceil(0.5 * WIDTH / 1e-4 - 0.5) * 1e-4
-    assert (frame.material[:, at] == TOOL).any()
-    assert (frame.material[:, :40] == WORKPIECE).all()
+    with_tool = next(MeshSource(source.files, tool_parts=("2",)).frames(RASTER))
+    assert (with_tool.material[:, 45:] == TOOL).any()
+    assert (with_tool.material[:, :40] == WORKPIECE).all()
 
 
 DECK = """*HEADING
@@ -551,21 +547,16 @@ def test_elements_of_nodes_that_do_not_exist(tmp_path):
         MeshSource(tmp_path / "chip.vtk").survey()
 
 
-def solid(x0, x1, count=(4, 3, 2), first=0):
-    """Points and hexahedra of a block, its elements in the order of x, y and z."""
-    nx, ny, nz = count
-    at = [np.linspace(*ends, n + 1) for ends, n in (((x0, x1), nx), ((0, 1), ny), ((0, 1), nz))]
-    z, y, x = np.meshgrid(*at[::-1], indexing="ij")
-    k, j, i = np.mgrid[:nz, :ny, :nx].reshape(3, -1)
-    corner = first + (k * (ny + 1) + j) * (nx + 1) + i
-    level = (nx + 1) * (ny + 1)
-    lower = np.stack([corner, corner + 1, corner + nx + 2, corner + nx + 1], axis=1)
-    points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    return points, np.concatenate([lower, lower + level], axis=1)
+def solid():
+    """Points and hexahedra of a block of 2 x 1 x 1, its elements in the order of x, y and z."""
+    grid = pv.ImageData(dimensions=(5, 4, 3), spacing=(0.5, 1 / 3, 0.5))
+    # A voxel's nodes are in another order than a brick's.
+    cells = grid.cast_to_unstructured_grid().cell_connectivity.reshape(-1, 8)
+    return np.array(grid.points, float), cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
 
 
 def test_a_section_has_nothing_of_side_sets(tmp_path):
-    points, hexes = solid(0.0, 2.0)
+    points, hexes = solid()
     heat = 300.0 + 100.0 * points[:, 0] + 50.0 * points[:, 2]
     heat[points[:, 2] == 1.0] = 913.0
     top = np.arange(1, 13) + 12
@@ -578,24 +569,18 @@ def test_a_section_has_nothing_of_side_sets(tmp_path):
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
-def test_boundaries_of_an_openfoam_case_are_no_material(tmp_path):
-    path = write_foam(tmp_path, sides="type fixedValue; value uniform 250;")
-    raster = Raster(0.0, 1.0, 0.1, 10, 20)
-    for section in (0.5, "facing"):
-        frame = next(MeshSource(path, section=section).frames(raster))
-        assert set(np.unique(frame.fields["temperature"])) == {300.0, 400.0}
-
-
-def test_u_of_openfoam_is_the_velocity(tmp_path):
-    source = MeshSource(write_foam(tmp_path, velocity="(3 1 2)"), section=0.5)
-    survey = survey_of(source)
+def test_a_case_of_openfoam_has_a_velocity_and_its_boundaries_are_no_material(tmp_path):
+    path = write_foam(tmp_path, "type fixedValue; value uniform 250;", velocity="(3 1 2)")
+    survey = survey_of(MeshSource(path, section=0.5))
     assert survey.times.tolist() == [0.0, 0.5]
     assert survey.extent == pytest.approx((0.0, 2.0, 0.0, 1.0))
     assert survey.found["velocity_x"] == survey.found["velocity_y"] == "U"
     assert not any("U is not added" in sentence for sentence in survey.notes.assumed)
-    frame = next(source.frames(Raster(0.0, 1.0, 0.1, 10, 20)))
-    assert (frame.fields["velocity_x"] == 3.0).all()
-    assert (frame.fields["velocity_y"] == 1.0).all()
+    for section in (0.5, "facing"):
+        frame = next(MeshSource(path, section=section).frames(Raster(0.0, 1.0, 0.1, 10, 20)))
+        assert set(np.unique(frame.fields["temperature"])) == {300.0, 400.0}
+        assert (frame.fields["velocity_x"] == 3.0).all()
+        assert (frame.fields["velocity_y"] == 1.0).all()
 
 
 def xdmf_over_time(path, times, heat):
@@ -652,7 +637,7 @@ def test_all_times_of_one_file_are_read(tmp_path, write):
 
 def two_materials(path, other="temperature_steel", divided=False, whole_name=None):
     """Two blocks that share nodes, with a field each; what a block has not is written as 0."""
-    points, hexes = solid(0.0, 2.0, (4, 3, 2))
+    points, hexes = solid()
     left = points[hexes][:, :, 0].mean(axis=1) < 1.0
     blocks = {"graphite": hexes[left], "steel": hexes[~left]}
     heat = 300.0 + 100.0 * points[:, 0] + 20.0 * points[:, 2]

@@ -371,28 +371,26 @@ def with_grey_tool(picture):
     return picture
 
 
+def test_a_coloured_tool_keeps_its_values(tmp_path):
+    corners = ((90.0, 50.0), (120.0, 50.0), (120.0, 80.0), (90.0, 80.0))
+    frame = first_frame(a_source(a_movie(tmp_path / "a.avi"), tool_polygon=corners))
+    tool = frame.material == Material.TOOL
+    assert np.count_nonzero(tool) == 30 * 30
+    error = frame.fields["temperature"][tool] - known_field(0, SHAPE)[tool]
+    assert np.abs(error).max() < LEVEL
+
+
 @pytest.mark.parametrize(
     "how", [{"tool_polygon": ((90, 50), (120, 80))}, {"tool_colour": (128, 128, 128)}]
 )
 def test_a_grey_tool_has_no_values(tmp_path, how):
-    source = a_source(a_movie(tmp_path / "a.avi", change=with_grey_tool), **how)
-    frame = first_frame(source)
+    frame = first_frame(a_source(a_movie(tmp_path / "a.avi", change=with_grey_tool), **how))
     tool = np.zeros(SHAPE, bool)
     tool[50:80, 90:] = True
     np.testing.assert_array_equal(frame.material == Material.TOOL, tool)
     assert np.isnan(frame.fields["temperature"][tool]).all()
     beside = frame.fields["temperature"][40:, 85:89] - known_field(0, SHAPE)[40:, 85:89]
     assert np.abs(beside).max() < 15
-
-
-def test_a_coloured_tool_keeps_its_values(tmp_path):
-    corners = ((90.0, 50.0), (120.0, 50.0), (120.0, 80.0), (90.0, 80.0))
-    source = a_source(a_movie(tmp_path / "a.avi"), tool_polygon=corners)
-    frame = first_frame(source)
-    tool = frame.material == Material.TOOL
-    assert np.count_nonzero(tool) == 30 * 30
-    error = frame.fields["temperature"][tool] - known_field(0, SHAPE)[tool]
-    assert np.abs(error).max() < LEVEL
 
 
 @settings(max_examples=30)
