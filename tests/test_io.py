@@ -25,8 +25,8 @@ from chipglow.io import (
     write_measurement,
     write_scene,
 )
+from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Frame, Raster, SceneError, ToolGeometry
-from chipglow.scene.scene import raster_coordinates
 
 RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27)
 RELATIVE = {
@@ -327,25 +327,10 @@ def test_atomic_path_leaves_nothing_after_an_error(tmp_path):
 
 
 def a_measurement():
-    generator = np.random.default_rng(7)
-    raster = Raster(0.0, 5e-4, 6e-6, 4, 5)
-    temperature = generator.uniform(500.0, 1200.0, (2, 4, 5))
-    flags = (temperature < 573.15).astype(np.uint8)
-    dimensions = ("time", "y", "x")
-    data = xr.Dataset(
-        {
-            "radiance_temperature": (
-                dimensions,
-                np.where(flags, np.nan, temperature),
-                {"units": "K"},
-            ),
-            "radiance": (dimensions, temperature**2, {"units": "W m-2 sr-1"}),
-            "flags": (dimensions, flags, {"units": "1"}),
-        },
-        coords=raster_coordinates(raster, np.array([0.0, 1 / 600])),
-        attrs={"pitch": 6e-6, "band_lower": 3.8e-6, "camera": "one"},
-    )
-    return Measurement(data)
+    band, raster = Band(3.8e-6, 5.1e-6), Raster(0.0, 5e-4, 6e-6, 4, 5)
+    radiance = band.radiance(np.random.default_rng(7).uniform(500.0, 1200.0, (2, 4, 5)))
+    described = band, [0.0, 1 / 600], raster, 573.15
+    return Measurement.from_radiance(radiance, *described, attributes={"camera": "one"})
 
 
 def a_measurement_file(folder):
