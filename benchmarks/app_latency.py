@@ -6,7 +6,7 @@ Presses keys on the sliders of a page in headless Chromium, as fast as pictures 
 from the key's event to the frame of the screen after the new image was there, by the browser's
 clock: the first picture, which may be a quick look, the curves along its lines, and the exact
 picture where the hand rests. Then how long the command took to the first exact picture, and the
-memory of the server beside that of the scene's own splines or samples.
+memory of the server.
 """
 
 import os
@@ -63,7 +63,7 @@ def main():
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
             try:
                 times = measured(browser, server.stdout.readline().split()[-1], given)
-                report(times, times.pop("opened") - begun, server.pid, given.scene)
+                report(times, times.pop("opened") - begun, server.pid)
             finally:
                 server.terminate()
         browser.close()
@@ -102,7 +102,7 @@ def turned(page, label, turns):
     return page.evaluate("lines => [chipglowLog.first, lines, chipglowLog.last]", lines)
 
 
-def report(times, opened, process, scene):
+def report(times, opened, process):
     heads = "".join(f"{head:>9}" for head in ("median", "95 %", "most", "lines", "exact"))
     print(f"{'control':26}{'turns':>7}{heads}   ms")
     for label, (first, lines, last) in times.items():
@@ -112,7 +112,7 @@ def report(times, opened, process, scene):
     print(f"opened, with the process: {opened:.1f} s; load {os.getloadavg()[0]:.1f}")
     pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
     resident = pages * os.sysconf("SC_PAGE_SIZE")
-    print(f"memory: {resident / 1e6:.0f} MB resident; {own(scene)}")
+    print(f"memory: {resident / 1e6:.0f} MB resident")
 
 
 def row(first, lines):
@@ -120,16 +120,6 @@ def row(first, lines):
     middle, late, most = np.percentile(first, (50, 95, 100))
     drawn = f"{np.percentile(lines, 95):.0f}" if len(lines) else "-"
     return f"{len(first):7}{middle:9.0f}{late:9.0f}{most:9.0f}{drawn:>9}"
-
-
-def own(path):
-    """What a scene is itself: its splines or samples in memory, and its samples if all were."""
-    from chipglow.io import example_scene, open_scene
-
-    scene = open_scene(path) if path else example_scene()
-    samples = len(scene) * scene.raster.rows * scene.raster.columns * 4 * len(scene.fields)
-    kept = samples if scene.lattice is None else 4 * len(scene) * int(np.prod(scene.lattice.shape))
-    return f"the scene's own {kept / 1e6:.0f} MB, its samples {samples / 1e6:.0f} MB"
 
 
 if __name__ == "__main__":

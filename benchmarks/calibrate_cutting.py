@@ -48,7 +48,6 @@ class Range:
     high: float
 
     def at(self, place):
-        """Return the value in SI at a place from -1 to 1."""
         return self.scale * exp(log(self.low) + 0.5 * (place + 1) * log(self.high / self.low))
 
 
@@ -99,7 +98,6 @@ Observation = namedtuple("Observation", "cut quantity value uncertainty")
 
 
 def observations(experiments):
-    """Return the measured forces of the four cuts, period and degree of the paper's."""
     forces = [
         Observation(one.name, entry.quantity, entry.value, UNCERTAINTIES[entry.quantity])
         for one in experiments
@@ -179,7 +177,6 @@ def computed(experiments, places, processes):
 
 
 def best_table(fit, place):
-    """Return the table of what the surfaces predict at a place, and their scatter."""
     rows = [["cut", "quantity", "predicted over measured / %", "scatter of the surface / %"]]
     for one, value, scatter in zip(fit.observed, fit.logs(place), fit.scatter, strict=True):
         difference = f"{100 * (exp(value) / one.value - 1):+.0f}"
@@ -211,7 +208,6 @@ def valley_table(covariance):
 
 
 def run_table(places, runs, observed):
-    """Return the table of all places: numbers and differences from measured values."""
     heads = [f"{one.cut} {one.quantity.split('_')[0]}" for one in observed]
     rows = [[*(one.name for one in RANGES), *heads, "degree of the paper's / %"]]
     for place, run in zip(places, runs, strict=True):

@@ -1,6 +1,6 @@
 """Published cuts of AISI 1045 compared with the same cuts computed by chipglow.
 
-    python benchmarks/experiments.py [--cell 20] [--length 2] [--markdown] [NAME ...]
+    python benchmarks/experiments.py [--cell 20] [--length 2] [--figure F] [--markdown] [NAME ...]
 
 The cuts, what is published of them and where it stands are in experiments.yaml. Each cut takes
 minutes at a cell of 20 um; its means are kept in build/experiments, so that an interrupted run goes
@@ -22,6 +22,8 @@ from common import arguments, minus, print_tables, timed
 
 from chipglow import cutting
 from chipglow.cutting import SOLVER_VERSION
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import GREY
 from chipglow.io import atomic_path
 from chipglow.laboratory.chip import chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity
@@ -79,7 +81,6 @@ class Experiment:
     published: tuple
 
     def simulation(self, cell, length):
-        """Return the cut at these conditions with the default material, friction and numerics."""
         return cutting.CuttingSimulation(
             conditions=cutting.CuttingConditions(self.speed, self.feed, length),
             tool=ToolGeometry(self.rake, self.clearance, self.edge_radius),
@@ -200,6 +201,31 @@ def quality(means):
     return drift, lost, f"{means.seconds:.0f}"
 
 
+@style()
+def draw_residuals(computed, path):
+    """Draw the relative difference of computed from published forces; write the figure."""
+    figure = new_figure(4.5)
+    axes = figure.subplots()
+    entries = [(one, means, entry) for one, means in computed for entry in one.published]
+    for quantity, marker in (("cutting_force", "o"), ("thrust_force", "s")):
+        rows = [
+            (
+                f"{one.name}, {entry.source.partition('-')[0]}",
+                getattr(means, quantity) / entry.value,
+            )
+            for one, means, entry in entries
+            if entry.quantity == quantity
+        ]
+        names, ratios = zip(*rows, strict=True)
+        excess = 100 * (np.array(ratios) - 1)
+        axes.plot(excess, names, marker, label=quantity.replace("_", " "))
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.invert_yaxis()
+    axes.set_xlabel("computed over published force, less one / %")
+    axes.legend()
+    figure.savefig(path, format="png")
+
+
 def number(value, unit):
     """Return three digits in the quantity's unit; a dash for NaN."""
     if not isfinite(value):
@@ -215,13 +241,15 @@ def mark(read):
 def main():
     sources, known = read_experiments()
     names = tuple(one.name for one in known)
-    given = arguments(__doc__, names=names, cell=20.0, length=2.0, markdown=False)
+    given = arguments(__doc__, names=names, cell=20.0, length=2.0, figure=Path, markdown=False)
     computed = []
     for one in known:
         if one.name in given.names:
             print(one.name, file=sys.stderr, flush=True)
             simulation = one.simulation(given.cell * 1e-6, given.length * 1e-3)
             computed.append((one, means_of(simulation, one.name)))
+    if given.figure:
+        draw_residuals(computed, given.figure)
     print(f"Cell {given.cell:g} um, cutting length {given.length:g} mm, solver {SOLVER_VERSION}.")
     print(f"{NOT_READ}: the source was not read, look the number up before you quote it.")
     print_tables((comparison(computed), cuts(computed)), given.markdown)

@@ -21,6 +21,16 @@ def typed(command, code=0):
     return chipglow(*shlex.split(command), code=code, COLUMNS="160")
 
 
+def run(*arguments, code=0, width=160):
+    """Text that a command prints, which must end with this code."""
+    return chipglow(*arguments, code=code, COLUMNS=str(width)).output
+
+
+def settings_of(fields):
+    """Options with the settings of a description."""
+    return [f"--set={field}" for field in fields]
+
+
 def words(text):
     """A text without the breaks of its lines."""
     return " ".join(text.split())

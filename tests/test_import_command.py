@@ -5,7 +5,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from commands import run, settings_of
+from command import run, settings_of
 
 from chipglow.io import (
     ImportDescription,

@@ -15,12 +15,7 @@ from chipglow.io.sources import SourceError, Units
 from chipglow.io.sources.grid import GridSource
 from chipglow.quantities.units import CELSIUS
 from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
-from chipglow.scene.completion import (
-    Completion,
-    complete,
-    optical_flow,
-    strain_rate_along,
-)
+from chipglow.scene.completion import Completion, complete, optical_flow, strain_rate_along
 
 RASTER = Raster(0.0, 100e-6, 2e-6, 50, 60)
 WHOLE = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")

@@ -24,12 +24,7 @@ from synthetic_edge import (
 )
 
 from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
-from chipglow.laboratory.psf import (
-    NoEdgeError,
-    edge_image,
-    knife_edge,
-    psf_kernel,
-)
+from chipglow.laboratory.psf import NoEdgeError, edge_image, knife_edge, psf_kernel
 from chipglow.laboratory.psf.psf_models import (
     AnnularModel,
     DefocusedDiscModel,

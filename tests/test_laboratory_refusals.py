@@ -11,13 +11,7 @@ from command import refusal
 from heated_chip import RASTER, REGIONS, table_1
 from measured_band import TOOL, BandImage
 from PIL import Image
-from synthetic_edge import (
-    edge_radiance,
-    gaussian_aperture,
-    gaussian_edge,
-    image_of,
-    measurement_of,
-)
+from synthetic_edge import edge_radiance, gaussian_aperture, gaussian_edge, image_of, measurement_of
 
 from chipglow.camera import Flag, Measurement
 from chipglow.io import write_measurement

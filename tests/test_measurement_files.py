@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from analytic_chip import AnalyticChip
-from commands import run, settings_of
+from command import run, settings_of
 from PIL import Image
 
 from chipglow.camera import (

@@ -105,10 +105,7 @@ def test_a_link_stays_and_its_target_is_written(tmp_path):
         write(tmp_path / "results", text)
         with atomic_path(tmp_path / "file") as part:
             part.write_text(text)
-        assert contents(tmp_path / "far") == {
-            "results/summary.json": text,
-            "file": text,
-        }
+        assert contents(tmp_path / "far") == {"results/summary.json": text, "file": text}
     assert (tmp_path / "results").is_symlink()
     assert (tmp_path / "file").is_symlink()
     (tmp_path / "nowhere").symlink_to(tmp_path / "missing" / "results")

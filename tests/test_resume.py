@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from commands import run
+from command import run
 from PIL import Image
 from test_io import a_frame
 from test_preview import assert_same_frames
