@@ -165,7 +165,6 @@ class Fit:
 
 
 def computed(experiments, places, processes):
-    """Return the means of every cut by name at every place; the paper's edge radius is fixed."""
     tasks = [
         (one, (*place[:-1], 0.0) if one.name == "paper" else place)
         for place in places

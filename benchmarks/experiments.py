@@ -144,7 +144,6 @@ def compute(simulation):
 
 
 def drift(history):
-    """Return the relative change of the mean cutting force between halves after the build-up."""
     steady = history.time > BUILD_UP * history.time[-1] * (1 + 1e-9)
     first, second = np.array_split(history.cutting[steady], 2)
     return float(second.mean() / first.mean() - 1)

@@ -72,7 +72,6 @@ _PAGE = (200, 215, 235)
 
 
 def known_field(number, shape=SHAPE):
-    """Return the temperature of a picture in K, NaN where there is no material."""
     y, x = np.linspace(1, 0, shape[0])[:, None], np.linspace(0, 1, shape[1]) - 0.01 * number
     spot = 500 * np.exp(-((x - 0.55) ** 2 + (y - 0.45) ** 2) / 0.02)
     band = 300 * np.exp(-(((y - 0.3 - 0.8 * (x - 0.3)) / 0.03) ** 2))
@@ -173,7 +172,6 @@ def read_with_legend(path, codec, colours, edges, count):
 
 
 def chosen(given, maps, codecs):
-    """Return the maps and codecs that the command names; all if it names none."""
     return (
         [one for one in maps if not given.maps or one.name in given.maps],
         [one for one in codecs if not given.codecs or one.name in given.codecs],

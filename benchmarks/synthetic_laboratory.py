@@ -240,7 +240,6 @@ class Laboratory:
             write_hcc(path, camera.Recording(counts, *described, float(self.detector.saturation)))
 
     def _field(self):
-        """Return the true temperature of the hot chip, uniform in the middle."""
         rows, columns = self.emissivity.shape
         x = PITCH / SAMPLES * (np.arange(columns) - (columns - 1) / 2)
         y = PITCH / SAMPLES * (np.arange(rows) - (rows - 1) / 2)
@@ -297,7 +296,6 @@ class Evaluation:
         return measurement.load_calibration(path)
 
     def images(self, pattern):
-        """Return recordings as measurements, as ``chipglow convert`` does."""
         fields = [*self.fields, f"calibration={self.folder.resolve() / 'calibration.yaml'}"]
         paths = sorted(self.folder.glob(pattern))
         if not pattern.endswith("hcc"):
@@ -333,7 +331,6 @@ class Evaluation:
         }
 
     def _spread(self):
-        """Return width and MTF of the optics, as ``chipglow psf`` does."""
         factor = NormalDist().inv_cdf(0.975)
         images = self.images("edge-*")
         result = knife_edge([edge_image(image, f"edge {k}") for k, image in enumerate(images, 1)])

@@ -170,7 +170,6 @@ def cuts_made(outcomes, tests):
 
 
 def outcome_of(trials, rake, cell):
-    """Return the means of the cut, stored or computed, or the error that stopped it."""
     name = f"{Condition(trials[0].speed, trials[0].feed).name}-{rake:g}"
     print(name, file=sys.stderr, flush=True)
     try:
