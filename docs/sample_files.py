@@ -291,6 +291,7 @@ def main() -> None:
     wanted = parser.parse_args()
     wanted.folder.mkdir(parents=True, exist_ok=True)
     write_samples(wanted.page, wanted.folder)
+    print(f"files of the page {wanted.page} are in {wanted.folder.resolve()}")
 
 
 if __name__ == "__main__":

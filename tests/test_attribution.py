@@ -13,9 +13,11 @@ from chipglow.analysis.attribution import (
     REST,
     attribute,
     interaction_matrix,
+    read_attribution,
     sampled_shapley,
     shapley_matrix,
 )
+from chipglow.analysis.places import HottestPlace
 from chipglow.camera import (
     Camera,
     Detector,
@@ -245,6 +247,18 @@ def test_the_report_states_the_causes_of_each_main_error(chip_analysis):
     values = attribution.contributions(facts)["rake"]
     assert f"emissivity −{abs(values['emissivity']):.0f} K" in rake
     assert f"is {abs(sum(values.values())):.0f} K below the true temperature" in rake
+
+
+def test_a_peak_is_divided_at_the_hottest_pixel_of_the_reference(scene):
+    camera = replace(CAMERA, detector=None, lower_limit=None, reflected=None)
+    data = attribute(scene, camera, UniformSurface(0.6))
+    images = data.reference.values, data.measured.values
+    read, _ = read_attribution(data, HottestPlace(), images, camera.pixels(scene.raster))
+    row, column = np.unravel_index(np.nanargmax(images[0]), images[0].shape)
+    np.testing.assert_array_equal(read[0, :-1], data.contribution.values[:, row, column])
+    # Float32 images of 1000 K: 1e-4 K.
+    total = images[1][row, column] - images[0][row, column]
+    assert read[0, :-1].sum() == pytest.approx(total, abs=1e-3)
 
 
 def test_a_sentence_describes_one_pixel(scene):

@@ -250,7 +250,7 @@ def test_cut_writes_the_scene_and_keeps_it_in_the_cache(folder, runs, tmp_path):
     assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
     listed = chipglow("cache", "list").output
     assert re.search(r"\d MB  scene-[0-9a-f]{32}\.nc", listed)
-    assert re.search(r"1 scenes, \d+\.\d MB in ", listed)
+    assert re.search(r"1 scene, \d+\.\d MB in ", listed)
     with full_disk(50_000):
         refused(("cut", "study.yaml", "--out", "second.nc"), "chipglow: second.nc: File too large")
     assert len(runs) == 1

@@ -208,3 +208,7 @@ def test_a_working_f_number_is_that_of_the_light_at_the_detector():
     # Abbe's sine condition: NA at the detector, 1 / (2 N), times the magnification.
     assert AiryAperture(working_f_number=2.5).aperture(4.0) == pytest.approx(0.8)
     assert AiryAperture(working_f_number=2.5).aperture(1.0) == pytest.approx(0.2)
+    # A lens that takes less light than the cold stop admits decides.
+    both = AiryAperture(numerical_aperture=0.25, working_f_number=2.5)
+    assert both.aperture(2.5) == 0.25
+    assert both.aperture(1.0) == pytest.approx(0.2)

@@ -302,9 +302,9 @@ def test_the_answer_ends_with_the_true_temperature_without_and_with_emissivity(f
     emissivity = float(facts.data.set_emissivity.sel(surface="chip 2"))
     assert 0.74 < emissivity < 0.88
     assert sentences_of(facts)[-1] == (
-        f"At the first of these places (rake face) the reading is {-plain:.0f} K too low against "
-        f"the true temperature with emissivity 1, and {-corrected:.0f} K too low with emissivity "
-        f"{emissivity:.2f} set in the camera."
+        f"Compared with the true temperature, the reading at the rake face is {-plain:.0f} K too "
+        f"low if the camera is set to emissivity 1, and {-corrected:.0f} K too low if it is set to "
+        f"{emissivity:.2f}."
     )
     rows = {row.key: row for row in result_rows(facts.analysis)}
     assert rows["rake_true_error_degC"].here == plain

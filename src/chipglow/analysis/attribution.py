@@ -174,13 +174,13 @@ def read_attribution(
     """Return contributions at the readings of a place, (reading, effect), and along its lines.
 
     The readings are at the positions at which the place reads the reference and the measured
-    image, `images`; their last column is the gain of half the exposure. The lines by name are of
+    image, `images`, of a peak at that of the reference; their last column is the gain of half the exposure. The lines by name are of
     shape (effect, point).
     """
     first, gain = len(images), data.gain_half_exposure.values
     stack = np.concatenate([np.stack(images), data.contribution.values, gain[None]])
     lines = place.sampled(stack, pixels)
-    read = place.read(stack, pixels, lines)[:, first:]
+    read = place.read_parts(stack, pixels, lines)[:, first:]
     return read, {name: along[first:-1] for name, along in lines.items()}
 
 

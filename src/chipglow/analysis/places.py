@@ -55,6 +55,10 @@ class Place(ABC):
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         """Return the `quantities` of images (reference first) and their `lines`; NaN for none."""
 
+    def read_parts(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
+        """Return the readings of all images at the positions that the first two determine."""
+        return self.read(images, pixels, lines)
+
     def outline(self) -> NDArray[np.float64] | None:
         """Return points to draw it, x and y in m, shape (n, 2); None for the whole image."""
         return None
@@ -156,6 +160,10 @@ class HottestPlace(Place):
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         largest = np.where(np.isnan(images), -np.inf, images).max(axis=(1, 2))
         return np.where(np.isfinite(largest), largest, np.nan)[None]
+
+    def read_parts(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
+        row, column = np.unravel_index(np.nanargmax(images[0]), images[0].shape)
+        return images[None, :, row, column]
 
 
 @dataclass(frozen=True)

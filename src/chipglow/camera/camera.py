@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field_calibration
-from chipglow.camera.detector.response import OperationPoint, in_tables
+from chipglow.camera.detector.response import OperationPoint, RangeResponse, in_tables
 from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows, lagged
 from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
@@ -173,6 +173,12 @@ class Camera(Part):
                     f"Camera.{name}: {time:g} s is longer than the frame period of "
                     f"{1 / self.frame_rate:g} s"
                 )
+        response = self.detector.response if self.detector else None
+        if isinstance(response, RangeResponse) and (self.lower_limit or 0.0) >= response.hottest:
+            raise ValueError(
+                f"Camera.lower_limit: {self.lower_limit:g} K must be below the upper end of the "
+                f"range, {response.hottest:g} K (detector.response.hottest)"
+            )
         if (
             self.lower_limit is not None
             and self.lower_limit <= _SUSPECT_LIMIT

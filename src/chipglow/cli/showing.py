@@ -110,7 +110,7 @@ def _scene_facts(scene: StoredScene, path: Path) -> _Rows:
 
 
 def _where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Rows:
-    left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
+    left, right, bottom, top = (f"{round(1e6 * edge, 6):.6g} µm" for edge in raster.extent)
     yield name, f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
     yield "x", f"{left} to {right}"
     yield "y", f"{bottom} to {top}"

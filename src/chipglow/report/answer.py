@@ -114,7 +114,7 @@ def error_text(error: Distribution) -> str:
         return f"{text} (a single draw)"
     low, high = sorted(scale * end for end in error.interval)
     if not isfinite(low):
-        return f"{text} (no interval: {error.draws} draws with too few degrees of freedom)"
+        return f"{text} (no interval: too few {error.causes[0]}s)"
     least = quantity_text(abs(low), "K", 0) + (f" too {other}" if low < 0 else "")
     most = f"{quantity_text(high, 'K', 0)} too {way}"
     return f"{text} on average; in a single frame between {least} and {most}"

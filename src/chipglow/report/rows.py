@@ -256,10 +256,10 @@ def draws_text(draws: Distribution | None, scale: float = 1.0, unit: str = "K") 
 
 
 def _decimals(draws: Distribution) -> int:
-    """Return one decimal for numbers below ten, else none."""
+    """Return one decimal for numbers below ten and for small uncertainties, else none."""
     deviation = draws.standard_deviation
     size = max(abs(draws.mean), deviation if isfinite(deviation) else 0.0)
-    return 0 if size >= 9.95 else 1
+    return 0 if size >= 9.95 and not draws.expanded_uncertainty < 0.95 else 1
 
 
 def spread_text(

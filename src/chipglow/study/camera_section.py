@@ -23,7 +23,7 @@ from chipglow.camera import (
 )
 from chipglow.io.column_file import read_response
 from chipglow.quantities import FileBeside, Parameter, Part
-from chipglow.quantities.units import LENGTH, POSITION, WAVELENGTHS
+from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.study.scaling import with_pitch
@@ -179,7 +179,8 @@ class CameraSection(Part):
         if self.detector is None:
             raise ValueError("lower_limit: detector requires a detector")
         point = OperationPoint(band, self.integration_time, self.frame_rate, self.fill_factor)
-        return lower_range_limit(self.detector, point)
+        limit = lower_range_limit(self.detector, point)
+        return limit if limit > COLDEST else None
 
     def _psf(self, band: Band) -> PointSpreadFunction | None:
         if self.psf is None:

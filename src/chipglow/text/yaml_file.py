@@ -21,7 +21,9 @@ class DescriptionError(ValueError):
 def read_small_text(path: Path) -> str:
     """Read a text file in UTF-8, with or without a byte order mark."""
     if path.stat().st_size > _LARGEST_FILE:
-        raise DescriptionError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
+        raise DescriptionError(
+            f"{path}: is too large for a YAML file, expected up to {_LARGEST_FILE // 1000} kB"
+        )
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:

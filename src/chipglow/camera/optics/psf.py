@@ -322,7 +322,7 @@ class MeasuredPSF(PointSpreadFunction):
 
 @dataclass(frozen=True)
 class ApertureChoice(PSFChoice):
-    """Aperture from the data sheet of a lens: one of three numbers."""
+    """Aperture from the data sheets of lens and camera: the smaller of their cones of light."""
 
     numerical_aperture: Annotated[
         float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
@@ -339,7 +339,7 @@ class ApertureChoice(PSFChoice):
         float | None,
         Parameter(
             "F-number of the light at the detector, of a cooled camera that of its cold stop; the "
-            "numerical aperture is m / (2 working_f_number).",
+            "numerical aperture is m / (2 working_f_number), or that of the lens if it is smaller.",
             over=0.0,
         ),
     ] = None
@@ -347,12 +347,16 @@ class ApertureChoice(PSFChoice):
     def __post_init__(self) -> None:
         super().__post_init__()
         given = self.numerical_aperture, self.f_number, self.working_f_number
-        if sum(one is not None for one in given) != 1:
-            raise ValueError("pass one of numerical_aperture, f_number and working_f_number")
+        of_both = self.f_number is None and None not in (given[0], given[2])
+        if sum(one is not None for one in given) != 1 + of_both:
+            raise ValueError(
+                "set numerical_aperture, f_number or working_f_number; only numerical_aperture "
+                "and working_f_number can be combined"
+            )
 
     def aperture(self, magnification: float | None) -> float:
         """Return the numerical aperture on the scene's side."""
-        if self.numerical_aperture is not None:
+        if self.working_f_number is None and self.numerical_aperture is not None:
             return self.numerical_aperture
         name = "f_number" if self.working_f_number is None else "working_f_number"
         if magnification is None:
@@ -361,6 +365,8 @@ class ApertureChoice(PSFChoice):
             return magnification / (2 * self.f_number * (1 + magnification))
         assert self.working_f_number is not None
         aperture = magnification / (2 * self.working_f_number)
+        if self.numerical_aperture is not None:
+            return min(aperture, self.numerical_aperture)
         if aperture > 1:
             raise ValueError(
                 f"working_f_number: {self.working_f_number:g} gives a numerical aperture of "

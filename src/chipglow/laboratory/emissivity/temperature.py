@@ -271,8 +271,8 @@ def _far(row: TrueTemperature, line: EmissivityLine) -> Iterator[str]:
     if difference > FAR:
         ends = [f"{end - ZERO_CELSIUS:.0f} °C" for end in dict.fromkeys((low, high))]
         yield (
-            f"{row.name}: is {difference:.0f} K from the {' to '.join(ends)} at which its "
-            "emissivity was determined; u does not include the error of the extrapolation."
+            f"{row.name}: its emissivity was determined {difference:.0f} K away, at "
+            f"{' to '.join(ends)}; u does not include the error of the extrapolation."
         )
 
 

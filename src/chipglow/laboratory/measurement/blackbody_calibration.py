@@ -163,6 +163,6 @@ def _warnings(
         )
     if not common_known:
         yield (
-            "The uncertainty holds no error that all temperatures of the blackbody have in common "
+            "The uncertainty does not include a common error of all blackbody temperatures "
             "(common_uncertainty)."
         )
