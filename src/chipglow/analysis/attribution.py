@@ -174,8 +174,8 @@ def read_attribution(
     """Return contributions at the readings of a place, (reading, effect), and along its lines.
 
     The readings are at the positions at which the place reads the reference and the measured
-    image, `images`, of a peak at that of the reference; their last column is the gain of half the exposure. The lines by name are of
-    shape (effect, point).
+    image, `images`, of a peak at that of the reference; their last column is the gain of half the
+    exposure. The lines by name are of shape (effect, point).
     """
     first, gain = len(images), data.gain_half_exposure.values
     stack = np.concatenate([np.stack(images), data.contribution.values, gain[None]])
