@@ -20,6 +20,7 @@ from chipglow.study.camera_section import CAMERAS
 from chipglow.study.fitting import left_to_the_paper
 from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import CHIP_1, CHIP_2, Dispersion, HagenRubens, Origin
+from chipglow.text import Notes
 
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
@@ -223,11 +224,11 @@ def test_a_dear_cut_is_begun_only_if_the_user_says_so(agreed, asked, monkeypatch
 def test_what_is_too_coarse_is_said():
     coarse = Study(cutting={"feed": "0.05 mm", "numerics": {"cell": "10 um"}})
     scene = AnalyticChip(frames=10, frame_spacing=8e-6).scene()
-    told = " ".join(fit(coarse, scene).notes.assumed)
+    told = " ".join(fit(coarse, scene).notes.warnings)
     assert "The feed is 5 cells: too coarse" in told
     assert "represents 8 us of the exposure's 10 us" in told
     fine = AnalyticChip(frames=10, frame_spacing=1e-6).scene()
-    assert fit(Study(), fine).notes.assumed == []
+    assert fit(Study(), fine).notes == Notes()
 
 
 def test_the_reference_true_needs_no_quotes(tmp_path):

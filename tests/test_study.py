@@ -202,7 +202,7 @@ REFUSED = [
     ("x: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
     ("seed: 2026-13-45", "month must be in 1..12, expected YAML"),
     (b"\x89HDF\r\n\x1a\n\xff\xfe", "expected text in UTF-8"),
-    ("seed: 1\n" + 1_000_000 * "#", "expected a file of up to 1000 kB"),
+    ("seed: 1\n" + 1_000_000 * "#", "expected a text of up to 1000 kB"),
 ]
 
 

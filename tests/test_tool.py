@@ -324,7 +324,7 @@ BAD = {
         HEAD + "0,500\n0,0\n600,-30\n"
     ),
     "line 1002: 1001 points, expected 3 to 1000": HEAD + 1001 * "0,500\n",
-    "expected a file of up to 1000 kB": HEAD + 250_000 * "0,1\n",
+    "expected a text of up to 1000 kB": HEAD + 250_000 * "0,1\n",
     r"edge\.csv: expected text in UTF-8": HEAD + "\xff\xfe\n",
 }
 

@@ -243,9 +243,8 @@ def list_cache() -> None:
         when = datetime.fromtimestamp(scene.modified).strftime("%Y-%m-%d %H:%M")
         screen.heading(f"{when}  {_megabytes(scene.size):>10}  {scene.path.name}")
     total = sum(scene.size for scene in scenes)
-    screen.say(
-        f"{len(scenes)} scene{'' if len(scenes) == 1 else 's'}, {_megabytes(total)} in {cache_folder()}"
-    )
+    count = "1 scene" if len(scenes) == 1 else f"{len(scenes)} scenes"
+    screen.say(f"{count}, {_megabytes(total)} in {cache_folder()}")
     screen.values({"scenes": {str(scene.path): scene.size for scene in scenes}, "bytes": total})
 
 

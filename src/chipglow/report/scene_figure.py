@@ -40,6 +40,9 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         histograms = histogram_rows * _HISTOGRAM
         figure = drawing.new_figure(images + histograms)
         figure.suptitle(f"{frame.time * 1e6:.6g} µs")
+        # The layout of subfigures leaves too little room for labels on their left.
+        engine: Any = figure.get_layout_engine()
+        engine.set(rect=(0.02, 0.0, 0.98, 1.0))
         parts: Any = figure.subfigures(2, 1, height_ratios=(images, histograms))
         top, bottom = parts
         grid = top.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)

@@ -71,7 +71,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
         )
     assumed.extend(_measured_at(surfaces))
     assumed.extend(uncovered(surfaces, scene.raster))
-    assumed.extend(_too_coarse(study, scene))
+    notes.warnings.extend(_too_coarse(study, scene))
     return Fitted(scene, surfaces, notes)
 
 
@@ -110,7 +110,8 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
     if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
         yield (
             f"Each frame of the scene represents {spacing * 1e6:.3g} us of the exposure's "
-            f"{exposure * 1e6:.3g} us: motion within that time is neglected."
+            f"{exposure * 1e6:.3g} us: motion within that time is neglected. Use a scene with more "
+            "frames."
         )
     cutting = study.cutting
     cells = cutting.feed / cutting.numerics.cell

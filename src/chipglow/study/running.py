@@ -136,7 +136,9 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
     with _fitted(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
         analysis = analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
-        return replace(analysis, assumed=tuple(fitted.notes.assumed))
+        notes = fitted.notes
+        warnings = (*notes.warnings, *analysis.warnings)
+        return replace(analysis, assumed=tuple(notes.assumed), warnings=warnings)
 
 
 def errors(study: Study, progress: Progress | None = None, resume: bool = False) -> Analysis:

@@ -21,9 +21,8 @@ class DescriptionError(ValueError):
 def read_small_text(path: Path) -> str:
     """Read a text file in UTF-8, with or without a byte order mark."""
     if path.stat().st_size > _LARGEST_FILE:
-        raise DescriptionError(
-            f"{path}: is too large for a YAML file, expected up to {_LARGEST_FILE // 1000} kB"
-        )
+        most = f"{_LARGEST_FILE // 1000} kB"
+        raise DescriptionError(f"{path}: is too large, expected a text of up to {most}")
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
