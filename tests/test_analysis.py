@@ -160,7 +160,7 @@ def test_a_straight_ridge_is_found_where_it_is(degrees, width):
     assert np.abs(across[inner]).max() < 0.4e-6
     assert np.abs(across).max() < width / 2
     assert band.reaches_surface
-    assert distance[-1] == pytest.approx((200e-6 - shape.edge[1]) / sin(angle), abs=width)
+    assert distance[-1] == pytest.approx((200e-6 - TOOL.edge_point[1]) / sin(angle), abs=width)
     # At 50 degrees and under 29 µm from the edge the ridge's line is in the layer left out.
     assert band.start < (10e-6 if degrees < 45.0 else 35e-6)
     # Linear interpolation of the flanks at a sixth of the width: 2 %.

@@ -25,7 +25,7 @@ NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 PROGRAMS = {
     "app_latency.py": (
         "--turns 1 --controls Seed",
-        {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 3},
+        {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 1},
     ),
     "calibration.py": (
         "--repeats 2",
