@@ -124,8 +124,8 @@ def _results(folder: Path) -> SceneModel:
     study = load_study(file)
     if study.scene is None and not is_cut(study):
         raise ValueError(
-            f"{folder}: the scene of its study is not in the cache; set "
-            f"chipglow run {file} --out {folder} was done on this machine, or a scene file"
+            f"{folder}: the scene of its study is not in the cache; repeat "
+            f"chipglow run {file} --out {folder}, or open a scene file"
         )
     scene = open_scene(study.scene or cut(study))
     return scene_model(scene, study, folder.name, study.scene)
