@@ -38,14 +38,14 @@ def words(text):
 
 def refusal(command):
     """The one line with which a command line ends that is refused."""
-    lines = typed(command, code=2).output.strip().splitlines()
-    assert [line for line in lines if line.startswith("chipglow: ")] == lines[-1:]
+    lines = refused(shlex.split(command), COLUMNS="160").strip().splitlines()
+    assert lines[-1].startswith("chipglow: ")
     return lines[-1]
 
 
-def refused(arguments, *parts, code=2):
+def refused(arguments, *parts, code=2, **environment):
     """What a command prints that is refused: one line of its own, which has the parts."""
-    output = chipglow(*arguments, code=code).output
+    output = chipglow(*arguments, code=code, **environment).output
     (line,) = (line for line in output.splitlines() if line.startswith("chipglow: "))
     assert "Traceback" not in output
     for part in parts:

@@ -95,8 +95,7 @@ def _scene_facts(scene: StoredScene, path: Path) -> _Rows:
     raster, times, data = scene.raster, scene.times, scene.data
     yield from _where_and_when("samples", raster, times)
     if len(scene.blocks) > 1:
-        ends = (times[[one[0], one[-1]]] for one in scene.blocks)
-        spans = (f"{microseconds(first)} to {microseconds(last)}" for first, last in ends)
+        spans = (_span(times[one.start : one.stop]) for one in scene.blocks)
         yield "parts without gap", ", ".join(spans)
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
@@ -114,12 +113,16 @@ def _where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _R
     yield name, f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
     yield "x", f"{left} to {right}"
     yield "y", f"{bottom} to {top}"
-    yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
+    yield "frames", f"{len(times)}, {_span(times)}"
     if len(times) > 1:
         least, mean, largest = (float(f(np.diff(times))) for f in (np.min, np.mean, np.max))
         is_even = largest - least < 1e-3 * mean
         uneven = f"{microseconds(least)} to {microseconds(largest)}"
         yield "interval", microseconds(mean) if is_even else uneven
+
+
+def _span(times: NDArray[np.float64]) -> str:
+    return f"{microseconds(times[0])} to {microseconds(times[-1])}"
 
 
 def _tool_text(tool: Tool) -> str:

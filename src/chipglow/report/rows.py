@@ -199,7 +199,10 @@ def _drawn(
         more["decimals"] = _decimals(draws)
     reading = facts.data.sel(reading=name)
     surface, place = (str(reading[one].item()) for one in ("seen_surface", "place"))
-    names = {"id": name, "name": name, "surface": surface, "place": place}
+    where = place if name in MAIN else name
+    if name == "band_worst":
+        where = "beside the shear band"
+    names = {"id": name, "name": name, "surface": surface, "where": where}
     more |= {"draws": draws, "one_draw": known(one)}
     mean = draws.mean if draws else nan
     return _row(facts, key, readings.get(key, readings[kind]), mean, names, **more)
@@ -281,5 +284,9 @@ def deviation_text(
     text = spread_text(value, None, unit, decimals, sign)
     if text == "–" or deviation is None or not isfinite(deviation):
         return text
-    of_difference = "K" if unit == "°C" else unit
-    return f"{text} (sd {quantity_text(deviation, of_difference, decimals)})"
+    return f"{text} (sd {quantity_text(deviation, difference_unit(unit), decimals)})"
+
+
+def difference_unit(unit: str) -> str:
+    """Return the unit of differences of values in a unit."""
+    return "K" if unit == "°C" else unit

@@ -11,7 +11,7 @@ from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip import contact_temperatures, rake_grid
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
-from chipglow.report.rows import deviation_text, slug
+from chipglow.report.rows import deviation_text, difference_unit, slug
 
 Spread = tuple[float, float]
 """Mean and standard deviation; NaN where unknown."""
@@ -37,12 +37,11 @@ class ToolRow:
 
     @property
     def cells(self) -> Mapping[str, str]:
-        unit = "K" if self.unit == "°C" else self.unit
         return {
             "quantity": self.quantity,
             "own": deviation_text(*self.own, self.unit, 0),
             "steady": deviation_text(*self.steady, self.unit, 0),
-            "difference": deviation_text(*self.difference, unit, 0, "+"),
+            "difference": deviation_text(*self.difference, difference_unit(self.unit), 0, "+"),
         }
 
     @property

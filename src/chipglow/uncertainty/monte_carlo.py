@@ -115,9 +115,9 @@ def monte_carlo(
 def _summary(values: Array, ends: tuple[float, float], has_variance: bool) -> Array:
     """Return mean and standard deviation, NaN without a variance, and the interval's ends."""
     with np.errstate(invalid="ignore"):
-        mean, deviation = values.mean(axis=0), values.std(axis=0, ddof=1)
-    unknown = np.nan if not has_variance else 0.0
-    return np.array([mean + unknown, deviation + unknown, *np.quantile(values, ends, axis=0)])
+        moments = np.array([values.mean(axis=0), values.std(axis=0, ddof=1)])
+    moments = moments if has_variance else np.full_like(moments, np.nan)
+    return np.concatenate([moments, np.quantile(values, ends, axis=0)])
 
 
 def _is_stable(blocks: Array, digits: int, level: float) -> bool:

@@ -346,9 +346,12 @@ class ApertureChoice(PSFChoice):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = self.numerical_aperture, self.f_number, self.working_f_number
-        of_both = self.f_number is None and None not in (given[0], given[2])
-        if sum(one is not None for one in given) != 1 + of_both:
+        given = {
+            name
+            for name in ("numerical_aperture", "f_number", "working_f_number")
+            if getattr(self, name) is not None
+        }
+        if len(given) != 1 and given != {"numerical_aperture", "working_f_number"}:
             raise ValueError(
                 "set numerical_aperture, f_number or working_f_number; only numerical_aperture "
                 "and working_f_number can be combined"

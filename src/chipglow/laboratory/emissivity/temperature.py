@@ -10,6 +10,7 @@ from uuid import uuid4
 import numpy as np
 import pandas as pd
 import scipy
+from numpy.typing import ArrayLike
 
 from chipglow.camera import FittedCalibration, Measurement
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
@@ -341,9 +342,9 @@ def _mean_radiance(
     return found + (random - mean)
 
 
-def _temperature(emissivity: float, reflected: float, band: Band, radiance: Array) -> Array:
+def _temperature(emissivity: ArrayLike, reflected: ArrayLike, band: Band, radiance: Array) -> Array:
     """Return the true temperature in K by apparent radiance in W/(m² sr): Equation 2."""
-    room = float(band.radiance(np.array(reflected)))
+    emissivity, room = np.asarray(emissivity), band.radiance(np.asarray(reflected))
     own = (radiance - (1 - emissivity) * room) / emissivity
     return np.asarray(band.temperature(own), np.float64)
 
@@ -352,11 +353,9 @@ def _modelled(
     slope: float, at: float, band: Band, emissivity: Array, radiance: Array, reflected: Array
 ) -> Array:
     """Return true temperatures in K; the emissivity in 1/K has a slope, and its value at `at`."""
-    room = band.radiance(reflected)
-    found: Any = np.full_like(radiance, at)
+    found = np.full_like(radiance, at)
     for _ in range(_ROUNDS if slope else 1):
-        actual = emissivity + slope * (found - at)
-        found = band.temperature((radiance - (1 - actual) * room) / actual)
+        found = _temperature(emissivity + slope * (found - at), reflected, band, radiance)
     return np.where(np.isnan(found), inf, found)  # too little emissivity for any temperature
 
 
