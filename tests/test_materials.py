@@ -319,3 +319,25 @@ def test_a_drawn_steel_differs_in_its_damage_only():
 def test_a_material_whose_damage_was_not_fitted_is_not_drawn():
     with pytest.raises(ValueError, match="was not fitted"):
         workpiece("al-7075-t6").drawn(np.random.default_rng(1))
+
+
+def test_factors_scale_the_material_and_the_cut_in_the_cache():
+    plain = Study().cutting
+    factors = {"conductivity": 1.1, "hardening": 0.9, "density": 1.0}
+    scaled = replace(plain, workpiece_factors=factors)
+    one, other = plain.material(), scaled.material()
+    np.testing.assert_allclose(
+        other.conductivity.at([300.0, 900.0]), 1.1 * one.conductivity.at([300.0, 900.0])
+    )
+    assert other.flow_stress.hardening == 0.9 * one.flow_stress.hardening
+    assert other.damage == one.damage
+    inputs = [scene_inputs(Study(cutting=part)) for part in (plain, scaled)]
+    assert inputs[0] != inputs[1]
+    assert inputs[0] == scene_inputs(
+        Study(cutting=replace(plain, workpiece_factors={"density": 1.0}))
+    )
+
+
+def test_an_unknown_factor_is_refused():
+    with pytest.raises(ValueError, match=r"workpiece_factors: 'colour', expected one of .*density"):
+        Study(cutting={"workpiece_factors": {"colour": 2.0}})

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import time
 from functools import partial
 from pathlib import Path
 
@@ -192,6 +193,15 @@ def test_a_killed_worker_costs_its_task_alone(tmp_path):
     assert min(times) == 1
     # A worker's finished tasks may be repeated only while the client has not released them.
     assert sum(times) <= 40 + 2
+
+
+def test_a_cluster_without_workers_ends_the_sweep(monkeypatch):
+    monkeypatch.setattr("chipglow.study.workers._SILENCE", 0.5)
+    with local_client(None, 1, 1) as client:
+        client.cluster.scale(0)
+        client.cluster.sync(client.cluster._correct_state)
+        with pytest.raises(ConnectionError, match="every worker of the cluster is lost"):
+            list(on_client(client, time.sleep, [(0.1,)]))
 
 
 def test_the_figure_draws_each_point_over_each_setting(study, tmp_path):

@@ -1,7 +1,8 @@
 """Materials of the cut: mechanics and heat."""
 
-from dataclasses import dataclass, replace
-from typing import Annotated, Final
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,6 +47,19 @@ class TemperatureTable:
     def sampled(self) -> NDArray[np.float64]:
         """Return values at every kelvin from 200 K to 3000 K, for kernels."""
         return self.at(_KELVINS)
+
+
+def _numbers(part: Any) -> list[str]:
+    """Return the names of the fields of a part that are numbers or tables of numbers."""
+    kinds = (float, int, TemperatureTable, RateTable)
+    every = [one.name for one in fields(part)] if part is not None else []
+    return [name for name in every if isinstance(getattr(part, name), kinds)]
+
+
+def _times(quantity: Any, factor: float) -> Any:
+    if isinstance(quantity, float | int):
+        return quantity * factor
+    return replace(quantity, values=tuple(factor * one for one in quantity.values))
 
 
 _KELVINS: Final = np.arange(TABLE_COLDEST, TABLE_HOTTEST + 1.0)
@@ -163,6 +177,26 @@ class WorkpieceMaterial(Part):
         if self.damage is None or self.fitted_damage is None:
             raise ValueError(f"{self.name}: its damage was not fitted, nothing to draw from")
         return replace(self, damage=self.fitted_damage.draw(self.damage, generator))
+
+    def scaled(self, factors: Mapping[str, float]) -> "WorkpieceMaterial":
+        """Return the material with some of its numbers multiplied by factors, by name.
+
+        A name is looked for in the material, in its flow stress, then in its damage.
+        """
+        parts: dict[str, Any] = {"damage": self.damage, "flow_stress": self.flow_stress}
+        owners = {name: key for key, part in parts.items() for name in _numbers(part)}
+        owners |= dict.fromkeys(_numbers(self), "")
+        own: dict[str, Any] = {}
+        for name, factor in factors.items():
+            if name not in owners:
+                known = ", ".join(sorted(owners))
+                raise ValueError(f"workpiece_factors: {name!r}, expected one of {known}")
+            if key := owners[name]:
+                part = own.get(key, parts[key])
+                own[key] = replace(part, **{name: _times(getattr(part, name), factor)})
+            else:
+                own[name] = _times(getattr(self, name), factor)
+        return replace(self, **own)
 
     def failing_layer(self, cell: float) -> float:
         """Return the thickness in m of the layer that a failure softens; `cell` in m."""

@@ -13,6 +13,7 @@ from chipglow.cutting import (
     OutputWindow,
     Surroundings,
     ToolBody,
+    WorkpieceMaterial,
     is_own_file,
     material_names,
     tool_material,
@@ -99,6 +100,14 @@ class CuttingSection(CuttingConditions):
             "flow stress after a slash (aisi-1045/ozel); or your own file (steel.yaml)",
         ),
     ] = "aisi-1045"
+    workpiece_factors: Annotated[
+        dict[str, float],
+        Parameter(
+            "Factors on numbers of the workpiece's material, its flow stress and its damage, by "
+            "name, for sweeps and uncertainty budgets.",
+            allowed="{} or names and factors: {conductivity: 1.05, yield_stress: 0.95}",
+        ),
+    ] = field(default_factory=dict)
     tool: Annotated[CutToolSection, Parameter("The cutting tool.")] = field(
         default_factory=CutToolSection
     )
@@ -127,6 +136,11 @@ class CuttingSection(CuttingConditions):
                 f"window.end: {self.window.end * 1e3:g} mm is beyond cutting_length, "
                 f"expected up to {self.cutting_length * 1e3:g} mm"
             )
+        self.material()
+
+    def material(self) -> WorkpieceMaterial:
+        """Return the workpiece's material, with the factors on its numbers."""
+        return workpiece(self.workpiece).scaled(self.workpiece_factors)
 
     @property
     def duration(self) -> float:
@@ -139,7 +153,7 @@ class CuttingSection(CuttingConditions):
         return CuttingSimulation(
             conditions=CuttingConditions(**conditions),
             tool=self.tool.build(),
-            workpiece=workpiece(self.workpiece),
+            workpiece=self.material(),
             tool_material=tool_material(self.tool.material),
             friction=self.friction,
             numerics=self.numerics.around(self.field_of_view.build()),

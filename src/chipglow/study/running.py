@@ -208,7 +208,7 @@ def scene_inputs(study: Study) -> dict[str, Any]:
     simulation = study.cutting.simulation()
     tool = simulation.tool
     cutting = adapter(type(study.cutting)).dump_python(study.cutting)
-    del cutting["tool"]["outline"]
+    del cutting["tool"]["outline"], cutting["workpiece_factors"]
     workpiece, tool_material = map(asdict, (simulation.workpiece, simulation.tool_material))
     del workpiece["name"], tool_material["name"]  # everything else in a material file counts
     return {

@@ -1,6 +1,7 @@
 """Worker processes of a sweep: those of a Dask cluster, or of this machine."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
@@ -16,6 +17,9 @@ _TASKS_PER_WORKER: Final = 4
 
 _ALLOWED_FAILURES: Final = 10
 """Number of workers that may die with a task before the task fails."""
+
+_SILENCE: Final = 60.0
+"""Time in s without a finished task after which the cluster is asked for its workers."""
 
 
 def connected(scheduler: str) -> Client:
@@ -56,7 +60,7 @@ def on_client(
             function(*arguments)
             yield
         return
-    distributed, waiting = _distributed(), iter(every)
+    waiting = iter(every)
 
     def submit(count: int) -> list[Any]:
         return [
@@ -64,19 +68,35 @@ def on_client(
             for arguments in islice(waiting, count)
         ]
 
-    running = distributed.as_completed(submit(_TASKS_PER_WORKER * max(len(client.ncores()), 1)))
-    for future in running:
-        # Not `result`, which would fetch it and repeat the task if its worker died meanwhile.
-        if future.status == "error":
-            raise future.exception()
-        if future.status == "cancelled":
-            raise ConnectionError(
-                "the scheduler of the cluster is lost; the computed points are kept, run the sweep "
-                "again to continue"
-            )
-        future.release()
-        running.update(submit(1))
-        yield
+    running = set(submit(_TASKS_PER_WORKER * max(len(client.ncores()), 1)))
+    while running:
+        for future in _finished(client, running):
+            # Not `result`, which would fetch it and repeat the task if its worker died meanwhile.
+            if future.status == "error":
+                raise future.exception()
+            running.remove(future)
+            future.release()
+            running.update(submit(1))
+            yield
+
+
+def _finished(client: Client, running: Collection[Any]) -> Collection[Any]:
+    """Return the tasks that are finished, one or more; wait while the cluster has workers."""
+    while True:
+        try:
+            every = _distributed().wait(list(running), _SILENCE, "FIRST_COMPLETED")
+            return set(every.done)
+        except CancelledError:
+            raise _lost("the scheduler of the cluster") from None
+        except TimeoutError:
+            if not client.ncores():
+                raise _lost("every worker of the cluster") from None
+
+
+def _lost(what: str) -> ConnectionError:
+    return ConnectionError(
+        f"{what} is lost; the computed points are kept, run the sweep again to continue"
+    )
 
 
 def _distributed() -> Any:
