@@ -53,6 +53,7 @@ from chipglow.analysis.reductions import (
     sensitivity_psf_fraction as sensitivity_psf_fraction,
     with_errors as with_errors,
 )
+from chipglow.analysis.single import SingleReadings as SingleReadings
 from chipglow.analysis.straight_band import (
     READINGS as READINGS,
     StraightBand as StraightBand,

@@ -174,8 +174,7 @@ def analyse(
     tell = progress or (lambda label, part: None)
     task = _Task(scene, surfaces, camera, plan, tell, effects)
     fields = {name: camera.prepare(surface, scene) for name, surface in surfaces.items()}
-    cut, missing = _find_cut(task)
-    schedule = _scene_schedule(task) if cut is None else _cut_schedule(task, cut)
+    schedule, cut, missing = _schedule(task)
     looked = look(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
         name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
@@ -186,7 +185,7 @@ def analyse(
     variables = {
         **_scene_variables(task, frame, fields, looked),
         **_image_variables(measurements, looked, schedule.shown),
-        **looked.variables(HEADLINES if cut else {}, "segment" if cut else "exposure"),
+        **looked.variables("segment" if cut else "exposure"),
     }
     variables |= _corrected(camera, variables)
     variables |= task.attempt("attribution", lambda: _attribution(task, schedule, looked)) or {}
@@ -230,6 +229,19 @@ def analyse(
         missing=(*missing, *_unread(data)),
         failed=task.failed,
     )
+
+
+def schedule_of(
+    scene: Scene, surfaces: Mapping[str, Surface], camera: Camera, plan: Plan, tell: Progress
+) -> Schedule:
+    """Return the exposures, places and draws of an analysis."""
+    return _schedule(_Task(scene, surfaces, camera, plan, tell, CASES))[0]
+
+
+def _schedule(task: _Task) -> tuple[Schedule, Cut | None, tuple[str, ...]]:
+    """Return the schedule with the cut, if the scene shows one, or with what it lacks."""
+    cut, missing = _find_cut(task)
+    return _scene_schedule(task) if cut is None else _cut_schedule(task, cut), cut, missing
 
 
 def _find_cut(task: _Task) -> tuple[Cut | None, tuple[str, ...]]:
@@ -278,6 +290,7 @@ def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
             for order in PSF_ORDERS
             for width in plan.psf_widths
         ],
+        headlines=HEADLINES,
     )
 
 

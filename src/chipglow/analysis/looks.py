@@ -1,7 +1,7 @@
 """The loop of an analysis: images of a scene over exposures, textures and pixel phases."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Final, TypeAlias
 
@@ -56,6 +56,18 @@ class Schedule:
     reference: ReferenceKind
     effects: Mapping[str, Effect]  # the first switches nothing off
     vary: Sequence[Callable[[Camera], Camera]] = ()  # other cameras, for the first texture
+    headlines: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    """Names of the readings of a cut, by place and quantity."""
+
+    def named(self, view: int, text: str) -> str:
+        """Return the name of a line or reading, with its surface if there are several."""
+        several = not self.headlines and len(self.views) > 1
+        return f"{text} ({self.views[view].surface})" if several else text
+
+    def reading(self, view: int, place: str, quantity: str) -> str:
+        """Return the name of a reading."""
+        found = self.headlines.get((place, quantity))
+        return found or self.named(view, f"{place}, {quantity}")
 
     @property
     def varied_phases(self) -> tuple[int, ...]:
@@ -170,13 +182,10 @@ class Looked:
             peak = nearest(exposure.peak_radiance, raster, point)
             self.motion[row, *index] = temperature(mean) - temperature(peak)
 
-    def variables(self, names: Mapping[tuple[str, str], str], cause: str) -> Variables:
-        """Return variables of the Dataset; `names` names readings by place and quantity."""
+    def variables(self, cause: str) -> Variables:
+        """Return variables of the Dataset; `cause` of the scatter over the exposures."""
         schedule, views = self.schedule, self.schedule.views
         readings, lines, kelvin, metre = self.readings, self.lines, {"units": "K"}, {"units": "m"}
-
-        def named(view: int, text: str) -> str:
-            return f"{text} ({views[view].surface})" if not names and len(views) > 1 else text
 
         starts = schedule.starts[list(schedule.drawn)]
         variables: Variables = {
@@ -184,10 +193,7 @@ class Looked:
             "exposure": ("exposure", starts, {"units": "s", "title": cause}),
             "texture": ("texture", np.arange(self.read.shape[2])),
             "pixel_phase": ("pixel_phase", np.arange(self.read.shape[3])),
-            "reading": (
-                "reading",
-                [names.get((p, q), named(v, f"{p}, {q}")) for v, _, p, q in readings],
-            ),
+            "reading": ("reading", [schedule.reading(v, p, q) for v, _, p, q in readings]),
             "place": ("reading", [place for _, _, place, _ in readings]),
             "quantity": ("reading", [quantity for *_, quantity in readings]),
             "seen_surface": ("reading", [views[view].surface for view, *_ in readings]),
@@ -200,7 +206,7 @@ class Looked:
         if lines:
             over = "line", *_DRAWS
             variables |= {
-                "line": ("line", [named(view, line) for view, _, line in lines]),
+                "line": ("line", [schedule.named(view, line) for view, _, line in lines]),
                 "line_surface": ("line", [views[view].surface for view, _, _ in lines]),
                 "line_textures": ("line", [views[view].textures for view, _, _ in lines]),
                 **{

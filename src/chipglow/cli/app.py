@@ -12,6 +12,7 @@ import typer
 
 from chipglow.cli import options as opt
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
 from chipglow.cli.chip import rake, shearband
 from chipglow.cli.compare import compare
@@ -43,6 +44,7 @@ EXAMPLES = {
     "measure": "scene.nc --study study.yaml --chip 'chip 2' --out measured.nc",
     "wavelengths": "study.yaml --plot bands.png",
     "sweep": "study.yaml --vary camera.integration_time=2us,5us,10us --out sweep",
+    "budget": "study.yaml --at 'rake face' --out budget.csv --plot budget.png",
     "show": "measured.nc --plot measured.png",
     "app": "scene.nc",
     "materials": "aisi-1045",
@@ -155,6 +157,7 @@ app.command("import")(import_source)
 app.command()(measure)
 app.command()(wavelengths)
 app.command()(sweep)
+app.command()(budget)
 
 
 @app.command()

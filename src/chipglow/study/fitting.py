@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, TypeAlias
 
 from chipglow.analysis import Plan
 from chipglow.quantities import Part, own_settings
@@ -21,6 +21,8 @@ from chipglow.surface import (
 )
 from chipglow.text import Notes
 from chipglow.text.template import yaml_line
+
+Follow: TypeAlias = Literal["material", "mean", "none"]
 
 _FEW_FRAMES: Final = 5
 _FEW_CELLS: Final = 10
@@ -45,7 +47,6 @@ class Fitted:
 
 def fit(study: Study, scene: Scene) -> Fitted:
     """Fit a study to a scene that lacks material coordinates or a tool, as imports often do."""
-    surfaces = surfaces_of(study.surface, study.seed)
     notes = Notes()
     assumed = notes.assumed
     said = "cutting" in study.given and "tool" in study.cutting.given
@@ -57,10 +58,8 @@ def fit(study: Study, scene: Scene) -> Fitted:
             "The scene shows no tool: no radiation from beyond the rake face blurs into the chip, "
             "so errors there are larger than with a warm tool."
         )
-    follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"
-    changed = {name: _following(surface, follow) for name, surface in surfaces.items()}
-    if changed != surfaces and not scene.has_material_coordinates:
-        surfaces = changed
+    surfaces, follow = surfaces_on(study, scene)
+    if follow != "material":
         moving = {
             "mean": "textures move with the mean velocity of their feature",
             "none": "textures stay where they are, as it has no velocity either",
@@ -73,6 +72,16 @@ def fit(study: Study, scene: Scene) -> Fitted:
     assumed.extend(uncovered(surfaces, scene.raster))
     notes.warnings.extend(_too_coarse(study, scene))
     return Fitted(scene, surfaces, notes)
+
+
+def surfaces_on(study: Study, scene: Scene) -> tuple[dict[str, Surface], Follow]:
+    """Return a study's surfaces, and how their textures follow the material as far as known."""
+    surfaces = surfaces_of(study.surface, study.seed)
+    if scene.has_material_coordinates:
+        return surfaces, "material"
+    follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"
+    changed = {name: _following(surface, follow) for name, surface in surfaces.items()}
+    return changed, follow if changed != surfaces else "material"
 
 
 def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:

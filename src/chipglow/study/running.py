@@ -133,7 +133,7 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
     ValueError
         If the scene cannot be analysed as the study requires; the message names the scene file.
     """
-    with _fitted(study, progress, resume) as fitted:
+    with fitted_study(study, progress, resume) as fitted:
         camera = study.camera.on(fitted.scene.raster, study.seed)
         analysis = analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
         notes = fitted.notes
@@ -166,7 +166,7 @@ def wavelengths(study: Study, progress: Progress | None = None, resume: bool = F
         If the scene shows no band and no contact with a tool, and the study names no points.
     """
     plan = study.plan
-    with _fitted(study, progress, resume) as fitted:
+    with fitted_study(study, progress, resume) as fitted:
         scene = fitted.scene
         camera = study.camera.on(scene.raster, study.seed)
         if study.analysis.points:
@@ -189,7 +189,7 @@ def wavelengths(study: Study, progress: Progress | None = None, resume: bool = F
 
 
 @contextmanager
-def _fitted(study: Study, progress: Progress | None, resume: bool) -> Iterator[Fitted]:
+def fitted_study(study: Study, progress: Progress | None, resume: bool) -> Iterator[Fitted]:
     """Yield the scene and the surfaces of a study; errors name the scene file."""
     path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
     try:

@@ -12,6 +12,7 @@ from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import DERIVED, VIEWS, scaled, without
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
+from chipglow.study.uncertainty_section import UncertaintySection
 from chipglow.text import commented_yaml
 
 
@@ -67,6 +68,10 @@ class Study(Part):
     wavelengths: Annotated[
         WavelengthPlan, Parameter("Bands that chipglow wavelengths compares, alone and as ratios.")
     ] = field(default_factory=WavelengthPlan)
+
+    uncertainty: Annotated[
+        UncertaintySection, Parameter("Input quantities of the budget of chipglow budget.")
+    ] = field(default_factory=UncertaintySection)
 
     def _repr_html_(self) -> str:
         text = escape(commented_yaml("", self, set()))

@@ -328,7 +328,7 @@ def _key(study: Study | str, at: Sequence[str]) -> str:
     if isinstance(study, str):
         return _digest(study)
     content = adapter(Study).dump_python(study, mode="json")
-    del content["title"], content["wavelengths"]
+    del content["title"], content["wavelengths"], content["uncertainty"]
     if study.scene is None:
         content["cutting"] = scene_inputs(study)
     return _digest([_contents(content), sorted(at), version("chipglow")])

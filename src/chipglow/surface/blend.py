@@ -145,6 +145,10 @@ def blend_row(  # type: ignore[no-untyped-def]
 
 def in_blocks(count: int, work: Callable[[int, int], None], size: int = 16) -> None:
     """Work on rows (or columns) from a first up to a last number, a block in each call."""
-    firsts = range(0, count, size)
+    blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
+    if get_num_threads() == 1:
+        for first, last in blocks:
+            work(first, last)
+        return
     with ThreadPoolExecutor(get_num_threads()) as pool:
-        list(pool.map(work, firsts, (min(first + size, count) for first in firsts)))
+        list(pool.map(work, *zip(*blocks, strict=True)))

@@ -49,10 +49,11 @@ class MonteCarlo:
     def validates(self, estimate: Estimate) -> NDArray[np.bool_]:
         """Return where the interval of an estimate to first order agrees (JCGM 101:2008, 8.1).
 
-        The ends must agree to a digit less than the trials are stable (8.2).
+        The ends must agree to a digit less than the trials are stable (8.2), and to one at least.
         """
         reach = estimate.expanded_uncertainty(self.level)
-        tolerance = numerical_tolerance(estimate.standard_uncertainty, self.digits - 1)
+        digits = max(self.digits - 1, 1)
+        tolerance = numerical_tolerance(estimate.standard_uncertainty, digits)
         ends = (estimate.values - reach - self.low, estimate.values + reach - self.high)
         return np.asarray(np.maximum(*np.abs(ends)) <= tolerance)
 
@@ -96,18 +97,35 @@ def monte_carlo(
     """
     estimates = [as_estimate(one) for one in inputs]
     freedoms = (part.cause.degrees_of_freedom for one in estimates for part in one.components)
-    has_variance = min(freedoms, default=np.inf) > 2
+
+    def sample(count: int) -> Array:
+        return np.asarray(function(*draw(estimates, count, generator, True)), np.float64)
+
     block = max(ceil(100 / (1 - level)), _BLOCK)
+    return adaptive(sample, level, digits, most, block, min(freedoms, default=np.inf) > 2)
+
+
+def adaptive(
+    sample: Callable[[int], Array],
+    level: float,
+    digits: int,
+    most: int,
+    block: int,
+    has_variance: bool = True,
+    progress: Callable[[float], None] = lambda part: None,
+) -> MonteCarlo:
+    """Return the distribution of what `sample` returns for a number of trials, as `monte_carlo`."""
     ends = ((1 - level) / 2, (1 + level) / 2)
     values: list[Array] = []
     blocks: list[Array] = []
     is_stable = False
     while not is_stable and (len(values) + 1) * block <= most:
-        drawn = draw(estimates, block, generator, heavy_tails=True)
-        values.append(np.asarray(function(*drawn), np.float64))
+        progress(len(values) * block / most)
+        values.append(sample(block))
         blocks.append(_summary(values[-1], ends, has_variance))
         if len(blocks) > 1:
             is_stable = _is_stable(np.array(blocks), digits, level)
+    progress(1.0)
     mean, deviation, low, high = _summary(np.concatenate(values), ends, has_variance)
     return MonteCarlo(mean, deviation, low, high, level, digits, block * len(values), is_stable)
 

@@ -1,0 +1,261 @@
+"""Single readings: one place in one exposure with one texture and pixel position, quickly.
+
+An uncertainty budget and a choice of settings need thousands of readings with other cameras and
+surfaces. Each exposes only a window of the scene around the place. The light that blurs into the
+window from beyond it is that of the nominal camera and surface.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.analysis.cut import Progress
+from chipglow.analysis.engine import schedule_of
+from chipglow.analysis.images import Array, ExposureImages
+from chipglow.analysis.looks import Schedule
+from chipglow.analysis.places import Place
+from chipglow.analysis.plan import Plan
+from chipglow.camera import Camera
+from chipglow.scene import Frame, Raster, Scene, sample
+from chipglow.scene.lines import nearest
+from chipglow.surface import FeatureTrends, ModifiedSurface, Surface
+
+EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
+    "exposure",
+    "texture",
+    "pixel position across",
+    "pixel position down",
+    "noise",
+)
+"""What a single reading draws at random, as numbers of 0 to 1."""
+
+REFERENCE, MEASURED, TRUE = range(3)
+"""Temperatures of a reading."""
+
+_BLUR_WIDTHS: Final = 3.0
+"""Margin of a window around its place, in full widths at half maximum of the blur."""
+
+_PIXELS: Final = 4.0
+"""Further margin in pixels."""
+
+_TEXTURES: Final = 2**31
+
+
+@dataclass(frozen=True, eq=False)
+class _Window:
+    """Part of a scene during one exposure; `beyond` is light on the nominal camera's pixels."""
+
+    scene: Scene
+    place: Place
+    surface: str
+    rows: NDArray[np.bool_]  # of the readings
+    start: float
+    limits: tuple[float, float]  # in which an exposure must lie, in s
+    beyond: Array | None = None
+    pixels: Raster | None = None
+
+
+class SingleReadings:
+    """Readings of single exposures of a scene by cameras and surfaces that vary.
+
+    Parameters
+    ----------
+    scene : Scene
+        The true fields.
+    surfaces : mapping
+        The nominal surfaces by name.
+    camera : Camera
+        The nominal camera.
+    plan : Plan
+        Exposures and places; its numbers of draws are not used.
+    at : sequence of str
+        Places or readings; all by default.
+    tell : callable
+        Called with the current step and the fraction of it that is complete.
+
+    Raises
+    ------
+    ValueError
+        If a place or reading of `at` is unknown, or the analysis is impossible.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        surfaces: Mapping[str, Surface],
+        camera: Camera,
+        plan: Plan,
+        at: Sequence[str] = (),
+        tell: Progress = lambda step, part: None,
+    ) -> None:
+        schedule = schedule_of(scene, surfaces, camera, plan, tell)
+        places = [
+            (n, i, p) for n, v in enumerate(schedule.views) for i, p in enumerate(v.places[0])
+        ]
+        every = {
+            schedule.reading(n, p.name, quantity): (n, i, p.name)
+            for n, i, p in places
+            for quantity in p.quantities
+        }
+        if unknown := [
+            one for one in at if one not in every and one not in {p.name for *_, p in places}
+        ]:
+            known = ", ".join(dict.fromkeys([*(p.name for *_, p in places), *every]))
+            raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {known}")
+        kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
+        self.names = tuple(kept)
+        self._raster = scene.raster
+        self.reference, self._duration = plan.reference, camera.integration_time
+        keys = {key[:2] for key in kept.values()}
+        owners = [key[:2] for key in every.values()]
+        self._kept = np.array([name in kept for name in every])
+        self._rows = {key: np.array([one == key for one in owners]) for key in keys}
+        self._size = len(every)
+        self._exposures = [
+            self._windows(scene, surfaces, replace(camera, shape=None), schedule, number)
+            for number in range(len(schedule.drawn))
+        ]
+        used = {schedule.views[n].surface for n, _ in keys}
+        is_random = {
+            EXPOSURE: len(schedule.drawn) > 1,
+            TEXTURE: any(surfaces[name].redrawn(1) is not surfaces[name] for name in used),
+            NOISE: camera.detector is not None,
+        }
+        self.random = tuple(name for name in RANDOM if is_random.get(name, True))
+
+    def read(
+        self, camera: Camera, surfaces: Mapping[str, Surface], draw: Mapping[str, float]
+    ) -> Array:
+        """Return `REFERENCE`, `MEASURED` and `TRUE` in K of each reading, shape (reading, 3).
+
+        `draw` gives a number of 0 to 1 for each of `random`.
+        """
+        texture, noise = (int(draw.get(name, 0.0) * _TEXTURES) for name in (TEXTURE, NOISE))
+        moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
+        right, down = (moved + camera.offset).tolist()
+        seen = replace(camera, shape=None, offset=(right, down)).redrawn(noise)
+        values = np.full((self._size, 3), np.nan)
+        number = int(draw.get(EXPOSURE, 0.0) * len(self._exposures))
+        for window in self._exposures[number]:
+            surface = surfaces[window.surface].redrawn(texture)
+            stack, pixels = self._look(window, _on_grid(seen, self._raster, window), surface)
+            lines = window.place.sampled(stack, pixels)
+            values[window.rows] = window.place.read(stack, pixels, lines)
+        return np.asarray(values[self._kept])
+
+    def _look(self, window: _Window, camera: Camera, surface: Surface) -> tuple[Array, Raster]:
+        """Return the images `REFERENCE`, `MEASURED` and `TRUE` of a window."""
+        first, last = window.limits
+        middle = window.start + (self._duration - camera.integration_time) / 2
+        start = max(min(middle, last - camera.integration_time), first)
+        images = ExposureImages(camera.expose(window.scene, surface, start), self.reference)
+        pixels, radiance = camera.pixels(window.scene.raster), images.radiance(camera)
+        if window.beyond is not None and window.pixels is not None:
+            light = sample(window.beyond, window.pixels, _centres(pixels))
+            radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
+        read, _ = camera.read(radiance[None], np.array([start]))
+        reference = images.reference(camera)
+        measured = np.where(np.isnan(reference), np.nan, camera.band.temperature(read[0]))
+        return np.stack([reference, measured, images.reference(camera, "true")]), pixels
+
+    def _windows(
+        self,
+        scene: Scene,
+        surfaces: Mapping[str, Surface],
+        camera: Camera,
+        schedule: Schedule,
+        number: int,
+    ) -> list[_Window]:
+        """Return the windows of the places in one exposure."""
+        start = float(schedule.starts[schedule.drawn[number]])
+        frame = scene.frame_at(start)
+        block = next(one for one in scene.blocks if frame in one)
+        limits = float(scene.times[block[0]]), float(scene.times[block[-1]] + scene.frame_spacing)
+        if len(scene.times) == 1:
+            limits = -np.inf, np.inf
+        used = {schedule.views[n].surface for n, _ in self._rows}
+        small = [name for name in used if _is_local(surfaces[name]) and camera.line_time is None]
+        whole, frames = {}, []
+        if small:
+            fields = [camera.prepare(surfaces[name], scene) for name in small]
+            exposed = camera.expose_fields(scene, fields, start)
+            whole = dict(
+                zip(small, (ExposureImages(one).radiance(camera) for one in exposed), strict=True)
+            )
+            reach = camera.integration_time / 2
+            first, last = (scene.frame_at(start + at * reach) for at in (-1.0, 3.0))
+            frames = list(scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1)))
+        windows = []
+        for key, rows in self._rows.items():
+            view = schedule.views[key[0]]
+            place = view.places[number][key[1]]
+            part = _around(place, scene.raster, camera) if view.surface in whole else None
+            one = _Window(scene, place, view.surface, rows, start, limits)
+            if part is not None:
+                one = replace(one, scene=_cropped(frames, scene, part))
+                moved = _on_grid(camera, scene.raster, one)
+                alone = moved.expose(one.scene, surfaces[view.surface], start)
+                pixels, image = (
+                    moved.pixels(one.scene.raster),
+                    ExposureImages(alone).radiance(moved),
+                )
+                light = nearest(whole[view.surface], camera.pixels(scene.raster), _centres(pixels))
+                one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
+            windows.append(one)
+        return windows
+
+
+def _is_local(surface: Surface) -> bool:
+    """Return whether the emissivity of a sample follows from that sample alone."""
+    return not isinstance(surface, ModifiedSurface) or all(
+        isinstance(one, FeatureTrends) for one in surface.modifiers
+    )
+
+
+def _around(place: Place, raster: Raster, camera: Camera) -> tuple[slice, slice] | None:
+    """Return the rows and columns of a raster around a place; None for all."""
+    outline = place.outline()
+    if outline is None:
+        return None
+    points = np.concatenate(
+        [outline, *(line.points for line in place.lines(camera.pitch).values())]
+    )
+    blur = camera.psf.fwhm if camera.psf is not None else 0.0
+    margin = (_BLUR_WIDTHS * blur + _PIXELS * camera.pitch) / raster.spacing
+    index = (points - [raster.left, raster.top]) * [1, -1] / raster.spacing
+    low, high = np.floor(index.min(axis=0) - margin), np.ceil(index.max(axis=0) + margin)
+    limits = np.clip([low, high], 0, [raster.columns, raster.rows]).astype(int)
+    (left, top), (right, bottom) = limits.tolist()
+    return slice(top, bottom), slice(left, right)
+
+
+def _cropped(frames: Sequence[Frame], scene: Scene, part: tuple[slice, slice]) -> Scene:
+    raster, (down, across) = scene.raster, part
+    names = [name for name in scene.fields if getattr(frames[0], name, None) is not None]
+    if "material" not in names:
+        names.append("material")
+    corner = raster.left + across.start * raster.spacing, raster.top - down.start * raster.spacing
+    shape = down.stop - down.start, across.stop - across.start
+    return Scene.from_fields(
+        Raster(*corner, raster.spacing, *shape),
+        [frame.time for frame in frames],
+        {name: np.stack([getattr(frame, name)[part] for frame in frames]) for name in names},
+        scene.tool,
+    )
+
+
+def _on_grid(camera: Camera, scene: Raster, window: _Window) -> Camera:
+    """Return a camera on a scene with the same pixels on a window of it."""
+    own = window.scene.raster
+    shift = own.left - scene.left, scene.top - own.top
+    if not any(shift):
+        return camera
+    right, down = np.mod(np.subtract(camera.offset, shift), camera.pitch).tolist()
+    return replace(camera, offset=(right, down))
+
+
+def _centres(raster: Raster) -> Array:
+    return np.stack(np.meshgrid(raster.x, raster.y), axis=-1)

@@ -1,0 +1,292 @@
+"""The uncertainty budget of a study: of the error of single readings, scene included."""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numba import get_num_threads, set_num_threads
+from scipy.stats import qmc
+
+from chipglow.analysis.single import EXPOSURE, MEASURED, RANDOM, REFERENCE, TEXTURE, SingleReadings
+from chipglow.camera import Camera
+from chipglow.io import open_scene
+from chipglow.quantities import Array, changed, setting_at
+from chipglow.scene import Scene
+from chipglow.study.fitting import fit, surfaces_on
+from chipglow.study.running import Progress, cut, fitted_study
+from chipglow.study.schema import Study
+from chipglow.surface import Surface
+from chipglow.text import Notes
+from chipglow.uncertainty import Budget, Input, Inputs, budget
+from chipglow.uncertainty.surrogate import Surrogate
+
+SCENE, SURFACE, CAMERA = GROUPS = ("scene", "surface", "camera")
+"""Groups of inputs, unless the study names others."""
+
+_SURROGATE: Final = "scene settings between the cut ones"
+_NOMINAL_DRAWS: Final = 32
+"""Draws of the random inputs over which the error of a cut scene is a mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class StudyBudget:
+    """The budget of a study's readings.
+
+    Parameters
+    ----------
+    readings : tuple of str
+        Names of the readings, the outputs of the budget: their errors in K.
+    budget : Budget
+        The budget of these errors.
+    study : Study
+        The study.
+    notes : Notes
+        Assumptions and warnings.
+    surrogates : mapping
+        The surrogate of each reading over the settings of the scene; empty without such inputs.
+    """
+
+    readings: tuple[str, ...]
+    budget: Budget
+    study: Study
+    notes: Notes
+    surrogates: Mapping[str, Surrogate]
+
+    def summary(self) -> pd.DataFrame:
+        """Return a row for each reading: error, uncertainty, and the interval by Monte Carlo."""
+        estimate, trials = self.budget.estimate, self.budget.monte_carlo
+        return pd.DataFrame(
+            {
+                "reading": list(self.readings),
+                "error_K": estimate.values,
+                "standard_uncertainty_K": estimate.standard_uncertainty,
+                "degrees_of_freedom": estimate.degrees_of_freedom,
+                "coverage_factor": estimate.coverage_factor(),
+                "expanded_uncertainty_K": estimate.expanded_uncertainty(),
+                "monte_carlo_mean_K": trials.mean,
+                "monte_carlo_standard_uncertainty_K": trials.standard_uncertainty,
+                "low_K": trials.low,
+                "high_K": trials.high,
+                "validated": trials.validates(estimate),
+            }
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the budget in the form of the GUM: a row for each reading and input."""
+        inputs, estimate = self.budget.inputs, self.budget.estimate
+        lines = {part.name: part for part in inputs.inputs}
+        rows = []
+        for output, reading in enumerate(self.readings):
+            total = estimate.standard_uncertainty[output] ** 2
+            for name in estimate.names:
+                parts = [lines[one] for one in name.split(", ")]
+                one, is_set = parts[0], len(parts) == 1 and parts[0].has_slope
+                stated = self.study.uncertainty.inputs.get(one.name)
+                contribution = float(estimate.contribution(name)[output])
+                number = inputs.names.index(one.name)
+                rows.append(
+                    {
+                        "reading": reading,
+                        "input": name,
+                        "group": one.group,
+                        "distribution": one.distribution,
+                        "value": one.value if is_set else np.nan,
+                        "standard_uncertainty": one.standard_uncertainty if is_set else np.nan,
+                        "unit": self._unit(one.name) if is_set else "",
+                        "sensitivity": self.budget.sensitivity[number, output]
+                        if is_set
+                        else np.nan,
+                        "degrees_of_freedom": one.degrees_of_freedom,
+                        "contribution_K": contribution,
+                        "variance_percent": 100 * contribution**2 / total if total else 0.0,
+                        "source": stated.source if stated else "drawn at random",
+                    }
+                )
+        return pd.DataFrame(rows)
+
+    def indices(self) -> xr.Dataset:
+        """Return Sobol's indices over ``reading`` and ``group``."""
+        return self.budget.indices.rename(output="reading").assign_coords(
+            reading=list(self.readings)
+        )
+
+    def groups(self) -> pd.DataFrame:
+        """Return a row for each reading and group: its part of the variance in percent."""
+        frame = (100 * self.indices()).to_dataframe().reset_index()
+        return frame.rename(columns=lambda name: name.replace("_order", "_order_percent"))
+
+    def _unit(self, path: str) -> str:
+        quantity = setting_at(self.study, path).parameter.quantity
+        return quantity.base if quantity else "1"
+
+
+def study_budget(
+    study: Study,
+    at: Sequence[str] = (),
+    trials: int = 3000,
+    samples: int = 256,
+    scenes: int = 16,
+    progress: Progress | None = None,
+) -> StudyBudget:
+    """Return the uncertainty budget of the errors of single readings.
+
+    Parameters
+    ----------
+    study : Study
+        The study; its section `uncertainty` has the input quantities.
+    at : sequence of str
+        Places or readings, such as ``rake face`` or ``band``; all by default.
+    trials : int
+        Largest number of trials of the Monte Carlo.
+    samples : int
+        Base samples of Sobol's indices, a power of 2.
+    scenes : int
+        Number of scenes to cut if a setting of the cut is an input.
+    progress : callable, optional
+        Called with the current step and its completed fraction, 0 to 1.
+
+    Returns
+    -------
+    StudyBudget
+        Texture, pixel position, noise and exposure (the segments of a cut) are inputs too.
+
+    Raises
+    ------
+    ValueError
+        If an input is no number of the study, or the scene is a file and a setting of the cut is
+        an input.
+
+    Notes
+    -----
+    The effect of the cut's settings is a surrogate: of the mean errors on scenes at a Latin
+    hypercube of their distributions. Its cross-validated error is an input.
+    """
+    tell = progress or (lambda step, part: None)
+    stated = study.uncertainty.build(study)
+    is_cut = [one.name.startswith("cutting.") for one in stated.inputs]
+    if any(is_cut) and study.scene is not None:
+        raise ValueError(
+            f"uncertainty.inputs: {stated.names[is_cut.index(True)]}: the scene is a file, "
+            "expected a study that cuts (without scene)"
+        )
+    with fitted_study(study, progress, False) as fitted:
+        readings = _readings(study, fitted.scene, at, tell)
+        inputs = [
+            replace(one, group=SCENE) if one.group == "cutting" else one for one in stated.inputs
+        ]
+        inputs += [Input(name, group=_group(name)) for name in readings.random]
+        surrogates: dict[str, Surrogate] = {}
+        if any(is_cut):
+            surrogates = _surrogates(study, stated, scenes, readings.names, at, tell)
+            inputs.append(Input(_SURROGATE, 0.0, 1.0, "normal", group=SCENE))
+        model = _model(study, fitted.scene, readings, inputs, list(surrogates.values()))
+        found = budget(
+            model,
+            Inputs(inputs, stated.correlations),
+            np.random.default_rng(study.seed),
+            trials,
+            samples,
+            progress=tell,
+        )
+    return StudyBudget(readings.names, found, study, fitted.notes, surrogates)
+
+
+def _readings(study: Study, scene: Scene, at: Sequence[str], tell: Progress) -> SingleReadings:
+    return SingleReadings(scene, *_seen(study, scene), study.plan, at, tell)
+
+
+def _seen(study: Study, scene: Scene) -> tuple[Mapping[str, Surface], Camera]:
+    """Return the surfaces and the camera of a study on a scene."""
+    return surfaces_on(study, scene)[0], study.camera.on(scene.raster, study.seed)
+
+
+def _one_thread() -> None:
+    set_num_threads(1)
+
+
+def _silent(step: str, part: float) -> None:
+    pass
+
+
+def _group(name: str) -> str:
+    return {EXPOSURE: SCENE, TEXTURE: SURFACE}.get(name, CAMERA)
+
+
+def _model(
+    study: Study,
+    scene: Scene,
+    readings: SingleReadings,
+    inputs: Sequence[Input],
+    surrogates: Sequence[Surrogate],
+) -> Callable[[Array], Array]:
+    """Return the function from values of the inputs to the errors of the readings in K."""
+    names = [one.name for one in inputs]
+    optical = [name for name in names if name.startswith(("camera.", "surface."))]
+    cutting = [number for number, name in enumerate(names) if name.startswith("cutting.")]
+    best = np.array([inputs[i].value for i in cutting])
+    widths = np.array([inputs[i].standard_uncertainty for i in cutting])
+    nominal = _seen(study, scene)
+
+    def error(row: Array) -> Array:
+        values = dict(zip(names, row.tolist(), strict=True))
+        changes = {name: values[name] for name in optical}
+        surfaces, camera = _seen(changed(study, changes), scene) if changes else nominal
+        read = readings.read(camera, surfaces, values)
+        return np.asarray(read[:, MEASURED] - read[:, REFERENCE])
+
+    def errors(rows: Array) -> Array:
+        with ThreadPoolExecutor(get_num_threads(), initializer=_one_thread) as pool:
+            result = np.stack(list(pool.map(error, rows)))
+        if surrogates:
+            points = (rows[:, cutting] - best) / widths
+            middle = np.zeros((1, len(cutting)))
+            for number, one in enumerate(surrogates):
+                result[:, number] += one.at(points) - one.at(middle)
+                result[:, number] += one.error * rows[:, names.index(_SURROGATE)]
+        return result
+
+    return errors
+
+
+def _surrogates(
+    study: Study,
+    stated: Inputs,
+    scenes: int,
+    names: Sequence[str],
+    at: Sequence[str],
+    tell: Progress,
+) -> dict[str, Surrogate]:
+    """Cut scenes at a Latin hypercube of the inputs; return the surrogate of each reading."""
+    generator = np.random.default_rng(study.seed)
+    values = stated.at(qmc.LatinHypercube(len(stated), seed=generator).random(scenes))
+    draws = generator.random((_NOMINAL_DRAWS, len(RANDOM)))
+    rows = [i for i, one in enumerate(stated.inputs) if one.name.startswith("cutting.")]
+    best, widths = (
+        np.array([getattr(stated.inputs[i], name) for i in rows])
+        for name in ("value", "standard_uncertainty")
+    )
+    means = np.full((scenes, len(names)), np.nan)
+    for number, value in enumerate(values):
+        tell("scenes", number / scenes)
+        one = changed(study, {stated.names[i]: float(value[i]) for i in rows})
+        scene = fit(one, open_scene(cut(one))).scene
+        readings = _readings(one, scene, at, _silent)
+        surfaces, camera = _seen(one, scene)
+        errors = []
+        for draw in draws:
+            read = readings.read(camera, surfaces, dict(zip(RANDOM, draw, strict=True)))
+            errors.append(read[:, MEASURED] - read[:, REFERENCE])
+        mean = dict(zip(readings.names, np.mean(errors, axis=0), strict=True))
+        means[number] = [mean.get(name, np.nan) for name in names]
+        scene.data.close()
+    tell("scenes", 1.0)
+    points = (values[:, rows] - best) / widths
+    found = {}
+    for name, column in zip(names, means.T, strict=True):
+        known = np.isfinite(column)
+        found[name] = Surrogate.fit(points[known], column[known])
+    return found

@@ -1,0 +1,139 @@
+"""The section of the uncertainty: input quantities of a budget by the paths of their settings."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import inf, sqrt
+from statistics import pstdev
+from typing import Annotated, Any, Final
+
+from chipglow.quantities import Parameter, Part, setting_at
+from chipglow.uncertainty import Input, Inputs
+from chipglow.uncertainty.component import Distribution
+
+_SECTIONS: Final = ("camera", "surface", "cutting")
+_WIDTHS: Final[Mapping[str, float]] = {
+    "rectangular": sqrt(3.0), "triangular": sqrt(6.0), "arcsine": sqrt(2.0),
+}  # fmt: skip
+"""Half-widths of distributions of unit variance."""
+
+
+@dataclass(frozen=True)
+class InputSection(Part):
+    """Distribution of one setting about its value in the study."""
+
+    standard: Annotated[
+        float | str | None,
+        Parameter("Standard uncertainty, in the setting's unit (0.5 um) or relative (3 %)."),
+    ] = None
+    half_width: Annotated[
+        float | str | None,
+        Parameter("Half-width of a rectangular, triangular or arcsine distribution, likewise."),
+    ] = None
+    values: Annotated[
+        tuple[float | str, ...], Parameter("Values of equal probability instead, or [].")
+    ] = ()
+    distribution: Annotated[
+        Distribution | None,
+        Parameter("Distribution. Default: normal; rectangular with a half-width."),
+    ] = None
+    degrees_of_freedom: Annotated[
+        float | None, Parameter("Degrees of freedom of a standard uncertainty.", over=0.0)
+    ] = None
+    group: Annotated[
+        str | None,
+        Parameter("Group whose part of the variance is stated. Default: the setting's section."),
+    ] = None
+    source: Annotated[str, Parameter("Where the uncertainty comes from.")] = ""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        stated = [self.standard is not None, self.half_width is not None, bool(self.values)]
+        if sum(stated) != 1:
+            raise ValueError("must have one of standard, half_width and values")
+        if self.half_width is not None and self.distribution == "normal":
+            raise ValueError(
+                "half_width: requires a rectangular, triangular or arcsine distribution"
+            )
+        if self.values and self.distribution:
+            raise ValueError("distribution: cannot be combined with values")
+
+
+@dataclass(frozen=True)
+class UncertaintySection(Part):
+    """Input quantities of the uncertainty budget."""
+
+    inputs: Annotated[
+        dict[str, InputSection],
+        Parameter(
+            "Inputs by the path of a setting of camera, surface or cutting.",
+            allowed="{} or paths: {camera.pitch: {standard: 0.1 um, source: grid}, surface.tool."
+            "mean: {half_width: 0.05}}",
+        ),
+    ] = field(default_factory=dict)
+    correlations: Annotated[
+        tuple[tuple[str, str, float], ...],
+        Parameter(
+            "Correlation coefficients of two inputs of a group.",
+            allowed="[] or such as [[camera.pitch, camera.psf.fwhm, 0.4]]",
+        ),
+    ] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for path in self.inputs:
+            if path.partition(".")[0] not in _SECTIONS:
+                raise ValueError(f"inputs: {path!r}, expected a path in {', '.join(_SECTIONS)}")
+
+    def build(self, study: Part) -> Inputs:
+        """Return the inputs with the study's values as best estimates, in SI."""
+        built = []
+        for path, one in self.inputs.items():
+            try:
+                setting = setting_at(study, path)
+            except LookupError:
+                raise ValueError(f"uncertainty.inputs: {path}: no such setting") from None
+            if isinstance(setting.value, bool) or not isinstance(setting.value, int | float):
+                raise ValueError(
+                    f"uncertainty.inputs: {path}: is {setting.plain!r}, expected a number"
+                )
+            try:
+                built.append(_input(path, one, float(setting.value), setting.parameter))
+            except ValueError as error:
+                raise ValueError(f"uncertainty.inputs: {path}: {error}") from None
+        try:
+            return Inputs(built, {(a, b): value for a, b, value in self.correlations})
+        except ValueError as error:
+            raise ValueError(f"uncertainty.{error}") from None
+
+
+def _input(path: str, one: InputSection, value: float, parameter: Parameter) -> Input:
+    given: dict[str, Any] = {"name": path, "value": value, "group": one.group or path.split(".")[0]}
+    if one.values:
+        values = tuple(parameter.number(each) for each in one.values)
+        return Input(
+            **given, standard_uncertainty=pstdev(values), distribution="discrete", values=values
+        )
+    distribution = one.distribution or ("normal" if one.half_width is None else "rectangular")
+    stated = one.standard if one.half_width is None else one.half_width
+    width = _size(stated, value, parameter)
+    return Input(
+        **given,
+        standard_uncertainty=width if one.half_width is None else width / _WIDTHS[distribution],
+        distribution=distribution,
+        degrees_of_freedom=one.degrees_of_freedom or inf,
+    )
+
+
+def _size(stated: object, value: float, parameter: Parameter) -> float:
+    """Return a positive width in SI, of a text in the setting's unit or relative to its value."""
+    text = str(stated).strip()
+    if text.endswith("%"):
+        size = abs(value) * float(text[:-1]) / 100
+    elif parameter.quantity is not None:
+        quantity = replace(parameter.quantity, positive=False, is_difference=True)
+        size = quantity.parse(stated)
+    else:
+        size = float(text)
+    if not 0 < size < inf:
+        raise ValueError(f"{text!r}, expected more than 0")
+    return size
