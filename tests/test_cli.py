@@ -181,6 +181,7 @@ ENDINGS = {
     ("shearband", "--out"): ".csv or .nc",
     ("psf", "--out"): ".nc",
     ("wavelengths", "--out"): ".csv",
+    ("budget", "--out"): ".csv",
     ("register", "--out"): ".yaml or .yml",
     ("register", "--pairs"): ".csv",
     ("register", "--blink"): ".gif",

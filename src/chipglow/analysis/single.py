@@ -103,7 +103,7 @@ class SingleReadings:
         if unknown := [
             one for one in at if one not in every and one not in {p.name for *_, p in places}
         ]:
-            known = ", ".join(dict.fromkeys([*(p.name for *_, p in places), *every]))
+            known = "; ".join(dict.fromkeys([*(p.name for *_, p in places), *every]))
             raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {known}")
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
         self.names = tuple(kept)

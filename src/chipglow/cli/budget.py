@@ -52,6 +52,8 @@ def budget(
 
 
 def _print(result: "StudyBudget") -> None:
+    import pandas as pd
+
     screen, budget, summary = current(), result.to_frame(), result.summary()
     screen.table(
         "summary",
@@ -68,11 +70,10 @@ def _print(result: "StudyBudget") -> None:
         },
     )
     screen.heading()
-    largest = (
-        budget.sort_values("contribution_K", ascending=False).groupby("reading").head(_LARGEST)
-    )
+    parts = (part for _, part in budget.groupby("reading", sort=False))
+    largest = pd.concat([part.nlargest(_LARGEST, "contribution_K") for part in parts])
     columns = ["reading", "input", "group", "distribution", "contribution_K", "variance_percent"]
-    screen.table("contributions", largest.sort_values("reading", kind="stable"), columns)
+    screen.table("contributions", largest, columns)
     screen.heading()
     screen.table(
         "groups",

@@ -116,7 +116,7 @@ class StudyBudget:
 
     def groups(self) -> pd.DataFrame:
         """Return a row for each reading and group: its part of the variance in percent."""
-        frame = (100 * self.indices()).to_dataframe().reset_index()
+        frame = (100 * self.indices()).to_dataframe(["reading", "group"]).reset_index()
         return frame.rename(columns=lambda name: name.replace("_order", "_order_percent"))
 
     def _unit(self, path: str) -> str:

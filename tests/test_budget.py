@@ -1,0 +1,325 @@
+"""Uncertainty budgets: closed forms, the paper's figure, the whole analysis, and the command."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from analytic_chip import AnalyticChip
+from command import chipglow, refused
+from figure6 import figure_6
+from scipy import stats
+
+from chipglow.analysis import Plan, SingleReadings, analyse
+from chipglow.analysis.single import ACROSS, DOWN, MEASURED, REFERENCE, TRUE
+from chipglow.camera import Camera, GaussianPSF
+from chipglow.io import write_scene
+from chipglow.radiometry import Band
+from chipglow.scene import Raster, Scene
+from chipglow.study import Study, study_budget
+from chipglow.study.budgets import _surrogates
+from chipglow.surface import CHIP_1, CHIP_2
+from chipglow.uncertainty import Input, Inputs, budget
+from chipglow.uncertainty.surrogate import Surrogate
+
+GENERATOR = 1995
+
+
+def computed(model, inputs, correlations=None, **options):
+    generator = np.random.default_rng(GENERATOR)
+    return budget(model, Inputs(inputs, correlations or {}), generator, **options)
+
+
+def test_sobol_indices_of_ishigamis_function():
+    # Ishigami and Homma (1990): a = 7, b = 0.1.
+    inputs = [Input(name, 0.0, np.pi / np.sqrt(3.0), "rectangular") for name in "xyz"]
+
+    def model(rows):
+        x, y, z = rows.T
+        return (np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x))[:, None]
+
+    found = computed(model, inputs, samples=2**15).indices
+    np.testing.assert_allclose(found.first_order[0], [0.3139, 0.4424, 0.0], atol=0.01)
+    np.testing.assert_allclose(found.total_order[0], [0.5576, 0.4424, 0.2437], atol=0.01)
+    assert (found.total_order_low < found.total_order_high).all()
+
+
+def test_a_correlated_linear_model_is_exact():
+    inputs = [
+        Input("a", 1.0, 2.0, "normal", group="both"),
+        Input("b", 3.0, 0.5, "rectangular"),
+        Input("c", -1.0, 1.0, "normal", 8.0, group="both"),
+    ]
+    slopes = np.array([1.0, 4.0, -2.0])
+    found = computed(lambda rows: rows @ slopes[:, None], inputs, {("a", "c"): 0.6})
+    estimate = found.estimate
+    # JCGM 100:2008, 5.2.2.
+    both = 2.0**2 + 2.0**2 - 2 * 0.6 * 2.0 * 2.0
+    np.testing.assert_allclose(found.sensitivity[:, 0], slopes)
+    np.testing.assert_allclose(estimate.values, 1.0 + 12.0 + 2.0)
+    np.testing.assert_allclose(estimate.standard_uncertainty, np.sqrt(both + 2.0**2))
+    assert set(estimate.names) == {"a, c", "b"}
+    np.testing.assert_allclose(estimate.contribution("a, c"), np.sqrt(both))
+    assert found.indices.group.values.tolist() == ["both", "b"]
+    # 3 standard deviations of an index of 256 samples, by the bootstrap's own interval.
+    spread = found.indices.total_order_high - found.indices.total_order_low
+    np.testing.assert_array_less(abs(found.indices.total_order[0] - [0.44, 0.56]), 1.5 * spread[0])
+
+
+@pytest.mark.parametrize(
+    ("distribution", "freedoms", "peer"),
+    [
+        ("normal", np.inf, stats.norm()),
+        ("normal", 4.0, stats.t(4)),
+        ("rectangular", np.inf, stats.uniform(-np.sqrt(3), 2 * np.sqrt(3))),
+        ("triangular", np.inf, stats.triang(0.5, -np.sqrt(6), 2 * np.sqrt(6))),
+        ("arcsine", np.inf, stats.arcsine(-np.sqrt(2), 2 * np.sqrt(2))),
+    ],
+)
+def test_quantiles_of_the_distributions(distribution, freedoms, peer):
+    numbers = np.linspace(0.01, 0.99, 99)
+    one = Input("a", 5.0, 0.5, distribution, freedoms)
+    np.testing.assert_allclose(one.at(numbers), 5.0 + 0.5 * peer.ppf(numbers), rtol=1e-10)
+
+
+def test_random_and_discrete_inputs_count_by_their_scatter():
+    inputs = [
+        Input("phase"),
+        Input("lens", 2.0, np.std([1.0, 2.0, 3.0]), "discrete", values=(1.0, 2.0, 3.0)),
+    ]
+    found = computed(lambda rows: rows @ [[12.0], [1.0]], inputs)
+    assert np.isnan(found.sensitivity).all()
+    # Half the mean square of 64 differences: 1/sqrt(64) of the variance at worst.
+    np.testing.assert_allclose(found.estimate.contribution("phase"), np.sqrt(12.0), rtol=0.2)
+    np.testing.assert_allclose(found.estimate.contribution("lens"), np.sqrt(2 / 3), rtol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("correlations", "message"),
+    [
+        ({("a", "b"): 0.5}, "a is in the group 'a', b in 'b', expected the same group"),
+        ({("a", "z"): 0.5}, "'z' is not a continuous input"),
+        ({("c", "d"): 1.0}, "must form a positive definite matrix"),
+    ],
+)
+def test_impossible_correlations_are_refused(correlations, message):
+    parts = [
+        Input(name, 0.0, 1.0, "normal", group=group)
+        for name, group in zip("abcd", "abcc", strict=True)
+    ]
+    with pytest.raises(ValueError, match=message):
+        Inputs(parts, correlations)
+
+
+def test_the_surrogate_is_the_simplest_that_predicts():
+    generator = np.random.default_rng(GENERATOR)
+    points = generator.standard_normal((16, 2))
+    x, y = points.T
+    terms = np.column_stack([np.ones(16), x, y, x**2, y**2, x * y])
+    noise = generator.standard_normal(16)
+    noise -= terms @ np.linalg.lstsq(terms, noise)[0]  # no polynomial predicts the rest
+    constant = Surrogate.fit(points, 3.0 + noise)
+    assert constant.form == "constant"
+    # The mean of the others is off by n / (n - 1) of each point's own residual.
+    assert constant.error == pytest.approx(16 / 15 * np.sqrt(np.mean(noise**2)))
+    plane = Surrogate.fit(points, points @ [2.0, -10.0] + 1.0 + 0.1 * noise)
+    assert plane.form == "plane"
+    np.testing.assert_allclose(plane.at(np.eye(2)), [3.0, -9.0])
+    exact = Surrogate.fit(points, points[:, 0] * points[:, 1] * 5.0)
+    assert exact.form == "quadratic" and exact.error < 1e-9
+
+
+def test_windows_read_what_the_whole_analysis_reads():
+    scene = AnalyticChip(frames=60).scene()
+    surfaces = {"chip 1": CHIP_1, "chip 2": CHIP_2}
+    camera = Camera.paper()
+    plan = Plan(exposures=3, phases=2, textures=2, psf_widths=(8e-6,))
+    readings = SingleReadings(scene, surfaces, camera, plan)
+    data = analyse(scene, surfaces, camera, plan).data
+    assert readings.names == tuple(data.reading.values)
+    for phase in range(4):
+        read = readings.read(camera, surfaces, {ACROSS: phase % 2 / 2, DOWN: phase // 2 / 2})
+        whole = data.isel(exposure=0, texture=0, pixel_phase=phase)
+        np.testing.assert_allclose(read[:, REFERENCE], whole.reference, atol=1e-3)
+        np.testing.assert_allclose(read[:, TRUE], whole.true, atol=1e-3)
+        # The light from beyond the window is interpolated between pixels: seen 3 mK.
+        np.testing.assert_allclose(read[:, MEASURED], whole.measured.sel(effects="all"), atol=0.02)
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory):
+    """A uniform plate at 900 K."""
+    raster = Raster(left=-40e-6, top=40e-6, spacing=1e-6, rows=80, columns=80)
+    path = tmp_path_factory.mktemp("plate") / "plate.nc"
+    temperature = np.full((1, *raster.shape), 900.0)
+    write_scene(Scene.from_fields(raster, [0.0], {"temperature": temperature}), path)
+    return path
+
+
+def study_of(plate, **inputs):
+    return Study(
+        scene=str(plate),
+        surface={"kind": "uniform", "emissivity": 0.6},
+        camera={"psf": {"kind": "gaussian", "fwhm": "8 um"}, "lower_limit": None},
+        analysis={"reference": "true", "points": {"middle": ("0 um", "0 um")}},
+        uncertainty={"inputs": inputs},
+    )
+
+
+def test_the_budget_of_a_plate_is_the_closed_form(plate):
+    study = study_of(
+        plate,
+        **{
+            "surface.emissivity": {"standard": "2 %", "degrees_of_freedom": 9.0},
+            "camera.pitch": {"half_width": "0.1 um", "source": "grid"},
+        },
+    )
+    found = study_budget(study, ("middle",), trials=2000, samples=32)
+    band = Band(*study.camera.band)
+    temperature = band.temperature(0.6 * band.radiance(900.0))
+    slope = band.radiance(900.0) / band.slope(temperature)  # of Equation 3, by the emissivity
+    assert found.readings == ("middle, pixel",)
+    row = found.summary().iloc[0]
+    # The difference over 2 % to both sides is exact to second order: 0.2 % here.
+    assert row.error_K == pytest.approx(temperature - 900.0, abs=0.05)
+    assert row.standard_uncertainty_K == pytest.approx(0.02 * 0.6 * slope, rel=0.005)
+    assert row.degrees_of_freedom == pytest.approx(9.0, rel=1e-3)
+    assert bool(row.validated)
+    frame = found.to_frame().set_index("input")
+    assert frame.loc["surface.emissivity"].variance_percent == pytest.approx(100.0, abs=0.01)
+    assert frame.loc["camera.pitch"].source == "grid"
+    assert frame.loc["camera.pitch"].standard_uncertainty == pytest.approx(0.1e-6 / np.sqrt(3.0))
+
+
+def test_intervals_hold_the_truth_of_the_literal_figure_6(plate):
+    # 200 experiments with hidden emissivities and PSF widths, seen by the paper's Figure 6.
+    raster, band = Raster(-45e-6, 45e-6, 1e-6, 90, 90), Band(3.8e-6, 5.1e-6)
+    x = np.broadcast_to(raster.x, raster.shape)
+    temperature = 900.0 + 300.0 * np.exp(-((x / 12e-6) ** 2))
+    path = plate.with_name("ridge.nc")
+    write_scene(Scene.from_fields(raster, [0.0], {"temperature": temperature[None]}), path)
+    study = replace(
+        study_of(
+            path,
+            **{
+                "surface.emissivity": {"standard": 0.03},
+                "camera.psf.fwhm": {"half_width": "2 um"},
+            },
+        ),
+        camera={
+            "pitch": "9 um", "psf": {"kind": "gaussian", "fwhm": "14 um"},
+            "psf_order": "detector", "lower_limit": None,
+        },
+    )  # fmt: skip
+    # The camera's pixels have the corner of the scene in both.
+    readings = study_budget(study, ("middle",), trials=1000, samples=2)
+    generator = np.random.default_rng(GENERATOR)
+    low, high = readings.budget.monte_carlo.low[0], readings.budget.monte_carlo.high[0]
+    held = 0
+    for emissivity, width, (right, down) in zip(
+        generator.normal(0.6, 0.03, 200),
+        generator.uniform(12e-6, 16e-6, 200),
+        generator.integers(9, size=(200, 2)),
+        strict=True,
+    ):
+        part = (slice(down, down + 81), slice(right, right + 81))
+        kernel = GaussianPSF(width).kernel(9e-6)
+        seen = figure_6(
+            [temperature[part]], [np.full((81, 81), emissivity)], band.radiance,
+            band.temperature, kernel,
+        )  # fmt: skip
+        row, column = (int((45 - corner) // 9) for corner in (down, right))
+        truth = temperature[part][9 * row : 9 * row + 9, 9 * column : 9 * column + 9].max()
+        held += low <= seen[row, column] - truth <= high
+    # 95 % of 200, of which the standard deviation is 1.5 %.
+    assert 0.92 <= held / 200 <= 0.98
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ({"title": {"standard": 1.0}}, "'title', expected a path in camera, surface, cutting"),
+        ({"camera.pich": {"standard": "1 um"}}, "camera.pich: no such setting"),
+        ({"camera.pitch": {"standard": 0.5}}, "camera.pitch: 0.5 has no unit, expected a length"),
+        ({"camera.pitch": {"standard": "-1 um"}}, "camera.pitch: '-1 um', expected more than 0"),
+        ({"camera.psf_order": {"standard": 1.0}}, "is 'detector', expected a number"),
+        ({"camera.pitch": {}}, "must have one of standard, half_width and values"),
+        ({"cutting.feed": {"standard": "1 um"}}, "the scene is a file, expected a study that cuts"),
+    ],
+)
+def test_impossible_inputs_are_refused(plate, inputs, message):
+    with pytest.raises(ValueError, match=message):
+        study_budget(study_of(plate, **inputs))
+
+
+def test_an_unknown_place_is_refused(plate):
+    with pytest.raises(
+        ValueError, match=r"edge: no such place or reading, expected one of .*middle"
+    ):
+        study_budget(study_of(plate, **{"camera.pitch": {"standard": "1 um"}}), ("edge",))
+
+
+def test_settings_of_the_cut_act_by_a_surrogate(plate, monkeypatch):
+    """Scenes of the cut are plates, hotter with the friction; the emissivity is known."""
+    made = {}
+
+    def cut(study, *options):
+        friction = study.cutting.friction.coefficient
+        path = plate.with_name(f"plate-{friction}.nc")
+        raster = Raster(left=-40e-6, top=40e-6, spacing=1e-6, rows=80, columns=80)
+        temperature = np.full((1, *raster.shape), 900.0 + 400.0 * (friction - 0.5))
+        write_scene(Scene.from_fields(raster, [0.0], {"temperature": temperature}), path)
+        made[friction] = path
+        return path
+
+    monkeypatch.setattr("chipglow.study.budgets.cut", cut)
+    study = study_of(plate, **{"cutting.friction.coefficient": {"standard": 0.05}})
+    stated = study.uncertainty.build(study)
+    found = _surrogates(study, stated, 12, ("middle, pixel",), ("middle",), lambda *_: None)
+    assert len(made) == 12
+    one = found["middle, pixel"]
+    band = Band(*study.camera.band)
+
+    def error(temperature):
+        return band.temperature(0.6 * band.radiance(temperature)) - temperature
+
+    # One standard uncertainty of the friction is 20 K.
+    np.testing.assert_allclose(
+        one.at(np.array([[-1.0], [1.0]])), [error(880.0), error(920.0)], atol=0.05
+    )
+    assert one.error < 0.05
+
+
+def test_the_command_prints_and_writes_the_budget(plate, tmp_path):
+    (tmp_path / "study.yaml").write_text(
+        f"""
+scene: {plate}
+surface: {{kind: uniform, emissivity: 0.6}}
+camera: {{psf: {{kind: gaussian, fwhm: 8 um}}, lower_limit: none}}
+analysis: {{reference: true, points: {{middle: [0 um, 0 um]}}}}
+uncertainty:
+  inputs:
+    surface.emissivity: {{standard: 2 %, source: heated chips}}
+""",
+        encoding="utf-8",
+    )
+    table, picture = tmp_path / "budget.csv", tmp_path / "budget.png"
+    arguments = [
+        "budget",
+        tmp_path / "study.yaml",
+        "--at",
+        "middle",
+        "--samples",
+        2,
+        "--trials",
+        1000,
+    ]
+    printed = chipglow("--json", *arguments, "--out", table, "--plot", picture)
+    result = json.loads(printed.stdout)
+    (row,) = result["tables"]["summary"]
+    assert row["expanded_uncertainty_K"] == pytest.approx(
+        1.96 * row["standard_uncertainty_K"], rel=1e-3
+    )
+    assert "heated chips" in table.read_text(encoding="utf-8")
+    assert picture.stat().st_size > 10_000
+    refused([*map(str, arguments), "--at", "edge"], "edge: no such place or reading")
