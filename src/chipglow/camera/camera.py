@@ -253,16 +253,15 @@ class Camera(Part):
             )
         return surface.prepare(scene, self.band, self.reflected)
 
-    def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
+    def expose(
+        self, scene: Scene, surface: Surface, start: float, field: EmissivityField | None = None
+    ) -> Exposure:
         """Expose the camera to a scene for one integration time, starting at `start` in s.
 
-        Raises a ValueError if the scene does not cover the integration time or the pixels.
+        `field` is the surface from `prepare`, if it is known. Raises a ValueError if the scene does
+        not cover the integration time or the pixels.
         """
-        return self._expose(scene, surface, self.prepare(surface, scene), start)
-
-    def _expose(
-        self, scene: Scene, surface: Surface, field: EmissivityField, start: float
-    ) -> Exposure:
+        field = field or self.prepare(surface, scene)
         (exposure,) = self.expose_fields(scene, (field,), start)
         warnings = tuple(surface.origin.warnings(self.band, scene.metal))
         return replace(exposure, effects=surface.effects, warnings=warnings)
@@ -335,7 +334,7 @@ class Camera(Part):
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)
         measured = self.form_measurement(
-            self._expose(scene, surface, field, at)
+            self.expose(scene, surface, at, field)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
         if sparse := sparse_frames(scene, self.integration_time):
@@ -352,21 +351,9 @@ class Camera(Part):
     def form_image(self, radiance: Array, scene: Raster, gather: Gather = integrate) -> Array:
         """Form the image of a radiance map on the pixels by optics, PSF and footprint.
 
-        Parameters
-        ----------
-        radiance : ndarray
-            Mean radiance over the integration time in W/(m² sr), shape `scene.shape`, such as
-            `Exposure.mean_radiance`.
-        scene : Raster
-            Grid of the samples.
-        gather : callable
-            Takes samples, their raster, the raster of the pixels and the fill factor. Returns the
-            values that the pixels receive, such as the mean over each square (`integrate`).
-
-        Returns
-        -------
-        ndarray
-            Pixel radiance in W/(m² sr), shape `pixels(scene).shape`.
+        `radiance` in W/(m² sr), on the samples of `scene`, is a mean over the integration time such
+        as `Exposure.mean_radiance`. `gather` takes samples, their raster, the raster of the pixels
+        and the fill factor; it returns what the pixels receive, such as the mean over each square.
         """
         image = np.asarray(radiance, np.float64)
         if image.shape != scene.shape:

@@ -9,8 +9,10 @@ from scipy.constants import Stefan_Boltzmann
 
 from chipglow.cutting.conditions import Numerics, Surroundings
 from chipglow.cutting.momentum import spline, spline_weights
+from chipglow.cutting.points import Grid
 from chipglow.cutting.stress import property_at
-from chipglow.scene.tool_surface import surface_distance
+from chipglow.quantities import Array
+from chipglow.scene.tool_surface import ToolSurface, surface_distance, surface_distances
 
 
 class ToolHeat(NamedTuple):
@@ -27,17 +29,11 @@ class ToolHeat(NamedTuple):
     area: float
 
 
-@njit(cache=True)
-def tool_fraction(grid, tool):  # type: ignore[no-untyped-def]
+def tool_fraction(grid: Grid, tool: ToolSurface) -> Array:
     """Return the fraction of each node's square that the tool fills, shape (columns, rows)."""
-    result = np.zeros((grid.columns, grid.rows))
-    for i in range(grid.columns):
-        for j in range(grid.rows):
-            distance, _, _ = surface_distance(
-                grid.left + i * grid.cell, grid.bottom + j * grid.cell, tool
-            )
-            result[i, j] = min(max(0.5 - distance / grid.cell, 0.0), 1.0)
-    return result
+    x, y = np.meshgrid(*grid.axes, indexing="ij")
+    distance = np.reshape(surface_distances(x.ravel(), y.ravel(), tool), x.shape)
+    return np.asarray(np.clip(0.5 - distance / grid.cell, 0.0, 1.0), np.float64)
 
 
 @njit(cache=True)

@@ -52,10 +52,10 @@ SUMS = 9
     FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS,
     EXPANSION_WORK, MODULI_LOSS,
 ) = range(SUMS)  # fmt: skip
-"""Sums of a step: forces on the chip (N/m), and work per width of cut (J/m); the last three
-are the elastic energy that goes when the points of a cell share one dilation, that which comes when
-their volume without stress changes with the temperature, and that which goes when the moduli fall
-with it."""
+"""Sums of a step: forces on the chip (N/m), and work per width of cut (J/m), from the plastic work
+on as in `EnergyHistory`; the last three are the elastic energy that goes when the points of a cell
+share one dilation, that which comes when their volume without stress changes with the temperature,
+and that which goes when the moduli fall with it."""
 
 _RATE_OF_SLIDING = 1e4
 

@@ -17,7 +17,6 @@ from chipglow.cutting.momentum import spline, spline_weights
 from chipglow.cutting.points import Grid, Points
 from chipglow.scene import Frame, Raster, Tool
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
-from chipglow.scene.tool_surface import surface_distance
 
 _FIELDS: Final = SPLINE_FIELDS[:FILLED_SPLINE]
 _CORRECTIONS: Final = 2
@@ -78,17 +77,8 @@ class Picture:
 
 def lattice_of(grid: Grid, raster: Raster, tool: Tool, ambient: float) -> Lattice:
     """Return the nodes of the solver's grid that a raster's frames need."""
-    in_tool = _inside(raster.x, raster.y, tool.surface)
+    in_tool = tool.signed_distance(raster.x[None, :], raster.y[:, None]) < 0.0
     return Lattice.within(raster, (grid.left, grid.bottom), grid.cell, in_tool, ambient)
-
-
-@njit(cache=True)
-def _inside(x, y, tool):  # type: ignore[no-untyped-def]
-    result = np.empty((y.size, x.size), np.bool_)
-    for row in range(y.size):
-        for column in range(x.size):
-            result[row, column] = surface_distance(x[column], y[row], tool)[0] < 0.0
-    return result
 
 
 @njit(cache=True)

@@ -48,6 +48,12 @@ class Grid(NamedTuple):
     columns: int
     rows: int
 
+    @property
+    def axes(self) -> tuple[Array, Array]:
+        """Places of the nodes along x and y in m."""
+        x = self.left + self.cell * np.arange(self.columns, dtype=np.float64)
+        return x, self.bottom + self.cell * np.arange(self.rows, dtype=np.float64)
+
 
 def block_of_points(x: Array, y: Array, spacing: float, temperature: float, speed: float) -> Points:
     """Return points on the lattice of columns x and rows y (m), moving along x at `speed` (m/s)."""
@@ -114,13 +120,6 @@ def _innermost(points: Points, marked: NDArray[np.bool_]) -> int:
         return int(marked.argmax())
     distance = np.hypot(x - x[placed].mean(), y - y[placed].mean())
     return int(np.where(placed, distance, np.inf).argmin())
-
-
-def fastest_point(points: Points) -> tuple[float, int]:
-    """Return speed in m/s and number of the fastest point."""
-    speed = np.hypot(points["vx"], points["vy"])
-    index = int(speed.argmax())
-    return float(speed[index]), index
 
 
 def find_lost(points: Points, grid: Grid, ceiling: float) -> Trouble | None:

@@ -38,14 +38,10 @@ from chipglow.cutting.mean_rate import average_rates
 from chipglow.cutting.momentum import (
     BOUNDARY_WORK,
     CONTACT_WORK,
-    EXPANSION_WORK,
     FORCE_X,
     FORCE_Y,
-    FRICTION_WORK,
-    MODULI_LOSS,
     NODE_VALUES,
     PLASTIC_WORK,
-    SHARING_LOSS,
     SUMS,
     VELOCITY_VALUES,
     VELOCITY_X,
@@ -59,7 +55,6 @@ from chipglow.cutting.points import (
     Points,
     Trouble,
     block_of_points,
-    fastest_point,
     find_lost,
     find_off_grid,
     find_trouble,
@@ -78,7 +73,7 @@ from chipglow.cutting.recording import (
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
-from chipglow.scene.tool_surface import ToolSurface, surface_distance
+from chipglow.scene.tool_surface import ToolSurface, surface_distances
 
 SOLVER_VERSION: Final = "12"
 """Changes whenever the same input gives another result."""
@@ -356,13 +351,13 @@ class _State:
         self.tool = simulation.tool.surface
         self.speed, self.spacing = conditions.speed, spacing
         self.simulation, self.interval = simulation, interval
-        self.heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
-        mass = self.heat_mass * simulation.mass_scaling
+        heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
+        mass = heat_mass * simulation.mass_scaling
         resists, exponent = material.nonlocal_viscosity, simulation.friction.thermal_exponent
         self.step = Step(
             mass=mass,
-            heat_mass=self.heat_mass,
-            volume=self.heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
+            heat_mass=heat_mass,
+            volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
             time_step=0.0,
             kept=_KEPT,
             shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
@@ -534,23 +529,19 @@ class _State:
         self.choose_steps(self.grid.cell / self.cycle)
         drive = self.work[BOUNDARY_WORK] + self.carried
         held = self._held() - self.held_at_start
-        used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS, EXPANSION_WORK, MODULI_LOSS]]
-        return np.concatenate(
-            [
-                forces,
-                [self.thickness(), drive, self.work[CONTACT_WORK]],
-                held,
-                used,
-                [self.lost_heat],
-            ]
-        )
+        used = self.work[PLASTIC_WORK:]
+        done = drive, self.work[CONTACT_WORK]
+        return np.array([*forces, self.thickness(), *done, *held, *used, self.lost_heat])
 
     def choose_steps(self, allowed: float = inf) -> None:
         """Choose time step and cycles of the next interval, by the fastest point.
 
         It may not have been faster than `allowed` (m/s) by the steps of the interval before.
         """
-        fastest, index = fastest_point(self.points[: self.count])
+        points = self.points[: self.count]
+        speed = np.hypot(points["vx"], points["vy"])
+        index = int(speed.argmax())
+        fastest = float(speed[index])
         sound = _sound(self.simulation)
         if fastest > sound:
             self._fail(
@@ -576,7 +567,8 @@ class _State:
 
     def _conduct(self) -> None:
         points, count, grid, cycle = self.points, self.count, self.grid, self.cycle
-        nodes, rise, capacity, mass = self.heat_nodes, self.increment, self.capacity, self.heat_mass
+        nodes, rise, mass = self.heat_nodes, self.increment, self.step.heat_mass
+        capacity = self.capacity
         tool, filled, heat = self.tool_temperature, self.tool_fraction, self.tool_heat
         part = min(self.diffusivity * cycle / grid.cell**2, 1.0)
         conduct(points, count, nodes, rise, self.conductivity, capacity, mass, grid, cycle, part)
@@ -693,6 +685,6 @@ def _touching(tool: ToolSurface, heights: NDArray[np.float64]) -> float:
     low, high = -1e-2, 0.0
     for _ in range(60):
         middle = (low + high) / 2
-        clear = all(surface_distance(middle, y, tool)[0] > 0 for y in heights)
+        clear = (surface_distances(np.full_like(heights, middle), heights, tool) > 0.0).all()
         low, high = (middle, high) if clear else (low, middle)
     return low

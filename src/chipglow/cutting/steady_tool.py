@@ -68,7 +68,7 @@ class SteadyTool:
 
     def on(self, grid: Grid, fraction: Field) -> Field:
         """Return the temperature on the nodes of another grid, in K, shape (columns, rows)."""
-        x, y = _axes(self.grid)
+        x, y = self.grid.axes
         filled = self.fraction > 0.0
         places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
         nearest = scipy.interpolate.NearestNDInterpolator(places[filled], self.temperature[filled])
@@ -77,7 +77,7 @@ class SteadyTool:
         inside = scipy.interpolate.RegularGridInterpolator(
             (x, y), whole, bounds_error=False, fill_value=None
         )
-        new = np.stack(np.meshgrid(*_axes(grid), indexing="ij"), axis=-1)
+        new = np.stack(np.meshgrid(*grid.axes, indexing="ij"), axis=-1)
         beside = float(self.temperature[filled].min())
         return np.where(fraction > 0.0, inside(new), beside)
 
@@ -123,16 +123,9 @@ def _conduction(
     return scipy.sparse.csc_array((values, (rows, columns)), shape=(drained.size, drained.size))
 
 
-def _axes(grid: Grid) -> tuple[Field, Field]:
-    """Return the places of the nodes in m."""
-    x = grid.left + grid.cell * np.arange(grid.columns, dtype=np.float64)
-    y = grid.bottom + grid.cell * np.arange(grid.rows, dtype=np.float64)
-    return x, y
-
-
 def _distance(grid: Grid) -> Field:
     """Return the distance of the nodes from the edge in m, a cell at least."""
-    x, y = _axes(grid)
+    x, y = grid.axes
     return np.maximum(np.hypot(x[:, None], y[None, :]), grid.cell)
 
 
@@ -144,7 +137,7 @@ def _outward(grid: Grid, border: NDArray[np.int64], conductivity: Field, body: T
     i, j = border[:, 0], border[:, 1]
     r = _distance(grid)[i, j]
     sides = np.stack([(i == 0) | (i == grid.columns - 1), (j == 0) | (j == grid.rows - 1)])
-    x, y = _axes(grid)
+    x, y = grid.axes
     along = np.abs(np.stack([x[i], y[j]])) / r
     facing = np.maximum(np.where(sides, along, 0.0).max(axis=0), _FACING)
     slope = body.width / (r * (body.width + r))

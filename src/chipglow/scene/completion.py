@@ -89,8 +89,6 @@ class Completion(Part):
         super().__post_init__()
         if self.chip is not None and len(self.chip) < 3:
             raise ValueError(f"chip: {len(self.chip)} corners, expected 3 or more")
-        if self.motion not in ("auto", "flow", "none"):
-            raise ValueError(f"motion: {self.motion!r}, expected auto, flow or none")
         if self.motion == "none" and self.cutting_speed is not None:
             raise ValueError("motion: 'none' beside a cutting_speed, give only one of them")
 
@@ -165,7 +163,9 @@ def complete(
 
     The first one's strain rate and optical flow are taken from the second.
     """
-    chip, in_tool = _inside(completion.chip, raster), _in_tool(completion.tool, raster)
+    x, y, nowhere = raster.x[None, :], raster.y[:, None], np.zeros(raster.shape, np.bool_)
+    chip = in_polygon(completion.chip, x, y) if completion.chip else nowhere
+    in_tool = completion.tool.signed_distance(x, y) < 0.0 if completion.tool else nowhere
     history: deque[SampledFrame] = deque(maxlen=completion.memory)
     found: set[str] = set()
     for number, sampled in enumerate(frames):
@@ -291,20 +291,6 @@ def _pattern(frame: SampledFrame) -> NDArray[np.float32]:
 def _elsewhere(values: NDArray[np.float32], value: float = 0.0) -> NDArray[np.float32]:
     """Values with one value where there is no material."""
     return np.where(np.isfinite(values), values, np.float32(value))
-
-
-def _in_tool(tool: Tool | None, raster: Raster) -> NDArray[np.bool_]:
-    if tool is None:
-        return np.zeros(raster.shape, np.bool_)
-    x, y = np.meshgrid(raster.x, raster.y)
-    return np.asarray(tool.signed_distance(x, y) < 0.0)
-
-
-def _inside(corners: Sequence[tuple[float, float]] | None, raster: Raster) -> NDArray[np.bool_]:
-    """Which samples lie in a polygon."""
-    if corners is None:
-        return np.zeros(raster.shape, np.bool_)
-    return in_polygon(corners, raster.x[None, :], raster.y[:, None])
 
 
 def strain_rate_along(

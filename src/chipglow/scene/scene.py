@@ -422,16 +422,12 @@ def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
     lowest, highest = float(values.min()), float(values.max())
     if not (isfinite(lowest) and isfinite(highest)):
         raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
-    if name == "temperature" and lowest < COLDEST:
-        hint = "; it looks like °C, add 273.15" if -100.0 < lowest < 200.0 else ""
+    if name == "temperature" and not COLDEST <= lowest <= highest <= HOTTEST:
+        wrong = lowest if lowest < COLDEST else highest
+        hint = "; it looks like °C, add 273.15" if -100.0 < wrong < COLDEST else ""
         raise SceneError(
-            f"scene: temperature {lowest:.6g} at {time:.9g} s, expected kelvin of "
+            f"scene: temperature {wrong:.6g} at {time:.9g} s, expected kelvin of "
             f"{COLDEST:g} to {HOTTEST:g}{hint}"
-        )
-    if name == "temperature" and highest > HOTTEST:
-        raise SceneError(
-            f"scene: temperature {highest:.6g} at {time:.9g} s, expected kelvin of "
-            f"{COLDEST:g} to {HOTTEST:g}"
         )
     if name in ("plastic_strain", "plastic_strain_rate") and lowest < 0:
         raise SceneError(f"scene: {name!r} is {lowest:.6g} at {time:.9g} s, expected 0 or more")

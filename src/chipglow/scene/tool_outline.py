@@ -20,8 +20,7 @@ _STRAIGHT: Final = 0.2e-6
 _TOUCHING: Final = 1e-10
 _LEVEL: Final = 1e-12
 _WEDGE: Final = ("rake_angle", "clearance_angle", "edge_radius")
-_CHAMFER: Final = ("tool_chamfer_width", "tool_chamfer_angle")
-_HONE: Final = ("tool_hone_rake", "tool_hone_clearance")
+_EDGES: Final[Mapping[str, type[Chamfer | Hone]]] = {"chamfer": Chamfer, "hone": Hone}
 _ORDER: Final = (
     "points go from the rake face round the edge to the flank face, the tool on their left"
 )
@@ -176,10 +175,9 @@ def tool_attributes(tool: Tool) -> dict[str, Any]:
         return values | {"tool_outline": tool.own_corners.ravel()}
     assert isinstance(tool, ToolGeometry)
     values |= {f"tool_{name}": getattr(tool, name) for name in _WEDGE}
-    if tool.chamfer:
-        values |= zip(_CHAMFER, (tool.chamfer.width, tool.chamfer.angle), strict=True)
-    if tool.hone:
-        values |= zip(_HONE, (tool.hone.rake, tool.hone.clearance), strict=True)
+    for name, kind in _EDGES.items():
+        if edge := getattr(tool, name):
+            values |= {f"tool_{name}_{field}": getattr(edge, field) for field in kind.declared()}
     return values
 
 
@@ -198,11 +196,9 @@ def _tool_at_origin(attributes: Mapping[str, Any]) -> Tool | None:
         return ToolOutline(tuple((float(x), float(y)) for x, y in line))
     if not all(f"tool_{name}" in attributes for name in _WEDGE):
         return None
-    wedge: dict[str, Any] = {name: float(attributes[f"tool_{name}"]) for name in _WEDGE}
-    chamfer = [float(attributes[name]) for name in _CHAMFER if name in attributes]
-    hone = [float(attributes[name]) for name in _HONE if name in attributes]
-    return ToolGeometry(
-        **wedge,
-        chamfer=Chamfer(*chamfer) if len(chamfer) == len(_CHAMFER) else None,
-        hone=Hone(*hone) if len(hone) == len(_HONE) else None,
-    )
+    values: dict[str, Any] = {name: float(attributes[f"tool_{name}"]) for name in _WEDGE}
+    for name, kind in _EDGES.items():
+        names = [f"tool_{name}_{field}" for field in kind.declared()]
+        if all(one in attributes for one in names):
+            values[name] = kind(*(float(attributes[one]) for one in names))
+    return ToolGeometry(**values)

@@ -54,16 +54,6 @@ class Exchange:
         """Middles of the elements in m, shape (element, 2)."""
         return (self.starts + self.ends) / 2
 
-    @cached_property
-    def view_factors(self) -> Array:
-        """Fraction of each element's diffuse radiation that first meets each other one.
-
-        Shape (element, element + 1); the last column is what leaves to the surroundings, so that
-        every row has the sum 1.
-        """
-        no_mirrors = np.zeros((1, len(self.lengths)))
-        return np.asarray(_factors(*self._first_hits, no_mirrors)[0])
-
     def incident(
         self,
         radiance: ArrayLike,

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, pi, radians, sin
+from math import cos, pi, radians
 from typing import Annotated, Final, NamedTuple
 
 import numpy as np
@@ -298,16 +298,6 @@ class Wedge(SideShape):
         depth = self.bulge_radius * (cos(self.angle) - np.sin(slope))
         height = self.bulge_radius * (np.cos(slope) - 1.0) - self.overhang
         return np.stack([depth, height], axis=1)
-
-    @property
-    def width(self) -> float:
-        """Depth into the chip in m at which its side is flat."""
-        return self.bulge_radius * cos(self.angle)
-
-    @property
-    def height(self) -> float:
-        """Height of the rake face that is bare beside the chip, in m."""
-        return self.bulge_radius * (1.0 - sin(self.angle)) + self.overhang
 
 
 def _graded(count: int) -> NDArray[np.float64]:

@@ -93,19 +93,8 @@ class Surface(Part, ABC):
     ) -> EmissivityField:
         """Lay the surface on a scene; what depends on the whole scene is computed here.
 
-        Parameters
-        ----------
-        scene : Scene
-            The scene.
-        band : Band, optional
-            The camera's spectral band, for a surface that is not grey.
-        reflected : float, optional
-            Temperature of the surroundings that the surface reflects in K; None: they are dark.
-
-        Raises
-        ------
-        ValueError
-            If the scene lacks a field, or a surface that is not grey has no band.
+        A surface that is not grey needs the camera's `band`, and reflects surroundings of the
+        temperature `reflected` in K (None: dark ones). A ValueError if the scene lacks a field.
         """
 
     @property
@@ -146,20 +135,10 @@ class Modifier(Part, ABC):
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
     ) -> Change:
-        """Return the change of the emissivity of a surface on a scene.
+        """Return the change of the emissivity of a surface on a scene, in a band and surroundings.
 
-        Parameters
-        ----------
-        surface : Surface
-            The surface that is modified.
-        scene, band, reflected
-            As for `Surface.prepare`.
-
-        Returns
-        -------
-        callable
-            Takes the surface's emissivity, float32 of shape (y, x), which is 0 in the void and
-            must stay so, and the frame; returns the modified one.
+        It takes the surface's emissivity, float32 of shape (y, x), which is 0 in the void and must
+        stay so, and the frame.
         """
 
     def redrawn(self, number: int) -> Self:

@@ -56,12 +56,7 @@ class DetectorResponse(Part, ABC):
     def electrons(self, point: OperationPoint, capacity: float) -> float:
         """Return the electrons that 1 W/(m² sr) makes in an element in one frame.
 
-        Parameters
-        ----------
-        point : OperationPoint
-            How the camera uses the detector.
-        capacity : float
-            Electrons that fill the detector or its digitiser.
+        `capacity` are the electrons that fill the detector or its digitiser.
         """
 
 

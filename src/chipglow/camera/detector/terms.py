@@ -84,20 +84,7 @@ class DetectorTerm(Part, ABC):
 
     @abstractmethod
     def apply(self, electrons: Array, readout: Readout) -> Array:
-        """Return the electrons with the effect.
-
-        Parameters
-        ----------
-        electrons : ndarray
-            Signal of every element and frame after the previous stages, shape (time, y, x).
-        readout : Readout
-            The frames.
-
-        Returns
-        -------
-        ndarray
-            Signal of the same shape.
-        """
+        """Return with the effect the electrons of the stages before, shape (time, y, x)."""
 
 
 @DETECTOR_TERMS.part

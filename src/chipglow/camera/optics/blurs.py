@@ -10,14 +10,7 @@ import numpy as np
 from scipy import fft
 from scipy.special import j0
 
-from chipglow.camera.optics.kernel import (
-    check_length,
-    folded,
-    half_size,
-    kernel_fwhm,
-    normalised,
-    resized,
-)
+from chipglow.camera.optics.kernel import folded, half_size, kernel_fwhm, normalised, resized
 from chipglow.camera.optics.psf import PointSpreadFunction
 from chipglow.quantities import Array, Family, Parameter, Part
 from chipglow.quantities.units import ANGLE, LENGTH
@@ -45,12 +38,9 @@ class BlurTerm(Part, ABC):
 
     @abstractmethod
     def transfer(self, across: Array, up: Array) -> Array:
-        """Return the transfer function, 1 at zero frequency.
+        """Return the transfer function at frequencies to the right and up in 1/m, broadcast.
 
-        Parameters
-        ----------
-        across, up : ndarray
-            Spatial frequencies to the right and up in 1/m, broadcast against each other.
+        It is 1 at zero frequency.
         """
 
 
@@ -193,15 +183,13 @@ class BlurredPSF(PointSpreadFunction):
         return replace(self, psf=self.psf.in_band(band))
 
     def kernel(self, spacing: float) -> Array:
-        check_length("spacing", spacing)
         kernel, change = self.psf.kernel(spacing), self._change(spacing)
         half = max(kernel.shape[0], change.shape[0]) // 2
         return np.maximum(resized(kernel, half, half) + resized(change, half, half), 0.0)
 
     def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
-        check_length("spacing", spacing)
-        kernel, change = self.psf.view_kernel(spacing, rows, columns), self._change(spacing)
-        change = folded(change, rows, columns)
+        kernel = self.psf.view_kernel(spacing, rows, columns)
+        change = folded(self._change(spacing), rows, columns)
         rows, columns = (max(pair) // 2 for pair in zip(kernel.shape, change.shape, strict=True))
         sum_of_both = resized(kernel, rows, columns) + resized(change, rows, columns)
         return normalised(np.maximum(sum_of_both, 0.0))

@@ -92,35 +92,18 @@ class PointSpreadFunction(PSFChoice):
 
     @abstractmethod
     def kernel(self, spacing: float) -> Array:
-        """Return the fractions of a point's light on a grid of squares.
+        """Return the fractions of a point's light on squares with sides of `spacing` in m.
 
-        Parameters
-        ----------
-        spacing : float
-            Side of a square in m. The point is at the centre of the central square.
-
-        Returns
-        -------
-        ndarray
-            A square array with an odd number of rows, first row on top. Its sum is less than 1 by
-            the light outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
+        A square array with an odd number of rows, first row on top; the point is at its centre. Its
+        sum is less than 1 by the light outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
         """
 
     def view_kernel(self, spacing: float, rows: int, columns: int) -> Array:
-        """Return the fractions of all of a point's light on a grid of limited size.
+        """Return the fractions of all of a point's light, of sum 1, on a grid of limited size.
 
-        Parameters
-        ----------
-        spacing : float
-            Side of a square in m. The point is at the centre of the central square.
-        rows, columns : int
-            Largest number of squares on each side of the central one.
-
-        Returns
-        -------
-        ndarray
-            Fractions of sum 1, shape (2 m + 1, 2 n + 1) with m ≤ `rows` and n ≤ `columns`. The
-            border squares also contain the light beyond them.
+        At most `rows` and `columns` of squares with sides of `spacing` in m are on each side of the
+        central one, which has the point at its centre; the border squares also contain the light
+        beyond them.
         """
         return folded(normalised(self.kernel(spacing)), rows, columns)
 

@@ -32,14 +32,7 @@ class OpticsTerm(Part, ABC):
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         """Return the image on the scene's samples, before the pixels integrate it.
 
-        Parameters
-        ----------
-        radiance : ndarray
-            Radiance of the samples.
-        scene, pixels : Raster
-            Grids of the samples and of the pixels.
-        blurred : Blur
-            Convolution, which includes the assumption about radiance beyond the scene.
+        `blurred` is a convolution, which includes the assumption about radiance beyond the scene.
         """
         return radiance
 
