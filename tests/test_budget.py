@@ -17,7 +17,6 @@ from chipglow.io import write_scene
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, study_budget
-from chipglow.study.budgets import _surrogates
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.uncertainty import Input, Inputs, budget
 from chipglow.uncertainty.surrogate import Surrogate
@@ -272,22 +271,30 @@ def test_settings_of_the_cut_act_by_a_surrogate(plate, monkeypatch):
         made[friction] = path
         return path
 
-    monkeypatch.setattr("chipglow.study.budgets.cut", cut)
-    study = study_of(plate, **{"cutting.friction.coefficient": {"standard": 0.05}})
-    stated = study.uncertainty.build(study)
-    found = _surrogates(study, stated, 12, ("middle, pixel",), ("middle",), lambda *_: None)
-    assert len(made) == 12
-    one = found["middle, pixel"]
+    for room in ("budgets", "running"):
+        monkeypatch.setattr(f"chipglow.study.{room}.cut", cut)
+    study = Study(
+        surface={"kind": "uniform", "emissivity": 0.6},
+        camera={"psf": {"kind": "gaussian", "fwhm": "8 um"}, "lower_limit": None},
+        analysis={"reference": "true", "points": {"middle": ("0 um", "0 um")}},
+        uncertainty={"inputs": {"cutting.friction.coefficient": {"standard": 0.05}}},
+    )
+    found = study_budget(study, ("middle",), trials=1000, samples=2, scenes=12)
+    assert len(made) == 13
+    one = found.surrogates["middle, pixel"]
     band = Band(*study.camera.band)
 
     def error(temperature):
         return band.temperature(0.6 * band.radiance(temperature)) - temperature
 
     # One standard uncertainty of the friction is 20 K.
-    np.testing.assert_allclose(
-        one.at(np.array([[-1.0], [1.0]])), [error(880.0), error(920.0)], atol=0.05
-    )
+    ends = np.array([error(880.0), error(920.0)])
+    np.testing.assert_allclose(one.at(np.array([[-1.0], [1.0]])), ends, atol=0.05)
     assert one.error < 0.05
+    frame = found.to_frame().set_index("input")
+    part = frame.loc["cutting.friction.coefficient"]
+    assert part.contribution_K == pytest.approx(abs(ends[1] - ends[0]) / 2, abs=0.05)
+    assert part.group == "scene" and part.variance_percent > 99.0
 
 
 def test_the_command_prints_and_writes_the_budget(plate, tmp_path):

@@ -120,6 +120,8 @@ class StudyBudget:
         return frame.rename(columns=lambda name: name.replace("_order", "_order_percent"))
 
     def _unit(self, path: str) -> str:
+        if path not in self.study.uncertainty.inputs:
+            return "1"
         quantity = setting_at(self.study, path).parameter.quantity
         return quantity.base if quantity else "1"
 
