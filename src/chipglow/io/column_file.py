@@ -53,11 +53,14 @@ def read_columns(path: str | os.PathLike[str], columns: Sequence[Column]) -> dic
 
     In the first line the unit follows the name: ``temperature_degC,counts``.
     """
-    return _table(Path(path), columns)[0]
+    return read_table(path, columns)[0]
 
 
-def _table(path: Path, columns: Sequence[Column]) -> tuple[dict[str, Array], list[int]]:
-    """Return the columns by name, and which line of the file each row is."""
+def read_table(
+    path: str | os.PathLike[str], columns: Sequence[Column]
+) -> tuple[dict[str, Array], list[int]]:
+    """Return the columns by name as `read_columns`, and which line of the file each row is."""
+    path = Path(path)
     lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     if len(rows) < 2:
@@ -97,7 +100,7 @@ def read_calibration_points(
         return read_columns(path, POINT_COLUMNS)
     counts = Column("counts", required=False, blank=True)
     file = Column("file", number_of=counts_of, blank=True)
-    table, lines = _table(Path(path), (TEMPERATURE, counts, file, *_POINT_UNCERTAINTIES))
+    table, lines = read_table(path, (TEMPERATURE, counts, file, *_POINT_UNCERTAINTIES))
     stated = table.pop("counts", np.full(len(lines), nan))
     read = table.pop("file")
     for line, both in zip(lines, np.isfinite(stated) == np.isfinite(read), strict=True):
@@ -149,7 +152,7 @@ def _fits(cell: str, column: Column) -> bool:
 
 def read_polyline(path: Path) -> tuple[Array, list[int]]:
     """Read corners in m, shape (n, 2), and the line of the file of each: ``x_um,y_um``."""
-    table, lines = _table(path, _CORNER_COLUMNS)
+    table, lines = read_table(path, _CORNER_COLUMNS)
     return np.stack([table["x"], table["y"]], axis=1), lines
 
 

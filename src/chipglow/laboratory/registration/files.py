@@ -1,6 +1,5 @@
 """Files of a registration: the map, pictures of a visible camera, and points seen in both."""
 
-import csv
 import os
 from pathlib import Path
 from typing import Final, NotRequired
@@ -16,6 +15,7 @@ from chipglow.camera import Recording
 from chipglow.io import atomic_path
 from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
+from chipglow.io.column_file import Column, read_table
 from chipglow.laboratory.registration.registration import Method, Model, Registration
 from chipglow.quantities import Array, problem
 from chipglow.scene import Raster
@@ -26,9 +26,9 @@ PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".g
 _MOST_PIXELS: Final = 400_000_000
 _TURN: Final = 600
 
-_VISIBLE: Final = ["visible_column", "visible_row"]
-_BY_LENGTH: Final = ["x_um", "y_um", *_VISIBLE]
-_BY_PIXEL: Final = ["infrared_column", "infrared_row", *_VISIBLE]
+_VISIBLE: Final = (Column("visible_column"), Column("visible_row"))
+_BY_LENGTH: Final = (Column("x", "um", "m"), Column("y", "um", "m"), *_VISIBLE)
+_BY_PIXEL: Final = (Column("infrared_column"), Column("infrared_row"), *_VISIBLE)
 _HALF: Final = 0.5
 _HEAD: Final = """\
 # Map from the infrared image onto the visible picture, by chipglow register.
@@ -147,40 +147,27 @@ def read_points(
 ) -> tuple[Array, Array]:
     """Read points from a CSV file."""
     path = Path(path)
-    lines = read_small_text(path).rstrip().splitlines()
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
-    if rows[0] not in (_BY_LENGTH, _BY_PIXEL):
-        raise ValueError(
-            f"{path}, line 1: {','.join(rows[0])!r}, expected {','.join(_BY_LENGTH)!r} "
-            f"or {','.join(_BY_PIXEL)!r}"
-        )
-    points = np.array([_point(path, i, row) for i, row in enumerate(rows[1:], 2)]).reshape(-1, 4)
-    positions = points[:, :2] * 1e-6
-    if rows[0] == _BY_PIXEL:
+    by_pixel = "infrared_column" in read_small_text(path).partition("\n")[0]
+    table, lines = read_table(path, _BY_PIXEL if by_pixel else _BY_LENGTH)
+    pixels = np.stack([table["visible_column"], table["visible_row"]], axis=1)
+    if by_pixel:
+        places = np.stack([table["infrared_column"], table["infrared_row"]], axis=1)
         corner = np.array([raster.left, raster.top])
-        positions = corner + (points[:, :2] + _HALF) * raster.spacing * [1.0, -1.0]
+        positions = corner + (places + _HALF) * raster.spacing * [1.0, -1.0]
+    else:
+        positions = np.stack([table["x"], table["y"]], axis=1)
     left, right, bottom, top = raster.extent
-    for line, (point, place) in enumerate(zip(points, positions, strict=True), 2):
-        if not (left <= place[0] <= right and bottom <= place[1] <= top):
+    for line, (x, y), (column, row) in zip(lines, positions, pixels, strict=True):
+        if not (left <= x <= right and bottom <= y <= top):
             raise ValueError(
-                f"{path}, line {line}: {point[0]:g}, {point[1]:g} is outside the infrared image, "
-                f"expected x {1e6 * left:.6g} to {1e6 * right:.6g} um and y {1e6 * bottom:.6g} to "
+                f"{path}, line {line}: the point is outside the infrared image, expected x "
+                f"{1e6 * left:.6g} to {1e6 * right:.6g} um and y {1e6 * bottom:.6g} to "
                 f"{1e6 * top:.6g} um, or columns 0 to {raster.columns - 1} and rows 0 to "
                 f"{raster.rows - 1}"
             )
-        if not (-_HALF <= point[2] <= shape[1] - _HALF and -_HALF <= point[3] <= shape[0] - _HALF):
+        if not (-_HALF <= column <= shape[1] - _HALF and -_HALF <= row <= shape[0] - _HALF):
             raise ValueError(
-                f"{path}, line {line}: {point[2]:g}, {point[3]:g} is outside the visible picture, "
+                f"{path}, line {line}: {column:g}, {row:g} is outside the visible picture, "
                 f"expected columns 0 to {shape[1] - 1} and rows 0 to {shape[0] - 1}"
             )
-    return positions, points[:, 2:]
-
-
-def _point(path: Path, line: int, row: list[str]) -> list[float]:
-    try:
-        values = [float(cell) for cell in row]
-    except ValueError:
-        values = []
-    if len(values) != len(_BY_LENGTH) or not np.isfinite(values).all():
-        raise ValueError(f"{path}, line {line}: {','.join(row)!r}, expected four numbers")
-    return values
+    return positions, pixels
