@@ -10,23 +10,24 @@ from matplotlib.patches import Patch
 from chipglow.drawing import drawing, scales
 from chipglow.study import StudyBudget
 
+_LARGEST: Final = 6
 _HEIGHT: Final = 0.22
 """Height of a bar in inches."""
 
 
 def draw_budget(result: StudyBudget) -> Figure:
-    """Draw a bar for each input and reading, coloured by group, with the total below."""
+    """Draw bars of the largest contributions to each reading, coloured by group, and their total."""
     frame, summary = result.to_frame(), result.summary().set_index("reading")
     groups = list(dict.fromkeys(frame.group))
     colour_of = dict(zip(groups, cycle(scales.COLOURS)))
-    count = frame.input.nunique() + 1
+    count = min(frame.input.nunique(), _LARGEST) + 1
     with drawing.style():
         figure = drawing.new_figure(len(result.readings) * (count * _HEIGHT + 0.75) + 0.4)
         panels = figure.subplots(len(result.readings), 1, squeeze=False, sharex=True)[:, 0]
         for panel, (reading, part) in zip(
             panels, frame.groupby("reading", sort=False), strict=True
         ):
-            part = part.sort_values("contribution_K", ascending=False)
+            part = part.nlargest(_LARGEST, "contribution_K")
             positions = np.arange(len(part))
             colours = [colour_of[group] for group in part.group]
             panel.barh(positions, part.contribution_K, color=colours)

@@ -50,7 +50,7 @@ class Dots:
     uncertainty: Array
     """Standard uncertainty of a column or a row in pixels, shape (n,)."""
     radius: float
-    """Diameter of most of them, in pixels."""
+    """Radius of most of them, in pixels."""
     bright: bool
     """Whether they are brighter than their surroundings."""
 
