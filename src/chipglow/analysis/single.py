@@ -2,7 +2,7 @@
 
 An uncertainty budget and a choice of settings need thousands of readings with other cameras and
 surfaces. Each exposes only a window of the scene around the place. The light that blurs into the
-window from beyond it is that of the nominal camera and surface.
+window from beyond it is computed with the nominal camera and surface.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
     "pixel position down",
     "noise",
 )
-"""What a single reading draws at random, as numbers of 0 to 1."""
+"""Random inputs of a single reading, numbers from 0 to 1."""
 
 REFERENCE, MEASURED, TRUE = range(3)
 """Temperatures of a reading."""
@@ -131,7 +131,7 @@ class SingleReadings:
     ) -> Array:
         """Return `REFERENCE`, `MEASURED` and `TRUE` in K of each reading, shape (reading, 3).
 
-        `draw` gives a number of 0 to 1 for each of `random`.
+        `draw` gives a number from 0 to 1 for each of `random`.
         """
         texture, noise = (int(draw.get(name, 0.0) * _TEXTURES) for name in (TEXTURE, NOISE))
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)

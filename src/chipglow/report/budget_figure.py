@@ -16,7 +16,7 @@ _HEIGHT: Final = 0.22
 
 
 def draw_budget(result: StudyBudget) -> Figure:
-    """Draw bars of the largest contributions to each reading, coloured by group, and their total."""
+    """Draw the largest contributions to each reading, coloured by group, and their total."""
     frame, summary = result.to_frame(), result.summary().set_index("reading")
     groups = list(dict.fromkeys(frame.group))
     colour_of = dict(zip(groups, cycle(scales.COLOURS)))

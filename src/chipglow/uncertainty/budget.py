@@ -20,6 +20,9 @@ Model: TypeAlias = Callable[[Array], Array]
 _DRAWS: Final = 64
 """Draws of the random inputs over which a sensitivity is a mean."""
 
+_LEAST: Final = 100
+"""Least number of trials."""
+
 _RESAMPLES: Final = 200
 """Resamples of the intervals of Sobol's indices."""
 
@@ -74,7 +77,8 @@ def budget(
     generator : numpy.random.Generator
         Source of all draws.
     trials : int
-        Largest number of trials of the Monte Carlo; fewer if the results are stable to one digit.
+        Largest number of trials of the Monte Carlo, 100 or more; fewer if the results are stable
+        to one digit.
     samples : int
         Base samples of Sobol's indices, a power of 2: the model is computed for this many times
         the number of groups and 2 more.
@@ -90,6 +94,8 @@ def budget(
     random inputs from a Sobol sequence. The contribution of a random or discrete input is the root
     of half the mean square of the change when it alone is drawn again (Jansen, 1999).
     """
+    if trials < _LEAST:
+        raise ValueError(f"trials: {trials}, expected {_LEAST} or more")
     progress("sensitivities", 0.0)
     values, slopes, scatter = _first_order(model, inputs, generator)
     progress("sensitivities", 1.0)
@@ -103,8 +109,8 @@ def budget(
         sample,
         level=level,
         digits=1,
-        most=max(trials, 2 * _BLOCK),
-        block=_BLOCK,
+        most=trials,
+        block=min(_BLOCK, trials // 2),
         has_variance=min(freedoms, default=np.inf) > 2,
         progress=lambda part: progress("Monte Carlo", part),
     )

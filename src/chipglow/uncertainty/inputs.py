@@ -14,7 +14,7 @@ from chipglow.quantities import Array
 from chipglow.uncertainty.component import Distribution
 
 InputDistribution: TypeAlias = Distribution | Literal["discrete", "random"]
-"""Distribution of an input; ``random`` is uniform over 0 to 1: an effect without a set value."""
+"""Distribution of an input; ``random`` is uniform from 0 to 1: an effect without a set value."""
 
 _TRIANGLE: Final = triang(0.5, -sqrt(6.0), 2 * sqrt(6.0))
 _EDGE: Final = 1e-12
@@ -35,7 +35,7 @@ class Input:
         Standard uncertainty, in the unit of the value.
     distribution : str
         normal (Student's with finite `degrees_of_freedom`), rectangular, triangular, arcsine;
-        discrete, one of `values` with equal probabilities; or random, uniform over 0 to 1.
+        discrete, one of `values` with equal probabilities; or random, uniform from 0 to 1.
     degrees_of_freedom : float
         Of the standard uncertainty.
     values : tuple of float
@@ -58,7 +58,7 @@ class Input:
         return self.distribution not in ("discrete", "random")
 
     def at(self, numbers: Array) -> Array:
-        """Return the quantiles at numbers of 0 to 1."""
+        """Return the quantiles at numbers from 0 to 1."""
         inside = np.clip(numbers, _EDGE, 1 - _EDGE)
         if self.distribution == "random":
             return np.asarray(inside)
@@ -146,7 +146,7 @@ class Inputs:
         return found
 
     def at(self, numbers: Array) -> Array:
-        """Return the values of the inputs at independent numbers of 0 to 1, (trial, input)."""
+        """Return the values of the inputs at independent numbers from 0 to 1, (trial, input)."""
         if self.correlations:
             normal = ndtri(np.clip(numbers, _EDGE, 1 - _EDGE))
             numbers = ndtr(normal @ np.linalg.cholesky(self.correlation).T)

@@ -114,7 +114,7 @@ def adaptive(
     has_variance: bool = True,
     progress: Callable[[float], None] = lambda part: None,
 ) -> MonteCarlo:
-    """Return the distribution of what `sample` returns for a number of trials, as `monte_carlo`."""
+    """Return the distribution of samples, as `monte_carlo`; `sample` takes a number of trials."""
     ends = ((1 - level) / 2, (1 + level) / 2)
     values: list[Array] = []
     blocks: list[Array] = []
