@@ -70,6 +70,30 @@ def test_the_calibration_of_a_mass_is_not_validated_to_first_order():
     assert not found.validates(first)
 
 
+@pytest.mark.parametrize(
+    ("place", "correlation", "mean", "deviation"),
+    [
+        (0.000, 0.0, 50, 50),
+        (0.010, 0.0, 150, 112),
+        (0.050, 0.0, 2550, 502),
+        (0.000, 0.9, 50, 67),
+        (0.010, 0.9, 150, 121),
+        (0.050, 0.9, 2550, 505),
+    ],
+)
+def test_the_comparison_loss_of_a_power_meter(place, correlation, mean, deviation):
+    # 9.4: the square of a complex voltage reflection, of which the first order is 0 at 0; in 1e-6.
+    covariance = 0.005**2 * np.array([[1.0, correlation], [correlation, 1.0]])
+    both = Estimate.from_covariance([place, 0.0], covariance, "reflections")
+    found = of(lambda parts: 1e6 * (parts**2).sum(axis=1), both)
+    # Stable to half a unit of the second digit, and rounded to a whole number.
+    tolerance = 2 * float(numerical_tolerance(deviation, 2)) + 0.5
+    assert found.mean == pytest.approx(mean, abs=tolerance)
+    assert found.standard_uncertainty == pytest.approx(deviation, abs=tolerance)
+    first = propagate(lambda part: 1e6 * part**2, both).sum()
+    assert (first.standard_uncertainty == 0) == (place == 0) and not found.validates(first)
+
+
 def test_the_gauge_block_has_the_published_interval():
     # 9.5, Table 11: lengths in nm, with Student's, arcsine and inexactly limited distributions.
     inputs = (
