@@ -24,10 +24,13 @@ from chipglow.text import Notes
 from chipglow.uncertainty import Budget, Input, Inputs, budget
 from chipglow.uncertainty.surrogate import Surrogate
 
-SCENE, SURFACE, CAMERA = GROUPS = ("scene", "surface", "camera")
+SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 """Groups of inputs, unless the study names others."""
 
 _SURROGATE: Final = "scene settings between the cut ones"
+_SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-out scenes"}
+"""Sources of the inputs that the study does not state, by distribution."""
+
 _NOMINAL_DRAWS: Final = 32
 """Draws of the random inputs over which the error of a cut scene is a mean."""
 
@@ -103,7 +106,7 @@ class StudyBudget:
                         "degrees_of_freedom": one.degrees_of_freedom,
                         "contribution_K": contribution,
                         "variance_percent": 100 * contribution**2 / total if total else 0.0,
-                        "source": stated.source if stated else "drawn at random",
+                        "source": stated.source if stated else _SOURCES[one.distribution],
                     }
                 )
         return pd.DataFrame(rows)
@@ -181,9 +184,10 @@ def study_budget(
             replace(one, group=SCENE) if one.group == "cutting" else one for one in stated.inputs
         ]
         inputs += [Input(name, group=_group(name)) for name in readings.random]
-        surrogates: dict[str, Surrogate] = {}
+        surrogates, notes = dict[str, Surrogate](), fitted.notes
         if any(is_cut):
-            surrogates = _surrogates(study, stated, scenes, readings.names, at, tell)
+            surrogates, lost = _surrogates(study, stated, scenes, readings.names, at, tell)
+            notes = notes + lost
             inputs.append(Input(_SURROGATE, 0.0, 1.0, "normal", group=SCENE))
         model = _model(study, fitted.scene, readings, inputs, list(surrogates.values()))
         found = budget(
@@ -194,7 +198,7 @@ def study_budget(
             samples,
             progress=tell,
         )
-    return StudyBudget(readings.names, found, study, fitted.notes, surrogates)
+    return StudyBudget(readings.names, found, study, notes, surrogates)
 
 
 def _readings(study: Study, scene: Scene, at: Sequence[str], tell: Progress) -> SingleReadings:
@@ -235,8 +239,13 @@ def _model(
 
     def error(row: Array) -> Array:
         values = dict(zip(names, row.tolist(), strict=True))
-        changes = {name: values[name] for name in optical}
-        surfaces, camera = _seen(changed(study, changes), scene) if changes else nominal
+        surfaces, camera = nominal
+        if optical:
+            try:
+                drawn = changed(study, {name: values[name] for name in optical})
+            except ValueError as reason:
+                raise ValueError(f"uncertainty.inputs: a draw is impossible: {reason}") from None
+            surfaces, camera = _seen(drawn, scene)
         read = readings.read(camera, surfaces, values)
         return np.asarray(read[:, MEASURED] - read[:, REFERENCE])
 
@@ -261,7 +270,7 @@ def _surrogates(
     names: Sequence[str],
     at: Sequence[str],
     tell: Progress,
-) -> dict[str, Surrogate]:
+) -> tuple[dict[str, Surrogate], Notes]:
     """Cut scenes at a Latin hypercube of the inputs; return the surrogate of each reading."""
     generator = np.random.default_rng(study.seed)
     values = stated.at(qmc.LatinHypercube(len(stated), seed=generator).random(scenes))
@@ -276,7 +285,10 @@ def _surrogates(
         tell("scenes", number / scenes)
         one = changed(study, {stated.names[i]: float(value[i]) for i in rows})
         scene = fit(one, open_scene(cut(one))).scene
-        readings = _readings(one, scene, at, _silent)
+        try:
+            readings = _readings(one, scene, at, _silent)
+        except ValueError:  # the scene shows no shear band or no contact
+            continue
         surfaces, camera = _seen(one, scene)
         errors = []
         for draw in draws:
@@ -291,4 +303,6 @@ def _surrogates(
     for name, column in zip(names, means.T, strict=True):
         known = np.isfinite(column)
         found[name] = Surrogate.fit(points[known], column[known])
-    return found
+    lost = int(np.isnan(means).all(axis=1).sum())
+    text = f"{lost} of {scenes} scenes show no shear band or no contact; they are left out."
+    return found, Notes(warnings=[text] if lost else [])
