@@ -87,7 +87,7 @@ class FittedDamage(Part):
         if not size or [len(row) for row in self.relative_covariance] != [size] * size:
             raise ValueError(f"relative_covariance: expected {size} rows of {size} numbers")
         covariance = np.array(self.relative_covariance, dtype=np.float64)
-        lowest = np.linalg.eigvalsh(covariance).min() if size else 0.0
+        lowest = np.linalg.eigvalsh(covariance).min()
         if not np.allclose(covariance, covariance.T) or lowest < -1e-9 * covariance.max():
             raise ValueError("relative_covariance: must be symmetric without negative variances")
 

@@ -62,12 +62,8 @@ class FlowStress(Part):
     def stress(strain: Any, rate: Any, temperature: Any, law: Any) -> Any:
         """Return the flow stress in Pa; compiled by Numba.
 
-        Parameters
-        ----------
-        strain, rate, temperature : float
-            Plastic strain (positive), its rate in 1/s (positive), temperature in K.
-        law : named tuple
-            The law's numbers, by the names of its fields.
+        Takes the plastic strain and its rate in 1/s, both positive, the temperature in K, and a
+        named tuple of the law's numbers, by the names of its fields.
         """
         raise NotImplementedError
 

@@ -114,9 +114,7 @@ class Tool(ABC):
     def signed_distance(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Return the distance of places in m to the tool's surface, negative inside the tool."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
-        distance = surface_distances(
-            np.ascontiguousarray(x).ravel(), np.ascontiguousarray(y).ravel(), self.surface
-        )
+        distance = surface_distances(x.ravel(), y.ravel(), self.surface)
         return np.asarray(distance, dtype=np.float64).reshape(x.shape)
 
     def outline(self, length: float) -> NDArray[np.float64]:

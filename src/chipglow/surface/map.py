@@ -100,15 +100,13 @@ class MapSurface(Surface):
     def prepare(
         self, scene: Scene, band: Band | None = None, reflected: float | None = None
     ) -> EmissivityField:
-        image, shape = self.at(scene.raster), scene.raster.shape
-        slopes = np.zeros(shape, np.float32)
+        image = self.at(scene.raster)
+        slopes = np.zeros_like(image)
         if self.slopes is not None:
             known = np.where(np.isfinite(self.values), self.slopes, np.nan)
             slopes = self._resampled(known, scene.raster, 0.0)
 
         def emissivity(frame: Frame) -> NDArray[np.float32]:
-            if frame.material.shape != shape:
-                raise ValueError(f"frame: has shape {frame.material.shape}, expected {shape}")
             values = image + slopes * (frame.temperature - np.float32(self.middle))
             values = np.clip(values, np.float32(0.0), np.float32(1.0))
             return np.where(frame.material == Material.VOID, np.float32(0.0), values)

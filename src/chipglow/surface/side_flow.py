@@ -47,8 +47,7 @@ class SideElements:
     exchange: Exchange
     """The elements: those of the tool's side, of the rake face, then of the chip's side."""
     tool_side: int
-    rake_face: int
-    """Number of elements of the first two."""
+    """Number of elements of the tool's side; the rake face has 16."""
 
     @property
     def depths(self) -> NDArray[np.float64]:
@@ -64,12 +63,12 @@ class SideElements:
     @property
     def chip(self) -> slice:
         """The elements of the chip."""
-        return slice(self.tool_side + self.rake_face, None)
+        return slice(self.tool_side + _RAKE_ELEMENTS, None)
 
     @property
     def face(self) -> slice:
         """The elements of the rake face."""
-        return slice(self.tool_side, self.tool_side + self.rake_face)
+        return slice(self.tool_side, self.tool_side + _RAKE_ELEMENTS)
 
 
 class _Sections(NamedTuple):
@@ -185,7 +184,7 @@ class SideShape(Modifier):
         )
         there = np.hypot(*(ends - starts).T) > 0.0  # an arc of 90° has no length
         exchange = Exchange(starts[there], ends[there])
-        return SideElements(exchange, len(tool) - 1, _RAKE_ELEMENTS)
+        return SideElements(exchange, len(tool) - 1)
 
     def change(
         self, surface: Surface, scene: Scene, band: Band | None, reflected: float | None
