@@ -75,7 +75,7 @@ def test_slopes_of_the_bulge_are_those_of_its_arc():
     flat = Wedge(angle=radians(30.0))
     assert degrees(slope[0]) == pytest.approx(60.0, abs=3.0)
     np.testing.assert_allclose(
-        np.sin(slope), (flat.width - elements.depths[chip]) / flat.bulge_radius, atol=2e-3
+        np.sin(slope), np.cos(flat.angle) - elements.depths[chip] / flat.bulge_radius, atol=2e-3
     )
 
 
