@@ -266,8 +266,8 @@ def reference_temperature(
     if kind == "mean":
         return _temperature(camera, integrate(exposure.mean_radiance, *squares))
     if kind == "centre":
-        points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
-        return _temperature(camera, nearest(exposure.centre_radiance, exposure.raster, points))
+        centre = nearest(exposure.centre_radiance, exposure.raster, pixels.centres)
+        return _temperature(camera, centre)
     if kind == "true":
         return largest(exposure.peak_temperature, *squares)
     raise ValueError(f"reference: unknown {kind!r}, expected one of {get_args(ReferenceKind)}")

@@ -108,7 +108,7 @@ class SingleReadings:
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
         self.names = tuple(kept)
         self._raster = scene.raster
-        self.reference, self._duration = plan.reference, camera.integration_time
+        self._reference, self._duration = plan.reference, camera.integration_time
         keys = {key[:2] for key in kept.values()}
         owners = [key[:2] for key in every.values()]
         self._kept = np.array([name in kept for name in every])
@@ -151,10 +151,10 @@ class SingleReadings:
         first, last = window.limits
         middle = window.start + (self._duration - camera.integration_time) / 2
         start = max(min(middle, last - camera.integration_time), first)
-        images = ExposureImages(camera.expose(window.scene, surface, start), self.reference)
+        images = ExposureImages(camera.expose(window.scene, surface, start), self._reference)
         pixels, radiance = camera.pixels(window.scene.raster), images.radiance(camera)
         if window.beyond is not None and window.pixels is not None:
-            light = sample(window.beyond, window.pixels, _centres(pixels))
+            light = sample(window.beyond, window.pixels, pixels.centres)
             radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
         read, _ = camera.read(radiance[None], np.array([start]))
         reference = images.reference(camera)
@@ -202,7 +202,7 @@ class SingleReadings:
                     moved.pixels(one.scene.raster),
                     ExposureImages(alone).radiance(moved),
                 )
-                light = nearest(whole[view.surface], camera.pixels(scene.raster), _centres(pixels))
+                light = nearest(whole[view.surface], camera.pixels(scene.raster), pixels.centres)
                 one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
             windows.append(one)
         return windows
@@ -255,7 +255,3 @@ def _on_grid(camera: Camera, scene: Raster, window: _Window) -> Camera:
         return camera
     right, down = np.mod(np.subtract(camera.offset, shift), camera.pitch).tolist()
     return replace(camera, offset=(right, down))
-
-
-def _centres(raster: Raster) -> Array:
-    return np.stack(np.meshgrid(raster.x, raster.y), axis=-1)

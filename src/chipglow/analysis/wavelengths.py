@@ -186,11 +186,10 @@ def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: flo
         (late,) = expose(scene, views[1:], start + camera.delay, of_second)
     formed, delayed = _image(first, one), _image(second, late)
     pixels = first.pixels(scene.raster)
-    points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
     temperature = camera.thermometer.temperature
     chain = [
         *(
-            sample(on_samples, scene.raster, points)
+            sample(on_samples, scene.raster, pixels.centres)
             for on_samples in (
                 true_temperature(scene, start + duration / 2),
                 temperature(*(exposure.centre_radiance for exposure in alike)),

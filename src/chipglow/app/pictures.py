@@ -320,7 +320,7 @@ class SceneModel:
             _, surface = self._on(state, quick=False)
             return self._camera(state, scene).prepare(surface, scene).emissivity(scene.frame(index))
         if name == "radiance_temperature":
-            places = np.stack(np.meshgrid(scene.raster.x, scene.raster.y), axis=-1)
+            places = scene.raster.centres
             radiance = nearest(exposure.centre_radiance, exposure.raster, places)
             return np.asarray(self._camera(state, scene).band.temperature(radiance))
         return scene.field(name, index)

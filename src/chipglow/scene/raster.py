@@ -51,6 +51,11 @@ class Raster:
         return self.top - self.spacing * (np.arange(self.rows, dtype=np.float64) + 0.5)
 
     @property
+    def centres(self) -> NDArray[np.float64]:
+        """Centres of all samples, x and y in m, shape (y, x, 2)."""
+        return np.stack(np.meshgrid(self.x, self.y), axis=-1)
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""
         return self.rows, self.columns

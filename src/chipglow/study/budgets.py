@@ -17,7 +17,7 @@ from chipglow.io import open_scene
 from chipglow.quantities import Array, changed, setting_at
 from chipglow.scene import Scene
 from chipglow.study.fitting import fit, surfaces_on
-from chipglow.study.running import Progress, cut, fitted_study
+from chipglow.study.running import Progress, cut, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes
@@ -170,7 +170,7 @@ def study_budget(
     The effect of the cut's settings is a surrogate: of the mean errors on scenes at a Latin
     hypercube of their distributions. Its cross-validated error is an input.
     """
-    tell = progress or (lambda step, part: None)
+    tell = progress or silent
     stated = study.uncertainty.build(study)
     is_cut = [one.name.startswith("cutting.") for one in stated.inputs]
     if any(is_cut) and study.scene is not None:
@@ -212,10 +212,6 @@ def _seen(study: Study, scene: Scene) -> tuple[Mapping[str, Surface], Camera]:
 
 def _one_thread() -> None:
     set_num_threads(1)
-
-
-def _silent(step: str, part: float) -> None:
-    pass
 
 
 def _group(name: str) -> str:
@@ -286,7 +282,7 @@ def _surrogates(
         one = changed(study, {stated.names[i]: float(value[i]) for i in rows})
         scene = fit(one, open_scene(cut(one))).scene
         try:
-            readings = _readings(one, scene, at, _silent)
+            readings = _readings(one, scene, at, silent)
         except ValueError:  # the scene shows no shear band or no contact
             continue
         surfaces, camera = _seen(one, scene)

@@ -78,17 +78,17 @@ def cut(
     path = scene_path(scene_inputs(study))
     if not _is_whole(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _compute(study, path, progress or _silent, resume, on_preview)
+        _compute(study, path, progress or silent, resume, on_preview)
     elif on_preview:
-        tell = partial(progress or _silent, PREVIEW_STEP)
+        tell = partial(progress or silent, PREVIEW_STEP)
         scene = open_scene(path)
         show_scene(scene, preview_of(study, on_preview), tell)
         scene.data.close()
     return path
 
 
-def _silent(step: str, fraction: float) -> None:
-    pass
+def silent(step: str, fraction: float) -> None:
+    """Report no progress."""
 
 
 def is_cut(study: Study) -> bool:

@@ -1,20 +1,15 @@
 """The section of the uncertainty: input quantities of a budget by the paths of their settings."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, sqrt
+from math import inf
 from statistics import pstdev
 from typing import Annotated, Any, Final
 
 from chipglow.quantities import Parameter, Part, setting_at
 from chipglow.uncertainty import Input, Inputs
-from chipglow.uncertainty.component import Distribution
+from chipglow.uncertainty.component import HALF_WIDTHS, Distribution
 
 _SECTIONS: Final = ("camera", "surface", "cutting")
-_WIDTHS: Final[Mapping[str, float]] = {
-    "rectangular": sqrt(3.0), "triangular": sqrt(6.0), "arcsine": sqrt(2.0),
-}  # fmt: skip
-"""Half-widths of distributions of unit variance."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +113,7 @@ def _input(path: str, one: InputSection, value: float, parameter: Parameter) -> 
     width = _size(stated, value, parameter)
     return Input(
         **given,
-        standard_uncertainty=width if one.half_width is None else width / _WIDTHS[distribution],
+        standard_uncertainty=width if one.half_width is None else width / HALF_WIDTHS[distribution],
         distribution=distribution,
         degrees_of_freedom=one.degrees_of_freedom or inf,
     )

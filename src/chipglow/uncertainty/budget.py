@@ -6,7 +6,6 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 import xarray as xr
-from scipy.stats import qmc, sobol_indices
 
 from chipglow.quantities import Array
 from chipglow.uncertainty.component import Cause, Component
@@ -124,6 +123,8 @@ def _first_order(
     model: Model, inputs: Inputs, generator: np.random.Generator
 ) -> tuple[Array, Array, Array]:
     """Return the outputs, the slopes by continuous inputs, and the scatter by the others."""
+    from scipy.stats import qmc  # slow to import, and most users of this room need none of it
+
     count = len(inputs)
     numbers = qmc.Sobol(2 * count, seed=generator).random(_DRAWS)
     drawn, again = inputs.at(numbers[:, :count]), inputs.at(numbers[:, count:])
@@ -181,6 +182,8 @@ def _indices(
     model: Model, inputs: Inputs, samples: int, generator: np.random.Generator
 ) -> xr.Dataset:
     """Return Sobol's indices of the groups of inputs, with bootstrap intervals."""
+    from scipy.stats import qmc
+
     size, groups = len(inputs), inputs.groups
     numbers = qmc.Sobol(2 * size, seed=generator).random(samples)
     one, two = numbers[:, :size], numbers[:, size:]
@@ -206,6 +209,8 @@ def _indices(
 
 def _sobol(results: Array) -> Array:
     """Return first and total indices of results for A, B and each mixture, (2, output, group)."""
+    from scipy.stats import sobol_indices
+
     functions: Any = {"f_A": results[0], "f_B": results[1], "f_AB": results[2:]}
     with np.errstate(divide="ignore", invalid="ignore"):
         found = sobol_indices(func=functions, n=results.shape[-1])

@@ -1,7 +1,8 @@
 """Components of uncertainty: the independent errors of a cause, and their effects."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, sqrt
 from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -12,6 +13,11 @@ from chipglow.quantities import Array
 
 Distribution: TypeAlias = Literal["normal", "rectangular", "triangular", "arcsine"]
 """Distribution of an error; a normal one with degrees of freedom is Student's."""
+
+HALF_WIDTHS: Final[Mapping[str, float]] = {
+    "rectangular": sqrt(3.0), "triangular": sqrt(6.0), "arcsine": sqrt(2.0),
+}  # fmt: skip
+"""Half-widths of the bounded distributions of unit variance."""
 
 _MOST: Final = 200_000_000
 """Numbers that the effects of one component may take: 1.6 GB."""

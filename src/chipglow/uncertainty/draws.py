@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite, sqrt
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import Cause
+from chipglow.uncertainty.component import HALF_WIDTHS, Cause
 from chipglow.uncertainty.estimate import Estimate, check_same
 
 _NO_VARIANCE: Final = 2.0
@@ -73,12 +73,13 @@ def _used(effects: Any) -> NDArray[np.intp]:
 def _errors(cause: Cause, count: int, generator: np.random.Generator) -> Array:
     """Draw errors in standard uncertainties, shape (count, errors)."""
     shape = (count, cause.errors)
+    width = HALF_WIDTHS.get(cause.distribution, 0.0)
     if cause.distribution == "rectangular":
-        return generator.uniform(-sqrt(3.0), sqrt(3.0), shape)
+        return generator.uniform(-width, width, shape)
     if cause.distribution == "triangular":
-        return generator.triangular(-sqrt(6.0), 0.0, sqrt(6.0), shape)
+        return generator.triangular(-width, 0.0, width, shape)
     if cause.distribution == "arcsine":
-        return np.asarray(sqrt(2.0) * np.cos(np.pi * generator.uniform(size=shape)))
+        return np.asarray(width * np.cos(np.pi * generator.uniform(size=shape)))
     found = generator.standard_normal(shape)
     freedom = cause.degrees_of_freedom
     if isfinite(freedom):

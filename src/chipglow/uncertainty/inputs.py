@@ -8,15 +8,13 @@ from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from scipy.special import ndtr, ndtri, stdtrit
-from scipy.stats import triang
 
 from chipglow.quantities import Array
-from chipglow.uncertainty.component import Distribution
+from chipglow.uncertainty.component import HALF_WIDTHS, Distribution
 
 InputDistribution: TypeAlias = Distribution | Literal["discrete", "random"]
 """Distribution of an input; ``random`` is uniform from 0 to 1: an effect without a set value."""
 
-_TRIANGLE: Final = triang(0.5, -sqrt(6.0), 2 * sqrt(6.0))
 _EDGE: Final = 1e-12
 """Least distance from 0 and 1 of the number from which a value is computed."""
 
@@ -65,12 +63,14 @@ class Input:
         if self.distribution == "discrete":
             numbers = (inside * len(self.values)).astype(int)
             return np.asarray(np.array(self.values)[numbers], np.float64)
+        width = HALF_WIDTHS.get(self.distribution, 0.0)
         if self.distribution == "rectangular":
-            errors = sqrt(3.0) * (2 * inside - 1)
+            errors = width * (2 * inside - 1)
         elif self.distribution == "triangular":
-            errors = _TRIANGLE.ppf(inside)
+            reach = 1 - np.sqrt(2 * np.minimum(inside, 1 - inside))
+            errors = width * np.copysign(reach, inside - 0.5)
         elif self.distribution == "arcsine":
-            errors = sqrt(2.0) * np.sin(np.pi * (inside - 0.5))
+            errors = width * np.sin(np.pi * (inside - 0.5))
         elif isfinite(self.degrees_of_freedom):
             errors = stdtrit(self.degrees_of_freedom, inside)
         else:

@@ -270,7 +270,7 @@ class _Squares:
     def __init__(self, raster: Raster, tool: Tool, size: float, whole: NDArray[np.bool_]) -> None:
         rows, columns = whole.shape
         self.whole = whole
-        middles = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
+        middles = raster.centres.reshape(-1, 2)
         along, across = tool.face_coordinates(middles)
         column = np.floor(along / size + _ROUNDING).astype(np.int64)
         row = np.floor(across / size + _ROUNDING).astype(np.int64)

@@ -218,7 +218,7 @@ def _level(
         known=known[part],
         bin_image=_binned(smooth)[part],
         edge_image=np.moveaxis(_edges(smooth, step, faint), 0, -1)[part],
-        places=frame.unit(np.stack(np.meshgrid(raster.x, raster.y), axis=-1)[part][known[part]]),
+        places=frame.unit(raster.centres[part][known[part]]),
         blocks=blocks[part][known[part]],
         codes=_binned(picture),
         lines=np.concatenate([lines, *np.gradient(lines, axis=(2, 1))]).transpose(1, 2, 0).copy(),

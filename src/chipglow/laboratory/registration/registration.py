@@ -95,7 +95,7 @@ class Registration:
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
         """Return median and largest standard uncertainty in m, of x and y together."""
-        places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1)
+        places = raster.centres
         variance = np.trace(self.position_covariance(places), axis1=-2, axis2=-1)
         found = np.sqrt(np.maximum(variance, 0.0))
         return float(np.median(found)), float(found.max())

@@ -242,7 +242,7 @@ def align_recordings(
 
     down, across = np.indices(visible.signal.shape[1:])
     seen = inside(registration.positions(np.stack([across, down], axis=-1)))
-    hot = inside(np.stack(np.meshgrid(infrared.raster.x, infrared.raster.y), axis=-1))
+    hot = inside(infrared.raster.centres)
     if not (hot.any() and seen.any()):
         raise ValueError("region: must lie within both images")
     signals = infrared.radiance[:, hot].mean(axis=1), visible.signal[:, seen].mean(axis=1)
