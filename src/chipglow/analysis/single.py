@@ -18,7 +18,7 @@ from chipglow.analysis.images import Array, ExposureImages
 from chipglow.analysis.looks import Schedule
 from chipglow.analysis.places import Place
 from chipglow.analysis.plan import Plan
-from chipglow.camera import Camera
+from chipglow.camera import Camera, Flag
 from chipglow.scene import Frame, Raster, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import FeatureTrends, ModifiedSurface, Surface
@@ -32,8 +32,8 @@ EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
 )
 """Random inputs of a single reading, numbers from 0 to 1."""
 
-REFERENCE, MEASURED, TRUE = range(3)
-"""Temperatures of a reading."""
+REFERENCE, MEASURED, TRUE, BELOW, SATURATED = range(5)
+"""Numbers of a reading: temperatures, and fractions of its place that cannot be read."""
 
 _BLUR_WIDTHS: Final = 3.0
 """Margin of a window around its place, in full widths at half maximum of the blur."""
@@ -129,25 +129,32 @@ class SingleReadings:
     def read(
         self, camera: Camera, surfaces: Mapping[str, Surface], draw: Mapping[str, float]
     ) -> Array:
-        """Return `REFERENCE`, `MEASURED` and `TRUE` in K of each reading, shape (reading, 3).
+        """Return temperatures in K and fractions of each reading, shape (reading, 5).
 
-        `draw` gives a number from 0 to 1 for each of `random`.
+        `draw` gives a number from 0 to 1 for each of `random`. The fractions are of the place's
+        outline, or of the window if it has none: below the lower range limit, and saturated.
         """
         texture, noise = (int(draw.get(name, 0.0) * _TEXTURES) for name in (TEXTURE, NOISE))
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
         right, down = (moved + camera.offset).tolist()
         seen = replace(camera, shape=None, offset=(right, down)).redrawn(noise)
-        values = np.full((self._size, 3), np.nan)
+        values = np.full((self._size, 5), np.nan)
         number = int(draw.get(EXPOSURE, 0.0) * len(self._exposures))
         for window in self._exposures[number]:
             surface = surfaces[window.surface].redrawn(texture)
-            stack, pixels = self._look(window, _on_grid(seen, self._raster, window), surface)
+            moved = _on_grid(seen, self._raster, window)
+            stack, flags, pixels = self._look(window, moved, surface)
             lines = window.place.sampled(stack, pixels)
-            values[window.rows] = window.place.read(stack, pixels, lines)
+            values[window.rows, :BELOW] = window.place.read(stack, pixels, lines)
+            below = stack[MEASURED] < (camera.lower_limit or 0.0)
+            values[window.rows, BELOW] = _fraction(window.place, below, pixels)
+            values[window.rows, SATURATED] = _fraction(window.place, flags, pixels)
         return np.asarray(values[self._kept])
 
-    def _look(self, window: _Window, camera: Camera, surface: Surface) -> tuple[Array, Raster]:
-        """Return the images `REFERENCE`, `MEASURED` and `TRUE` of a window."""
+    def _look(
+        self, window: _Window, camera: Camera, surface: Surface
+    ) -> tuple[Array, NDArray[np.bool_], Raster]:
+        """Return `REFERENCE`, `MEASURED` and `TRUE` of a window, and where it is saturated."""
         first, last = window.limits
         middle = window.start + (self._duration - camera.integration_time) / 2
         start = max(min(middle, last - camera.integration_time), first)
@@ -156,10 +163,13 @@ class SingleReadings:
         if window.beyond is not None and window.pixels is not None:
             light = sample(window.beyond, window.pixels, pixels.centres)
             radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
-        read, _ = camera.read(radiance[None], np.array([start]))
+        read, flags = camera.read(radiance[None], np.array([start]))
         reference = images.reference(camera)
         measured = np.where(np.isnan(reference), np.nan, camera.band.temperature(read[0]))
-        return np.stack([reference, measured, images.reference(camera, "true")]), pixels
+        stack = np.stack([reference, measured, images.reference(camera, "true")])
+        if flags is None:
+            return stack, np.zeros(pixels.shape, np.bool_), pixels
+        return stack, flags[0] & Flag.SATURATED != 0, pixels
 
     def _windows(
         self,
@@ -206,6 +216,10 @@ class SingleReadings:
                 one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
             windows.append(one)
         return windows
+
+
+def _fraction(place: Place, where: NDArray[np.bool_], pixels: Raster) -> float:
+    return float(where.mean()) if place.outline() is None else place.covered(where, pixels)
 
 
 def _is_local(surface: Surface) -> bool:

@@ -22,7 +22,7 @@ from chipglow.cli.register import register
 from chipglow.cli.screen import current
 from chipglow.cli.sources import convert, import_source
 from chipglow.cli.studies import cut, error, measure, reproduce, run, wavelengths
-from chipglow.cli.sweep import sweep
+from chipglow.cli.sweep import design, sweep
 
 app = typer.Typer(
     cls=Boundary,
@@ -45,6 +45,7 @@ EXAMPLES = {
     "wavelengths": "study.yaml --plot bands.png",
     "sweep": "study.yaml --vary camera.integration_time=2us,5us,10us --out sweep",
     "budget": "study.yaml --at 'rake face' --out budget.csv --plot budget.png",
+    "design": "study.yaml --vary camera.integration_time=2us,5us,10us --at 'rake face'",
     "show": "measured.nc --plot measured.png",
     "app": "scene.nc",
     "materials": "aisi-1045",
@@ -158,6 +159,7 @@ app.command()(measure)
 app.command()(wavelengths)
 app.command()(sweep)
 app.command()(budget)
+app.command()(design)
 
 
 @app.command()

@@ -1,7 +1,7 @@
-"""The command that runs a study at many settings."""
+"""The commands that run a study at many settings and choose among them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, cast
+from typing import TYPE_CHECKING, Annotated, Final, TypeAlias, cast
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
@@ -14,17 +14,27 @@ if TYPE_CHECKING:
 _MAX_ROWS: Final = 40
 _MAX_FAILURES: Final = 5
 
+_Vary: TypeAlias = Annotated[
+    list[str],
+    opt.value(
+        "PATH=VALUES",
+        "Setting to vary with its values, e.g. camera.integration_time=2us,5us,10us, or first, "
+        "last and number: camera.psf.fwhm=6um:20um:8. Repeatable.",
+    ),
+]
+_MethodName: TypeAlias = Annotated[
+    str,
+    opt.value(
+        "METHOD",
+        "grid: all combinations; latin-hypercube or sobol: samples between first and last.",
+    ),
+]
+_Samples: TypeAlias = Annotated[int, opt.value("NUMBER", "Number of samples, if not a grid.")]
+
 
 def sweep(
     study: opt.StudyFile,
-    vary: Annotated[
-        list[str],
-        opt.value(
-            "PATH=VALUES",
-            "Setting to vary with its values, e.g. camera.integration_time=2us,5us,10us, or first, "
-            "last and number: camera.psf.fwhm=6um:20um:8. Repeatable.",
-        ),
-    ],
+    vary: _Vary,
     out: Annotated[
         Path, opt.value("DIR", "Folder of the results; an interrupted sweep is continued.")
     ],
@@ -32,14 +42,8 @@ def sweep(
         list[str] | None,
         opt.value("READING", "Reading to keep, e.g. rake or band. Repeatable. Default: all."),
     ] = None,
-    method: Annotated[
-        str,
-        opt.value(
-            "METHOD",
-            "grid: all combinations; latin-hypercube or sobol: samples between first and last.",
-        ),
-    ] = "grid",
-    samples: Annotated[int, opt.value("NUMBER", "Number of samples, if not a grid.")] = 64,
+    method: _MethodName = "grid",
+    samples: _Samples = 64,
     workers: Annotated[
         int | None,
         opt.value("NUMBER", "Processes on this machine. Default: one per core. 0: this process."),
@@ -59,7 +63,7 @@ def sweep(
     from chipglow.text import Notes
 
     loaded, client = load_study(study), connected(scheduler) if scheduler else None
-    axes = dict(_axis(text) for text in vary)
+    axes = dict(map(_axis, vary))
     with progress_bars() as progress:
         result = compute(
             loaded,
@@ -86,6 +90,74 @@ def sweep(
         (out / "sweep.csv", lambda path: write_frame(frame, path)),
         (out / "sweep.nc", lambda path: write_dataset(data, path)),
         (out / "sweep.png" if len(frame) else None, figure(draw_sweep, data, quantities)),
+    )
+
+
+def design(
+    study: opt.StudyFile,
+    vary: _Vary,
+    at: Annotated[
+        list[str] | None,
+        opt.value("PLACE", "Place or reading that counts, e.g. 'rake face'. Repeatable."),
+    ] = None,
+    method: _MethodName = "grid",
+    samples: _Samples = 64,
+    draws: Annotated[int, opt.value("NUMBER", "Draws of the inputs for the last settings.")] = 1024,
+    below: Annotated[
+        float, opt.value("FRACTION", "Most of a place below the lower range limit.")
+    ] = 0.05,
+    saturated: Annotated[float, opt.value("FRACTION", "Most of a place saturated.")] = 0.05,
+    out: Annotated[Path | None, opt.file("Settings to write, .csv.", ".csv")] = None,
+    plot: Annotated[Path | None, opt.picture("Draw bias and uncertainty")] = None,
+) -> None:
+    """Find the settings of camera and surface with the least bias and uncertainty."""
+    from chipglow.cli.progress import progress_bars
+    from chipglow.laboratory.result_file import write_frame
+    from chipglow.quantities import setting_at
+    from chipglow.report.design_figure import draw_design
+    from chipglow.study import Method, design as search, load_study
+    from chipglow.text import Notes
+
+    loaded, axes, screen = load_study(study), dict(map(_axis, vary)), current()
+    with progress_bars() as progress:
+        result = search(
+            loaded,
+            axes,
+            tuple(at or ()),
+            cast(Method, method),
+            samples,
+            draws,
+            below,
+            saturated,
+            progress,
+        )
+    quantities = {path: setting_at(loaded, path).parameter.quantity for path in axes}
+    frame = result.to_frame()
+    columns = {
+        "|bias| / K": "bias_K",
+        "U (k = 2) / K": "expanded_uncertainty_K",
+        "regret / K": "regret_K",
+        "draws": "draws",
+        "Pareto": "pareto",
+        "own": "own",
+    }
+    best = _with_units(frame[frame.regret_K.notna()].head(_MAX_ROWS), quantities)
+    screen.table("settings", best, {path: path for path in axes} | columns)
+    count, total = len(result.settings), int(result.draws.sum())
+    screen.say(
+        f"{count} settings, {len(result.reasons)} excluded; {total} draws, "
+        f"{100 * total / (count * draws):.0f} % of {draws} for each setting.",
+        {"best": dict(result.settings[result.best]) if result.best is not None else None},
+    )
+    excluded = [reason for number, reason in result.reasons.items() if number]
+    own = [f"The study's own settings: {result.reasons[0]}"] if 0 in result.reasons else []
+    notes = result.notes + Notes(
+        warnings=[*own, *(f"Excluded: {one}" for one in dict.fromkeys(excluded))][:_MAX_FAILURES]
+    )
+    finish(
+        notes,
+        (out, lambda path: write_frame(frame, path)),
+        (plot, figure(draw_design, result, quantities)),
     )
 
 

@@ -8,6 +8,7 @@ from chipglow.study.cache import (
     clear_cache as clear_cache,
 )
 from chipglow.study.cost import expected_cost as expected_cost
+from chipglow.study.design import Design as Design, design as design
 from chipglow.study.files import load_study as load_study, study_text as study_text
 from chipglow.study.fitting import Fitted as Fitted, fit as fit
 from chipglow.study.preview import preview_raster as preview_raster

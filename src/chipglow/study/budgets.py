@@ -179,7 +179,7 @@ def study_budget(
             "expected a study that cuts (without scene)"
         )
     with fitted_study(study, progress, False) as fitted:
-        readings = _readings(study, fitted.scene, at, tell)
+        readings = readings_of(study, fitted.scene, at, tell)
         inputs = [
             replace(one, group=SCENE) if one.group == "cutting" else one for one in stated.inputs
         ]
@@ -189,7 +189,8 @@ def study_budget(
             surrogates, lost = _surrogates(study, stated, scenes, readings.names, at, tell)
             notes = notes + lost
             inputs.append(Input(_SURROGATE, 0.0, 1.0, "normal", group=SCENE))
-        model = _model(study, fitted.scene, readings, inputs, list(surrogates.values()))
+        read = reader(study, fitted.scene, readings, [one.name for one in inputs])
+        model = _model(read, inputs, list(surrogates.values()))
         found = budget(
             model,
             Inputs(inputs, stated.correlations),
@@ -201,7 +202,13 @@ def study_budget(
     return StudyBudget(readings.names, found, study, notes, surrogates)
 
 
-def _readings(study: Study, scene: Scene, at: Sequence[str], tell: Progress) -> SingleReadings:
+def errors_of(numbers: Array) -> Array:
+    """Return the errors in K of the numbers of readings, shape (..., number)."""
+    return np.asarray(numbers[..., MEASURED] - numbers[..., REFERENCE])
+
+
+def readings_of(study: Study, scene: Scene, at: Sequence[str], tell: Progress) -> SingleReadings:
+    """Return the readings of single exposures of a scene by a study's camera."""
     return SingleReadings(scene, *_seen(study, scene), study.plan, at, tell)
 
 
@@ -218,22 +225,14 @@ def _group(name: str) -> str:
     return {EXPOSURE: SCENE, TEXTURE: SURFACE}.get(name, CAMERA)
 
 
-def _model(
-    study: Study,
-    scene: Scene,
-    readings: SingleReadings,
-    inputs: Sequence[Input],
-    surrogates: Sequence[Surrogate],
+def reader(
+    study: Study, scene: Scene, readings: SingleReadings, names: Sequence[str]
 ) -> Callable[[Array], Array]:
-    """Return the function from values of the inputs to the errors of the readings in K."""
-    names = [one.name for one in inputs]
+    """Return the function from values of inputs, (trial, input), to (trial, reading, number)."""
     optical = [name for name in names if name.startswith(("camera.", "surface."))]
-    cutting = [number for number, name in enumerate(names) if name.startswith("cutting.")]
-    best = np.array([inputs[i].value for i in cutting])
-    widths = np.array([inputs[i].standard_uncertainty for i in cutting])
     nominal = _seen(study, scene)
 
-    def error(row: Array) -> Array:
+    def read(row: Array) -> Array:
         values = dict(zip(names, row.tolist(), strict=True))
         surfaces, camera = nominal
         if optical:
@@ -242,12 +241,26 @@ def _model(
             except ValueError as reason:
                 raise ValueError(f"uncertainty.inputs: a draw is impossible: {reason}") from None
             surfaces, camera = _seen(drawn, scene)
-        read = readings.read(camera, surfaces, values)
-        return np.asarray(read[:, MEASURED] - read[:, REFERENCE])
+        return readings.read(camera, surfaces, values)
+
+    def read_all(rows: Array) -> Array:
+        with ThreadPoolExecutor(get_num_threads(), initializer=_one_thread) as pool:
+            return np.stack(list(pool.map(read, rows)))
+
+    return read_all
+
+
+def _model(
+    read: Callable[[Array], Array], inputs: Sequence[Input], surrogates: Sequence[Surrogate]
+) -> Callable[[Array], Array]:
+    """Return the function from values of the inputs to the errors of the readings in K."""
+    names = [one.name for one in inputs]
+    cutting = [number for number, name in enumerate(names) if name.startswith("cutting.")]
+    best = np.array([inputs[i].value for i in cutting])
+    widths = np.array([inputs[i].standard_uncertainty for i in cutting])
 
     def errors(rows: Array) -> Array:
-        with ThreadPoolExecutor(get_num_threads(), initializer=_one_thread) as pool:
-            result = np.stack(list(pool.map(error, rows)))
+        result = errors_of(read(rows))
         if surrogates:
             points = (rows[:, cutting] - best) / widths
             middle = np.zeros((1, len(cutting)))
@@ -282,14 +295,14 @@ def _surrogates(
         one = changed(study, {stated.names[i]: float(value[i]) for i in rows})
         scene = fit(one, open_scene(cut(one))).scene
         try:
-            readings = _readings(one, scene, at, silent)
+            readings = readings_of(one, scene, at, silent)
         except ValueError:  # the scene shows no shear band or no contact
             continue
         surfaces, camera = _seen(one, scene)
         errors = []
         for draw in draws:
             read = readings.read(camera, surfaces, dict(zip(RANDOM, draw, strict=True)))
-            errors.append(read[:, MEASURED] - read[:, REFERENCE])
+            errors.append(errors_of(read))
         mean = dict(zip(readings.names, np.mean(errors, axis=0), strict=True))
         means[number] = [mean.get(name, np.nan) for name in names]
         scene.data.close()

@@ -181,11 +181,11 @@ def sweep(
     """
     tell, folder = progress or (lambda step, done: None), Path(out)
     axes = {path: axis(values) for path, values in vary.items()}
-    points = list(_points(axes, method, samples, seed))
+    points = list(points_of(axes, method, samples, seed))
     # Neither is kept of a point, and each takes longer than the rest.
     study = changed(study, {"analysis.psf_widths": ("8 um",), "attribution": None})
-    studies = _studies(study, points)
-    settings = [{path: _in_si(study, path, one[path]) for path in one} for one in points]
+    studies = studies_at(study, points)
+    settings = [{path: in_si(study, path, one[path]) for path in one} for one in points]
     keys = [_key(one, at) for one in studies]
     _write_description(Sweep(folder, axes, tuple(settings), tuple(keys), method == "grid"))
     tasks = {
@@ -281,7 +281,7 @@ def _cut(study: Study) -> None:
         return
 
 
-def _points(
+def points_of(
     axes: Mapping[str, Sequence[Any]], method: Method, samples: int, seed: int
 ) -> Iterator[dict[str, Any]]:
     """Yield the settings of each point as a study takes them."""
@@ -300,7 +300,7 @@ def _points(
         yield {path: between(values[0], values[-1], part) for (path, values), part in parts}
 
 
-def _studies(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | str]:
+def studies_at(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | str]:
     """Return the study of each point, or why it is impossible."""
     studies: list[Study | str] = []
     for point in points:
@@ -314,7 +314,7 @@ def _studies(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study | 
     return studies
 
 
-def _in_si(study: Study, path: str, value: Any) -> Any:
+def in_si(study: Study, path: str, value: Any) -> Any:
     """Return the value of a setting in SI; as it was given without a unit or if it is a range."""
     try:
         quantity = setting_at(study, path).parameter.quantity

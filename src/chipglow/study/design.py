@@ -1,0 +1,275 @@
+"""The choice of settings: those with the least bias and uncertainty of single readings."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from chipglow.analysis.single import BELOW, RANDOM, SATURATED
+from chipglow.quantities import Array, setting_at
+from chipglow.scene import Scene
+from chipglow.study.budgets import errors_of, reader, readings_of
+from chipglow.study.running import Progress, fitted_study, silent
+from chipglow.study.schema import Study
+from chipglow.study.sweeps import Method, axis, in_si, points_of, studies_at
+from chipglow.text import Notes
+from chipglow.uncertainty import Input, Inputs
+
+_KEPT: Final = 4
+"""A round keeps one setting of this many, and draws this many times as often."""
+
+_FEWEST_DRAWS: Final = 16
+_FEWEST_KEPT: Final = 4
+
+_COVERAGE: Final = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Settings of a study with bias and uncertainty of its readings.
+
+    Parameters
+    ----------
+    settings : tuple of mapping
+        The settings in SI by path; the first are the study's own.
+    readings : tuple of str
+        Names of the readings.
+    bias, expanded_uncertainty : ndarray
+        Mean error and twice the standard deviation of the errors in K, shape (setting, reading);
+        NaN for an impossible setting.
+    below, saturated : ndarray
+        Mean fractions of a reading's place below the lower range limit and saturated, likewise.
+    draws : ndarray
+        Readings of each setting.
+    reasons : mapping
+        Why a setting, by its number, is impossible or beyond a limit.
+    notes : Notes
+        Assumptions and warnings.
+    """
+
+    settings: tuple[Mapping[str, Any], ...]
+    readings: tuple[str, ...]
+    bias: Array
+    expanded_uncertainty: Array
+    below: Array
+    saturated: Array
+    draws: NDArray[np.int64]
+    reasons: Mapping[int, str]
+    notes: Notes
+
+    @property
+    def objectives(self) -> Array:
+        """Largest absolute bias and largest expanded uncertainty in K, shape (setting, 2)."""
+        return np.stack(
+            [np.abs(self.bias).max(axis=1), self.expanded_uncertainty.max(axis=1)], axis=1
+        )
+
+    @property
+    def regret(self) -> Array:
+        """Bias and uncertainty together, less those of the best setting, in K.
+
+        The sum bounds the error of a reading that is not corrected (JCGM 100:2008, F.2.4.5). NaN
+        for a setting that was excluded before the last two rounds, except the study's own.
+        """
+        total = self.objectives.sum(axis=1)
+        least = np.nan if self.best is None else total[self.best]
+        compared = self._compared
+        compared[0] = True
+        return np.where(compared, total - least, np.nan)
+
+    @property
+    def best(self) -> int | None:
+        """Number of the best setting; None if none is within the limits."""
+        last = self._compared & (self.draws == self.draws.max())
+        total = np.where(last, self.objectives.sum(axis=1), np.inf)
+        return int(total.argmin()) if last.any() else None
+
+    @property
+    def is_pareto(self) -> NDArray[np.bool_]:
+        """Whether no other setting of the last two rounds has less bias and less uncertainty."""
+        return np.asarray(_ranks(self.objectives, self._compared) == 0)
+
+    @property
+    def _compared(self) -> NDArray[np.bool_]:
+        """Whether a setting is within the limits and was drawn in one of the last two rounds."""
+        allowed = np.array([number not in self.reasons for number in range(len(self.settings))])
+        return np.asarray(allowed & (_KEPT * self.draws >= self.draws.max()))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row for each setting, the best first; the largest values of the readings."""
+        bias, uncertainty = self.objectives.T
+        frame = pd.DataFrame(list(self.settings)).assign(
+            bias_K=bias,
+            expanded_uncertainty_K=uncertainty,
+            regret_K=self.regret,
+            below_range=self.below.max(axis=1),
+            saturated=self.saturated.max(axis=1),
+            draws=self.draws,
+            pareto=self.is_pareto,
+            own=np.arange(len(self.settings)) == 0,
+            excluded=[self.reasons.get(number, "") for number in range(len(self.settings))],
+        )
+        return frame.sort_values(["excluded", "regret_K"], kind="stable")
+
+
+def design(
+    study: Study,
+    vary: Mapping[str, str | Sequence[Any]],
+    at: Sequence[str] = (),
+    method: Method = "grid",
+    samples: int = 64,
+    draws: int = 1024,
+    below: float = 0.05,
+    saturated: float = 0.05,
+    progress: Progress | None = None,
+) -> Design:
+    """Find the settings with the least bias and uncertainty of single readings.
+
+    Parameters
+    ----------
+    study : Study
+        The study; its section `uncertainty` has the input quantities.
+    vary : mapping
+        Values by the path of a setting of camera or surface, as in `sweep`.
+    at : sequence of str
+        Places or readings; all by default. The largest bias and uncertainty of them count.
+    method, samples
+        As in `sweep`.
+    draws : int
+        Draws of the inputs for the last settings.
+    below, saturated : float
+        Largest fractions of a place below the lower range limit, and saturated.
+    progress : callable, optional
+        Called with the current step and its completed fraction, 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        If a path is not of camera or surface, or all settings are impossible.
+
+    Notes
+    -----
+    Successive halving (Karnin et al., 2013) by quarters: all settings have the same few draws, the
+    first of a Sobol sequence; the best quarter (4 or more, and the study's own) has four times as
+    many, and so on. The Pareto front passes first, then the sum of bias and uncertainty decides. Uncertain settings of the cut are
+    left out: the scene is the study's.
+    """
+    tell = progress or silent
+    for path in vary:
+        if path.partition(".")[0] not in ("camera", "surface"):
+            raise ValueError(f"vary: {path!r}, expected a path in camera, surface")
+    axes = {path: axis(values) for path, values in vary.items()}
+    own = {path: setting_at(study, path).value for path in axes}
+    every = [own, *points_of(axes, method, samples, study.seed)]
+    settings = [{path: in_si(study, path, one[path]) for path in one} for one in every]
+    unique = [n for n, one in enumerate(settings) if one not in settings[:n]]
+    studies = [study, *studies_at(study, every[1:])]
+    with fitted_study(study, progress, False) as fitted:
+        search = _Search([studies[n] for n in unique], fitted.scene, tuple(at), study.seed)
+        counts = [draws]
+        while counts[0] >= _FEWEST_DRAWS * _KEPT:
+            counts.insert(0, counts[0] // _KEPT)
+        for number, count in enumerate(counts):
+            kept = search.kept(max(len(unique) // _KEPT**number, _FEWEST_KEPT), below, saturated)
+            for done, one in enumerate(kept):
+                tell(f"round {number + 1} of {len(counts)}", done / len(kept))
+                search.extend(one, count)
+            tell(f"round {number + 1} of {len(counts)}", 1.0)
+        notes = fitted.notes
+    if any(path.startswith("cutting.") for path in study.uncertainty.inputs):
+        notes = notes + Notes(["The scene is exact: uncertain settings of the cut are left out."])
+    return search.result([settings[n] for n in unique], below, saturated, notes)
+
+
+class _Search:
+    """Numbers of the readings at each setting, as far as they are drawn."""
+
+    def __init__(
+        self, studies: Sequence[Study | str], scene: Scene, at: tuple[str, ...], seed: int
+    ) -> None:
+        self.studies, self.scene, self.at, self.seed = studies, scene, at, seed
+        self.reasons = {n: one for n, one in enumerate(studies) if isinstance(one, str)}
+        self.names: tuple[str, ...] = ()
+        self.numbers: dict[int, Array] = {}
+
+    def extend(self, number: int, draws: int) -> None:
+        """Read at a setting until it has this many draws."""
+        study = self.studies[number]
+        if isinstance(study, str):
+            return
+        try:
+            readings = readings_of(study, self.scene, self.at, silent)
+            inputs = _inputs(study)
+            read = reader(study, self.scene, readings, inputs.names)
+        except ValueError as error:
+            if not number:  # the study itself
+                raise
+            self.reasons[number] = str(error)
+            return
+        self.names = readings.names
+        earlier = self.numbers.get(number, np.zeros((0, len(self.names), SATURATED + 1)))
+        sequence = qmc.Sobol(len(inputs), seed=np.random.default_rng(self.seed))
+        rows = inputs.at(sequence.random(draws)[len(earlier) :])
+        self.numbers[number] = np.concatenate([earlier, read(rows)])
+
+    def kept(self, count: int, below: float, saturated: float) -> list[int]:
+        """Return the numbers of the best settings, and the study's own; at first all."""
+        if not self.numbers:
+            return list(range(len(self.studies)))
+        found = self.result([{}] * len(self.studies), below, saturated, Notes())
+        allowed = np.array([n not in found.reasons for n in range(len(self.studies))])
+        ranks = _ranks(found.objectives, allowed)
+        order = np.lexsort([found.objectives.sum(axis=1), ranks, ~allowed])
+        return sorted({0, *(n for n in order[:count].tolist() if allowed[n])})
+
+    def result(
+        self, settings: Sequence[Mapping[str, Any]], below: float, saturated: float, notes: Notes
+    ) -> Design:
+        """Return bias, uncertainty and excluded settings as they are known."""
+        shape = len(settings), len(self.names)
+        bias, spread, lost, full = (np.full(shape, np.nan) for _ in range(4))
+        draws, reasons = np.zeros(len(settings), np.int64), dict(self.reasons)
+        for n, numbers in self.numbers.items():
+            errors = errors_of(numbers)
+            draws[n], bias[n] = len(errors), errors.mean(axis=0)
+            spread[n] = _COVERAGE * errors.std(axis=0, ddof=1)
+            lost[n], full[n] = numbers[..., [BELOW, SATURATED]].mean(axis=0).T
+            if lost[n].max() > below:
+                reasons[n] = f"{lost[n].max():.0%} of a place is below the range"
+            elif full[n].max() > saturated:
+                reasons[n] = f"{full[n].max():.0%} of a place is saturated"
+            elif not np.isfinite(bias[n]).all():
+                reasons[n] = "a place is not in every image"
+        names = self.names
+        return Design(tuple(settings), names, bias, spread, lost, full, draws, reasons, notes)
+
+
+def _inputs(study: Study) -> Inputs:
+    """Return the uncertain settings of camera and surface, and the random inputs."""
+    stated = study.uncertainty.build(study)
+    optical = [one for one in stated.inputs if not one.name.startswith("cutting.")]
+    names = {one.name for one in optical}
+    pairs = {pair: value for pair, value in stated.correlations.items() if names.issuperset(pair)}
+    return Inputs([*optical, *map(Input, RANDOM)], pairs)
+
+
+def _ranks(objectives: Array, allowed: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the number of the Pareto front of each setting, from 0; -1 if it is not allowed."""
+    ranks, rest, front = np.full(len(objectives), -1), set(np.flatnonzero(allowed).tolist()), 0
+    while rest:
+        first = {
+            one
+            for one in rest
+            if not any(
+                (objectives[other] <= objectives[one]).all()
+                and (objectives[other] < objectives[one]).any()
+                for other in rest
+            )
+        }
+        ranks[list(first)] = front
+        rest, front = rest - first, front + 1
+    return ranks
