@@ -155,8 +155,8 @@ def design(
     -----
     Successive halving (Karnin et al., 2013) by quarters: all settings have the same few draws, the
     first of a Sobol sequence; the best quarter (4 or more, and the study's own) has four times as
-    many, and so on. The Pareto front passes first, then the sum of bias and uncertainty decides. Uncertain settings of the cut are
-    left out: the scene is the study's.
+    many, and so on. The Pareto front passes first, then the sum of bias and uncertainty decides.
+    Uncertain settings of the cut are left out: the scene is the study's.
     """
     tell = progress or silent
     for path in vary:
