@@ -106,7 +106,7 @@ class SingleReadings:
             known = "; ".join(dict.fromkeys([*(p.name for *_, p in places), *every]))
             raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {known}")
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
-        self.names = tuple(kept)
+        self.names, self.places = tuple(kept), tuple(key[2] for key in kept.values())
         self._raster = scene.raster
         self._reference, self._duration = plan.reference, camera.integration_time
         keys = {key[:2] for key in kept.values()}

@@ -8,7 +8,10 @@ from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from chipglow.laboratory import emissivity as lab
+    from chipglow.text import Notes
 
 
 def emissivity(
@@ -151,6 +154,14 @@ def temperature(
     reflected_uncertainty: opt.ReflectedUncertainty = None,
     camera_uncertainty: opt.CameraUncertainty = None,
     drift: opt.Drift = None,
+    study: Annotated[
+        Path | None,
+        opt.value(
+            "STUDY",
+            "Study of this measurement, with places of the regions' names: its errors by blur, "
+            "pixels and motion correct the temperatures, with their uncertainty.",
+        ),
+    ] = None,
     table: Annotated[Path | None, opt.file("Write the table of regions, CSV.")] = None,
     settings: opt.Settings = None,
 ) -> None:
@@ -181,7 +192,46 @@ def temperature(
             for text in origin.warnings(one.band, str(one.data.attrs.get("metal", "")))
         ]
         notes += Notes(warnings=list(dict.fromkeys(doubts)))
-    finish(notes, (table, partial(write_frame, result.to_frame())))
+    frame = result.to_frame()
+    if study is not None:
+        notes += _correct(result, frame, study)
+    finish(notes, (table, partial(write_frame, frame)))
+
+
+def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Path) -> "Notes":
+    """Print the corrected temperatures and their budgets, and add them to the frame."""
+    import pandas as pd
+
+    from chipglow.cli.progress import progress_bars
+    from chipglow.study import corrected_temperatures, load_study
+
+    screen = current()
+    with progress_bars() as progress:
+        estimates, found = corrected_temperatures(result, load_study(study), progress)
+    rows = list(estimates.values())
+    frame["corrected_temperature_K"] = [float(one.values) for one in rows]
+    frame["corrected_uncertainty_K"] = [float(one.standard_uncertainty) for one in rows]
+    frame["corrected_expanded_uncertainty_K"] = [float(one.expanded_uncertainty()) for one in rows]
+    shown = frame.assign(
+        corrected_temperature_degC=frame.corrected_temperature_K - 273.15,
+        correction_K=frame.corrected_temperature_K - frame.true_temperature_K,
+    )
+    columns = {
+        "region": "region",
+        "correction / K": "correction_K",
+        "corrected ± u / °C": "corrected_temperature_degC ± corrected_uncertainty_K",
+        "U 95 % / K": "corrected_expanded_uncertainty_K",
+    }
+    screen.heading("\nCorrected for blur, pixels and motion")
+    screen.table("corrected", shown, columns)
+    parts = pd.DataFrame(
+        {"region": name, "input": part, "contribution_K": float(estimate.contribution(part))}
+        for name, estimate in estimates.items()
+        for part in estimate.names
+    )
+    screen.heading()
+    screen.table("budget", parts.sort_values(["region", "contribution_K"], ascending=[True, False]))
+    return found.notes.about(str(study))
 
 
 def _emissivities(

@@ -1,6 +1,10 @@
 """Studies: settings of cut, camera and analysis, as a YAML file or in Python."""
 
-from chipglow.study.budgets import StudyBudget as StudyBudget, study_budget as study_budget
+from chipglow.study.budgets import (
+    StudyBudget as StudyBudget,
+    corrected_temperatures as corrected_temperatures,
+    study_budget as study_budget,
+)
 from chipglow.study.cache import (
     CachedScene as CachedScene,
     cache_folder as cache_folder,

@@ -11,9 +11,18 @@ import xarray as xr
 from numba import get_num_threads, set_num_threads
 from scipy.stats import qmc
 
-from chipglow.analysis.single import EXPOSURE, MEASURED, RANDOM, REFERENCE, TEXTURE, SingleReadings
+from chipglow.analysis.single import (
+    EXPOSURE,
+    MEASURED,
+    NOISE,
+    RANDOM,
+    REFERENCE,
+    TEXTURE,
+    SingleReadings,
+)
 from chipglow.camera import Camera
 from chipglow.io import open_scene
+from chipglow.laboratory.emissivity import RegionTemperatures
 from chipglow.quantities import Array, changed, setting_at
 from chipglow.scene import Scene
 from chipglow.study.fitting import fit, surfaces_on
@@ -21,7 +30,7 @@ from chipglow.study.running import Progress, cut, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes
-from chipglow.uncertainty import Budget, Input, Inputs, budget
+from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget
 from chipglow.uncertainty.surrogate import Surrogate
 
 SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
@@ -30,6 +39,9 @@ SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 _SURROGATE: Final = "scene settings between the cut ones"
 _SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-out scenes"}
 """Sources of the inputs that the study does not state, by distribution."""
+
+_TRIALS: Final = 1000
+"""Trials that check the budget by which a measurement is corrected."""
 
 _NOMINAL_DRAWS: Final = 32
 """Draws of the random inputs over which the error of a cut scene is a mean."""
@@ -43,6 +55,8 @@ class StudyBudget:
     ----------
     readings : tuple of str
         Names of the readings, the outputs of the budget: their errors in K.
+    places : tuple of str
+        Name of the place of each reading.
     budget : Budget
         The budget of these errors.
     study : Study
@@ -54,6 +68,7 @@ class StudyBudget:
     """
 
     readings: tuple[str, ...]
+    places: tuple[str, ...]
     budget: Budget
     study: Study
     notes: Notes
@@ -199,7 +214,50 @@ def study_budget(
             samples,
             progress=tell,
         )
-    return StudyBudget(readings.names, found, study, notes, surrogates)
+    return StudyBudget(readings.names, readings.places, found, study, notes, surrogates)
+
+
+def corrected_temperatures(
+    measured: RegionTemperatures, study: Study, progress: Progress | None = None
+) -> tuple[dict[str, Estimate], StudyBudget]:
+    """Correct measured temperatures by the errors of a study of the same measurement.
+
+    Parameters
+    ----------
+    measured : RegionTemperatures
+        True temperatures by `true_temperatures`; the camera's resolution is not in them.
+    study : Study
+        The study; a region is corrected by the first reading of the place of its name.
+    progress : callable, optional
+        Called with the current step and its completed fraction, 0 to 1.
+
+    Returns
+    -------
+    estimates : dict
+        Corrected temperature in K by region, with the components of both budgets. The study's noise
+        is left out: the measurement states its own.
+    found : StudyBudget
+        The budget of the errors.
+
+    Raises
+    ------
+    ValueError
+        If a region has not the name of a place, or the study's error includes the emissivity.
+    """
+    if study.plan.reference == "true":
+        raise ValueError(
+            "analysis.reference: true, whose error includes the emissivity; expected maximum, mean "
+            "or centre, as the measured temperature is corrected for the emissivity"
+        )
+    rows = {row.name: row for row in measured.rows}
+    found = study_budget(study, tuple(rows), _TRIALS, 2, progress=progress)
+    estimates = {}
+    for name, row in rows.items():
+        names = zip(found.readings, found.places, strict=True)
+        number = next(n for n, known in enumerate(names) if name in known)
+        error = found.budget.estimate[number]
+        estimates[name] = row.estimate - row.gain * error.without(NOISE)
+    return estimates, found
 
 
 def errors_of(numbers: Array) -> Array:

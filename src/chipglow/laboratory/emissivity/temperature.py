@@ -80,6 +80,8 @@ class TrueTemperature:
     emissivity: float
     estimate: Estimate
     """True temperature in K, with the lines `TEMPERATURE_BUDGET`."""
+    gain: float
+    """Change of the true temperature with the radiance temperature, in K/K."""
     correlation: float | None
     """Correlation of the calibration's errors at the radiances of area and emissivity, if known."""
     model: Callable[..., Array]
@@ -180,6 +182,7 @@ def true_temperature(
         mean_of_pixels=mean_of_pixels,
         emissivity=float(value.values),
         estimate=replace(estimate, warnings=tuple(warnings)),
+        gain=derivatives[1] * float(band.slope(band.temperature(np.array(mean)))),
         correlation=correlation,
         model=partial(
             _modelled, emissivity.slope if len(emissivity.heatings) > 1 else 0.0, at, band
