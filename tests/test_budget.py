@@ -4,24 +4,28 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from analytic_chip import AnalyticChip
 from command import chipglow, refused
 from figure6 import figure_6
 from scipy import stats
+from scipy.special import ndtr
 
 from chipglow.analysis import Plan, SingleReadings, analyse
 from chipglow.analysis.single import ACROSS, DOWN, MEASURED, REFERENCE, TRUE
 from chipglow.camera import Camera, GaussianPSF
-from chipglow.io import write_scene
+from chipglow.io import write_measurement, write_scene
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, study_budget
-from chipglow.surface import CHIP_1, CHIP_2
+from chipglow.surface import CHIP_1, CHIP_2, UniformSurface
 from chipglow.uncertainty import Input, Inputs, budget
 from chipglow.uncertainty.surrogate import Surrogate
 
 GENERATOR = 1995
+
+HOT, COLD, EMISSIVITY, FWHM = 1000.0, 600.0, 0.6, 12e-6
 
 
 def computed(model, inputs, correlations=None, **options):
@@ -335,3 +339,92 @@ uncertainty:
     assert "heated chips" in table.read_text(encoding="utf-8")
     assert picture.stat().st_size > 10_000
     refused([*map(str, arguments), "--at", "edge"], "edge: no such place or reading")
+
+
+def strip_radiance_temperature(band, x, fwhm):
+    """Return the radiance temperature of pixels of 6 um, centred at x, on the strip."""
+    within = x[:, None] + (np.arange(200) - 99.5) / 200 * 6e-6
+    sigma = fwhm / np.sqrt(8 * np.log(2))
+    share = (ndtr((within + 10e-6) / sigma) - ndtr((within - 10e-6) / sigma)).mean(axis=1)
+    hot, cold = band.radiance(np.array([HOT, COLD]))
+    return band.temperature(EMISSIVITY * (cold + (hot - cold) * share))
+
+
+@pytest.fixture(scope="module")
+def strip(tmp_path_factory):
+    """A strip of 1000 K, 20 um wide, on 600 K, with its image and a study of it."""
+    folder = tmp_path_factory.mktemp("strip")
+    raster = Raster(left=-60e-6, top=60e-6, spacing=1e-6, rows=120, columns=120)
+    temperature = np.where(abs(raster.x) < 10e-6, HOT, COLD) * np.ones((1, 120, 1))
+    scene = Scene.from_fields(raster, [0.0], {"temperature": temperature})
+    write_scene(scene, folder / "strip.nc")
+    camera = Camera(psf=GaussianPSF(FWHM), lower_limit=None, offset=(2e-6, 1e-6))
+    image = camera.measure(scene, UniformSurface(EMISSIVITY), 0.0)
+    write_measurement(image, folder / "image.nc")
+    corners = "[[-4 um, -14 um], [2 um, -14 um], [2 um, 10 um], [-4 um, 10 um]]"
+    regions = f"regions: {{strip: {{polygon: {corners}}}}}"
+    (folder / "regions.yaml").write_text(regions, encoding="utf-8")
+    (folder / "study.yaml").write_text(
+        """
+scene: strip.nc
+surface: {kind: uniform, emissivity: 0.6}
+camera:
+  psf: {kind: gaussian, fwhm: 12 um}
+  psf_order: optics
+  lower_limit: none
+  detector:
+    response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5}
+    full_well: 1e8
+    bits: 16
+    terms: [{kind: shot-noise}]
+analysis:
+  reference: mean
+  regions:
+    strip: {polygon: [[-3 um, -12 um], [3 um, -12 um], [3 um, 12 um], [-3 um, 12 um]]}
+uncertainty: {inputs: {camera.psf.fwhm: {standard: 5 %}}}
+""",
+        encoding="utf-8",
+    )
+    return folder
+
+
+def test_a_measured_temperature_is_corrected_with_the_whole_budget(strip):
+    arguments = [strip / "image.nc", "--regions", strip / "regions.yaml", "--emissivity", 0.6]
+    arguments += ["--emissivity-uncertainty", 0.012, "--study", strip / "study.yaml"]
+    printed = chipglow("--json", "temperature", *arguments, "--table", strip / "table.csv")
+    tables, band = json.loads(printed.stdout)["tables"], Band(3.8e-6, 5.1e-6)
+    parts = {part["input"]: part["contribution_K"] for part in tables["budget"]}
+    (row,) = pd.read_csv(strip / "table.csv").itertuples()
+    # The pixels of the image are at -1 um; the study does not know where, and takes every place.
+    x = np.linspace(-3e-6, 3e-6, 61)
+    measured = strip_radiance_temperature(band, x, FWHM)
+    ideal = band.temperature(EMISSIVITY * band.radiance(HOT))
+    true = band.temperature(band.radiance(measured[20]) / EMISSIVITY)
+    gain = band.slope(measured[20]) / (EMISSIVITY * band.slope(true))
+    wider, narrower = (strip_radiance_temperature(band, x, FWHM * f) for f in (1.05, 0.95))
+    assert row.true_temperature_K == pytest.approx(true, abs=0.1)
+    # Over the 64 draws of the position the mean differs by less than 3.2 K / sqrt(64).
+    corrected = true + gain * (ideal - measured.mean())
+    assert row.corrected_temperature_K == pytest.approx(corrected, abs=0.4)
+    assert HOT - true > row.expanded_uncertainty_K
+    assert abs(HOT - row.corrected_temperature_K) < row.corrected_expanded_uncertainty_K
+    blur = gain * (narrower - wider).mean() / 2
+    assert parts["camera.psf.fwhm"] == pytest.approx(blur, rel=0.02)
+    # From 64 pairs of draws: 1 / sqrt(64) of the variance at worst.
+    assert parts["pixel position across"] == pytest.approx(gain * measured.std(), rel=0.07)
+    assert parts["noise"] == 0.0  # the measurement's, not that of the study's detector
+    total = np.sqrt(sum(part**2 for part in parts.values()))
+    assert row.corrected_uncertainty_K == pytest.approx(total)
+    assert "the error is not normal" in printed.stdout
+
+
+def test_a_study_of_other_places_or_with_the_emissivity_is_refused(strip):
+    arguments = ["temperature", strip / "image.nc", "--regions", strip / "regions.yaml"]
+    arguments += ["--emissivity", 0.6, "--study", strip / "other.yaml"]
+    text = (strip / "study.yaml").read_text(encoding="utf-8")
+    for old, new, message in (
+        ("strip: {polygon", "edge: {polygon", "strip: no such place or reading"),
+        ("reference: mean", "reference: true", "analysis.reference: true, whose error includes"),
+    ):
+        (strip / "other.yaml").write_text(text.replace(old, new), encoding="utf-8")
+        refused(list(map(str, arguments)), message)

@@ -228,7 +228,7 @@ def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Pat
         {"region": name, "input": part, "contribution_K": float(estimate.contribution(part))}
         for name, estimate in estimates.items()
         for part in estimate.names
-    )
+    ).dropna()
     screen.heading()
     screen.table("budget", parts.sort_values(["region", "contribution_K"], ascending=[True, False]))
     return found.notes.about(str(study))

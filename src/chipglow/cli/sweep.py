@@ -149,11 +149,8 @@ def design(
         f"{100 * total / (count * draws):.0f} % of {draws} for each setting.",
         {"best": dict(result.settings[result.best]) if result.best is not None else None},
     )
-    excluded = [reason for number, reason in result.reasons.items() if number]
-    own = [f"The study's own settings: {result.reasons[0]}"] if 0 in result.reasons else []
-    notes = result.notes + Notes(
-        warnings=[*own, *(f"Excluded: {one}" for one in dict.fromkeys(excluded))][:_MAX_FAILURES]
-    )
+    reasons = list(dict.fromkeys(result.reasons.values()))
+    notes = result.notes + Notes(warnings=[f"excluded: {one}" for one in reasons[:_MAX_FAILURES]])
     finish(
         notes,
         (out, lambda path: write_frame(frame, path)),

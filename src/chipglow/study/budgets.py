@@ -251,13 +251,18 @@ def corrected_temperatures(
         )
     rows = {row.name: row for row in measured.rows}
     found = study_budget(study, tuple(rows), _TRIALS, 2, progress=progress)
-    estimates = {}
+    errors, trials = found.budget.estimate, found.budget.monte_carlo
+    validated, doubts, estimates = trials.validates(errors), [], {}
     for name, row in rows.items():
         names = zip(found.readings, found.places, strict=True)
         number = next(n for n, known in enumerate(names) if name in known)
-        error = found.budget.estimate[number]
-        estimates[name] = row.estimate - row.gain * error.without(NOISE)
-    return estimates, found
+        estimates[name] = row.estimate - row.gain * errors[number].without(NOISE)
+        if not validated[number]:
+            doubts.append(
+                f"{name}: the error is not normal; by Monte Carlo it is "
+                f"{trials.low[number]:.3g} to {trials.high[number]:.3g} K (95 %)."
+            )
+    return estimates, replace(found, notes=found.notes + Notes(warnings=doubts))
 
 
 def errors_of(numbers: Array) -> Array:
