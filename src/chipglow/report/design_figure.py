@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing, scales
@@ -29,9 +30,9 @@ def draw_design(result: Design, quantities: Mapping[str, Quantity | None]) -> Fi
         figure = drawing.new_figure(4.2)
         panel = figure.subplots()
         for label, (chosen, style) in marks.items():
-            panel.plot(
-                bias[chosen], uncertainty[chosen], label=label, **{"linestyle": "none", **style}
-            )
+            x, y = bias[chosen], uncertainty[chosen]
+            if np.isfinite(x).any():
+                panel.plot(x, y, label=label, **{"linestyle": "none", **style})
         panel.set_xlabel("magnitude of the bias / K")
         panel.set_ylabel("expanded uncertainty (k = 2) / K")
         figure.legend(loc="outside lower center", ncols=2)
