@@ -222,6 +222,8 @@ def corrected_temperatures(
 ) -> tuple[dict[str, Estimate], StudyBudget]:
     """Correct measured temperatures by the errors of a study of the same measurement.
 
+    The error is that against the mean radiance of a place (``reference: mean``).
+
     Parameters
     ----------
     measured : RegionTemperatures
@@ -234,7 +236,7 @@ def corrected_temperatures(
     Returns
     -------
     estimates : dict
-        Corrected temperature in K by region, with the components of both budgets. The study's noise
+        Mean temperature of each region in K, with the components of both budgets. The study's noise
         is left out: the measurement states its own.
     found : StudyBudget
         The budget of the errors.
@@ -242,13 +244,9 @@ def corrected_temperatures(
     Raises
     ------
     ValueError
-        If a region has not the name of a place, or the study's error includes the emissivity.
+        If a region has not the name of a place.
     """
-    if study.plan.reference == "true":
-        raise ValueError(
-            "analysis.reference: true, whose error includes the emissivity; expected maximum, mean "
-            "or centre, as the measured temperature is corrected for the emissivity"
-        )
+    study = changed(study, {"analysis.reference": "mean"})
     rows = {row.name: row for row in measured.rows}
     found = study_budget(study, tuple(rows), _TRIALS, 2, progress=progress)
     errors, trials = found.budget.estimate, found.budget.monte_carlo
