@@ -33,7 +33,7 @@ EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
 """Random inputs of a single reading, numbers from 0 to 1."""
 
 REFERENCE, MEASURED, TRUE, BELOW, SATURATED = range(5)
-"""Numbers of a reading: temperatures, and fractions of its place that cannot be read."""
+"""Values of a reading: temperatures, and fractions of its place that cannot be read."""
 
 _BLUR_WIDTHS: Final = 3.0
 """Margin of a window around its place, in full widths at half maximum of the blur."""

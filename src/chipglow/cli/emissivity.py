@@ -158,8 +158,8 @@ def temperature(
         Path | None,
         opt.value(
             "STUDY",
-            "Study of this measurement, with places of the regions' names: its errors by blur, "
-            "pixels and motion correct the temperatures, with their uncertainty.",
+            "Study of this measurement, with places of the regions' names, seen on its first chip: "
+            "its errors by blur, pixels and motion correct the temperatures.",
         ),
     ] = None,
     table: Annotated[Path | None, opt.file("Write the table of regions, CSV.")] = None,

@@ -110,7 +110,7 @@ def design(
     out: Annotated[Path | None, opt.file("Settings to write, .csv.", ".csv")] = None,
     plot: Annotated[Path | None, opt.picture("Draw bias and uncertainty")] = None,
 ) -> None:
-    """Find the settings of camera and surface with the least bias and uncertainty."""
+    """Find the settings of camera and surface with the smallest bias and uncertainty."""
     from chipglow.cli.progress import progress_bars
     from chipglow.laboratory.result_file import write_frame
     from chipglow.quantities import setting_at

@@ -1,4 +1,4 @@
-"""The choice of settings: those with the least bias and uncertainty of single readings."""
+"""The choice of settings: those with the smallest bias and uncertainty of single readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -83,7 +83,7 @@ class Design:
 
     @property
     def best(self) -> int | None:
-        """Number of the best setting; None if none is within the limits."""
+        """Index of the best setting; None if none is within the limits."""
         last = self._compared & (self.draws == self.draws.max())
         total = np.where(last, self.objectives.sum(axis=1), np.inf)
         return int(total.argmin()) if last.any() else None
@@ -127,7 +127,7 @@ def design(
     saturated: float = 0.05,
     progress: Progress | None = None,
 ) -> Design:
-    """Find the settings with the least bias and uncertainty of single readings.
+    """Find the settings with the smallest bias and uncertainty of single readings.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def design(
 
 
 class _Search:
-    """Numbers of the readings at each setting, as far as they are drawn."""
+    """Values of the readings at each setting, as far as they are drawn."""
 
     def __init__(
         self, studies: Sequence[Study | str], scene: Scene, at: tuple[str, ...], seed: int

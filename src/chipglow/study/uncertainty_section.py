@@ -38,7 +38,7 @@ class InputSection(Part):
         str | None,
         Parameter("Group whose part of the variance is stated. Default: the setting's section."),
     ] = None
-    source: Annotated[str, Parameter("Where the uncertainty comes from.")] = ""
+    source: Annotated[str, Parameter("Source of the uncertainty.")] = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()

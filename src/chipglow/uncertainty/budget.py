@@ -20,7 +20,7 @@ _DRAWS: Final = 64
 """Draws of the random inputs over which a sensitivity is a mean."""
 
 _LEAST: Final = 100
-"""Least number of trials."""
+"""Smallest number of trials."""
 
 _RESAMPLES: Final = 200
 """Resamples of the intervals of Sobol's indices."""

@@ -16,7 +16,7 @@ InputDistribution: TypeAlias = Distribution | Literal["discrete", "random"]
 """Distribution of an input; ``random`` is uniform from 0 to 1: an effect without a set value."""
 
 _EDGE: Final = 1e-12
-"""Least distance from 0 and 1 of the number from which a value is computed."""
+"""Smallest distance from 0 and 1 of the number from which a value is computed."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Input:
         normal (Student's with finite `degrees_of_freedom`), rectangular, triangular, arcsine;
         discrete, one of `values` with equal probabilities; or random, uniform from 0 to 1.
     degrees_of_freedom : float
-        Of the standard uncertainty.
+        Degrees of freedom of the standard uncertainty.
     values : tuple of float
         Values of a discrete input.
     group : str
@@ -139,7 +139,7 @@ class Inputs:
 
     @property
     def groups(self) -> dict[str, list[int]]:
-        """Numbers of the inputs by group."""
+        """Indices of the inputs by group."""
         found: dict[str, list[int]] = {}
         for number, one in enumerate(self.inputs):
             found.setdefault(one.group or one.name, []).append(number)

@@ -14,7 +14,7 @@ from chipglow.uncertainty.draws import draw
 from chipglow.uncertainty.estimate import Estimate, as_estimate
 
 _BLOCK: Final = 10_000
-"""Least number of trials between two checks of stability (JCGM 101:2008, 7.9.4)."""
+"""Smallest number of trials between two checks of stability (JCGM 101:2008, 7.9.4)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ class Surrogate:
     form : str
         constant, plane, squares (with the square of each input) or quadratic.
     coefficients : ndarray
-        Of its terms.
+        Coefficients of its terms.
     error : float
         Root mean square of the errors at the points, each left out of the fit that predicts it.
     """
@@ -40,7 +40,7 @@ class Surrogate:
 
     @classmethod
     def fit(cls, points: Array, values: Array) -> "Surrogate":
-        """Return the form with the least error, fitted to points (point, input) and values."""
+        """Return the form with the smallest error, fitted to points (point, input) and values."""
         fits = []
         for form, terms in _FORMS.items():
             matrix = terms(points)
