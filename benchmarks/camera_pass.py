@@ -1,15 +1,13 @@
-"""Cost of a frame, a study and a new image, compared with other programs.
+"""Cost of a frame and a new image, compared with other programs.
 
-python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--sub-frames 50] [--scene SCENE.nc]
+python benchmarks/camera_pass.py [--rounds 7] [--sub-frames 50]
 
 A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels: temperature and emissivity
 given in memory, all fields in memory, and a file, looked at for the first time and again. Beside
 them are the bound, which is to read once what the pass needs, and the paper's Figure 6 in plain
-NumPy. The study is the paper's: nine instants, two chips, on the same file, or on that of a cut
-(`chipglow cache list` says where). An image is what a camera makes of a kept mean radiance; Pyxel
-also makes counts, if it is there (``pip install pyxel-sim``). Frames and studies are timed in turn;
-the best of the rounds counts. Processor time, that of all threads, can be compared on a shared
-machine.
+NumPy. An image is formed from a kept mean radiance; Pyxel also makes counts, if it is installed
+(``pip install pyxel-sim``). Frames are timed in turn; the best of the rounds counts. Processor
+time, of all threads, can be compared on a shared machine.
 """
 
 import os
@@ -27,7 +25,6 @@ import numpy as np
 from common import arguments, best_of
 from scipy.signal import fftconvolve
 
-from chipglow.analysis import spread_starts
 from chipglow.camera import (
     AnnularAperturePSF,
     Camera,
@@ -42,7 +39,7 @@ from chipglow.camera.optics.sampling import integrate
 from chipglow.io import SceneWriter, open_scene
 from chipglow.scene import Raster, Scene, ToolGeometry
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
-from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface
+from chipglow.surface import CHIP_1, EmissivityField, Surface
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from figure6 import figure_6
@@ -100,12 +97,12 @@ def spline_frame(lattice, time):
     return SplineFrame(lattice, time, nodes, limits.astype(np.float32))
 
 
-def stored_scene(path, instants, sub_frames):
+def stored_scene(path, sub_frames):
     """Write the file of the scene, on nodes around its raster with a tool in its corner."""
     in_tool = ToolGeometry().signed_distance(*np.meshgrid(RASTER.x, RASTER.y)) < 0.0
     lattice = Lattice.within(RASTER, (-0.8e-3, -0.6e-3), CELL, in_tool, 293.15)
     with SceneWriter(path, RASTER, ToolGeometry(), lattice=lattice) as writer:
-        for index in range(instants * sub_frames):
+        for index in range(sub_frames):
             time = index * CAMERA.integration_time / sub_frames
             writer.append(spline_frame(lattice, time).frame())
 
@@ -138,23 +135,14 @@ def read_once(arrays):
         return [one.result() for one in work]
 
 
-def study(scene, instants):
-    camera = Camera.paper()
-    fields = [camera.prepare(chip, scene) for chip in (CHIP_1, CHIP_2)]
-    starts = spread_starts(scene, camera.integration_time, instants)
-    exposures = [camera.expose_fields(scene, fields, start) for start in starts]
-    return [camera.form_measurement(chip) for chip in zip(*exposures, strict=True)]
-
-
 def main():
-    given = arguments(__doc__, rounds=7, instants=9, sub_frames=50, scene=Path)
+    given = arguments(__doc__, rounds=7, sub_frames=50)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.nc"
-        stored_scene(path, 1 if given.scene else given.instants, given.sub_frames)
+        stored_scene(path, given.sub_frames)
         threads = numba.get_num_threads()
         print(f"{threads} threads; best of {given.rounds} rounds in turn")
         kept = compare_frames(path, given.rounds, given.sub_frames)
-        compare_studies(given.scene or path, given.instants, given.rounds)
     compare_images(kept, given.rounds)
 
 
@@ -200,19 +188,6 @@ def compare_frames(path, rounds, sub_frames):
     for name, (wall, busy) in best.items():
         print_times(name, wall, busy, f"{busy / samples / sub_frames * 1e9:11.2f}")
     return CAMERA.expose(stored, CHIP_1, 0.0)
-
-
-def compare_studies(path, instants, rounds):
-    kept = open_scene(path)
-    size = f"{kept.raster.rows} x {kept.raster.columns}"
-    print(f"\n{instants} instants x 2 chips, {len(kept)} frames of {size}")
-    calls = {
-        "study: first look": lambda: study(open_cold(path), instants),
-        "study: again": lambda: study(kept, instants),
-    }
-    best = best_of(calls, min(rounds, 3))
-    for name, times in best.items():
-        print_times(name, *times)
 
 
 def print_times(name, wall, busy, more=""):

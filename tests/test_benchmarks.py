@@ -32,10 +32,10 @@ PROGRAMS = {
         {"| none |": 5, "| none, sakuma": 5, "| 15 counts": 6, "| 3 points": 6},
     ),
     "camera_pass.py": (
-        "--rounds 1 --instants 1 --sub-frames 4",
+        "--rounds 1 --sub-frames 4",
         {
             **dict.fromkeys(("given: ", "in memory: ", "stored: "), 3),
-            **dict.fromkeys(("study: ", "new image: ", "image: ", "counts: "), 2),
+            **dict.fromkeys(("new image: ", "image: ", "counts: "), 2),
         },
     ),
     "convergence.py": (f"{COARSEST} --length 1", {f"| {COARSEST} |": 10}),
@@ -69,6 +69,7 @@ PROGRAMS = {
         f"--cell {COARSEST} 88.9-0.1",
         {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},
     ),
+    "trials.py": ("--trials 4", {"| whole image |": 2, "| rake face |": 2, "| both places |": 2}),
     "verification.py": ("momentum", {"| A free, spinning block": 4}),
 }
 NEEDED = {

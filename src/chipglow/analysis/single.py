@@ -32,7 +32,7 @@ EXPOSURE, TEXTURE, ACROSS, DOWN, NOISE = RANDOM = (
 )
 """Random inputs of a single reading, numbers from 0 to 1."""
 
-REFERENCE, MEASURED, TRUE, BELOW, SATURATED = range(5)
+REFERENCE, MEASURED, BELOW, SATURATED = range(4)
 """Values of a reading: temperatures, and fractions of its place that cannot be read."""
 
 _BLUR_WIDTHS: Final = 3.0
@@ -129,7 +129,7 @@ class SingleReadings:
     def read(
         self, camera: Camera, surfaces: Mapping[str, Surface], draw: Mapping[str, float]
     ) -> Array:
-        """Return temperatures in K and fractions of each reading, shape (reading, 5).
+        """Return temperatures in K and fractions of each reading, shape (reading, 4).
 
         `draw` gives a number from 0 to 1 for each of `random`. The fractions are of the place's
         outline, or of the window if it has none: below the lower range limit, and saturated.
@@ -138,7 +138,7 @@ class SingleReadings:
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
         right, down = (moved + camera.offset).tolist()
         seen = replace(camera, shape=None, offset=(right, down)).redrawn(noise)
-        values = np.full((self._size, 5), np.nan)
+        values = np.full((self._size, 4), np.nan)
         number = int(draw.get(EXPOSURE, 0.0) * len(self._exposures))
         for window in self._exposures[number]:
             surface = surfaces[window.surface].redrawn(texture)
@@ -154,7 +154,7 @@ class SingleReadings:
     def _look(
         self, window: _Window, camera: Camera, surface: Surface
     ) -> tuple[Array, NDArray[np.bool_], Raster]:
-        """Return `REFERENCE`, `MEASURED` and `TRUE` of a window, and where it is saturated."""
+        """Return `REFERENCE` and `MEASURED` of a window, and where it is saturated."""
         first, last = window.limits
         middle = window.start + (self._duration - camera.integration_time) / 2
         start = max(min(middle, last - camera.integration_time), first)
@@ -166,7 +166,7 @@ class SingleReadings:
         read, flags = camera.read(radiance[None], np.array([start]))
         reference = images.reference(camera)
         measured = np.where(np.isnan(reference), np.nan, camera.band.temperature(read[0]))
-        stack = np.stack([reference, measured, images.reference(camera, "true")])
+        stack = np.stack([reference, measured])
         if flags is None:
             return stack, np.zeros(pixels.shape, np.bool_), pixels
         return stack, flags[0] & Flag.SATURATED != 0, pixels

@@ -96,10 +96,15 @@ def setting_at(part: Part, path: str) -> Setting:
     return replace(found, path=path, value=value_at(part, path))
 
 
-def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
-    """Return a copy with other values by their paths, all checked; a ValueError if impossible."""
+def changed(
+    part: PartType, changes: Mapping[str, object], stated: Mapping[str, Any] | None = None
+) -> PartType:
+    """Return a copy with other values by their paths, all checked; a ValueError if impossible.
+
+    `stated` are the stated settings of the part, by default its own.
+    """
     try:
-        made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes))
+        made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes, stated))
     except ValidationError as error:
         raise ValueError(problem(error)) from None
     return made

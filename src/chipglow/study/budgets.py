@@ -3,7 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Final
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -273,9 +274,28 @@ def readings_of(study: Study, scene: Scene, at: Sequence[str], tell: Progress) -
     return SingleReadings(scene, *_seen(study, scene), study.plan, at, tell)
 
 
-def _seen(study: Study, scene: Scene) -> tuple[Mapping[str, Surface], Camera]:
-    """Return the surfaces and the camera of a study on a scene."""
-    return surfaces_on(study, scene)[0], study.camera.on(scene.raster, study.seed)
+def _seen(
+    study: Study,
+    scene: Scene,
+    drawn: Mapping[str, float] = MappingProxyType({}),
+    stated: Mapping[str, Any] = MappingProxyType({}),
+) -> tuple[Mapping[str, Surface], Camera]:
+    """Return a study's surfaces and camera on a scene, drawn settings in place of its stated."""
+    surface, camera = (
+        _section(getattr(study, name), f"{name}.", drawn, stated.get(name))
+        for name in (SURFACE, CAMERA)
+    )
+    return surfaces_on(scene, surface, study.seed)[0], camera.on(scene.raster, study.seed)
+
+
+def _section(
+    part: Any, prefix: str, drawn: Mapping[str, float], stated: Mapping[str, Any] | None
+) -> Any:
+    own = {path.removeprefix(prefix): one for path, one in drawn.items() if path.startswith(prefix)}
+    try:
+        return changed(part, own, stated) if own else part
+    except ValueError as reason:
+        raise ValueError(f"uncertainty.inputs: a draw is impossible: {prefix}{reason}") from None
 
 
 def _one_thread() -> None:
@@ -291,17 +311,12 @@ def reader(
 ) -> Callable[[Array], Array]:
     """Return the function from values of inputs, (trial, input), to (trial, reading, number)."""
     optical = [name for name in names if name.startswith(("camera.", "surface."))]
-    nominal = _seen(study, scene)
+    nominal, stated = _seen(study, scene), study.stated()
 
     def read(row: Array) -> Array:
         values = dict(zip(names, row.tolist(), strict=True))
-        surfaces, camera = nominal
-        if optical:
-            try:
-                drawn = changed(study, {name: values[name] for name in optical})
-            except ValueError as reason:
-                raise ValueError(f"uncertainty.inputs: a draw is impossible: {reason}") from None
-            surfaces, camera = _seen(drawn, scene)
+        drawn = {name: values[name] for name in optical}
+        surfaces, camera = _seen(study, scene, drawn, stated) if drawn else nominal
         return readings.read(camera, surfaces, values)
 
     def read_all(rows: Array) -> Array:

@@ -9,7 +9,7 @@ from chipglow.quantities import Part, own_settings
 from chipglow.quantities.units import LENGTH
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
-from chipglow.study.surface_section import FeaturesSection, surfaces_of
+from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surfaces_of
 from chipglow.surface import (
     EmissivityTrend,
     FeatureSurface,
@@ -58,7 +58,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
             "The scene shows no tool: no radiation from beyond the rake face blurs into the chip, "
             "so errors there are larger than with a warm tool."
         )
-    surfaces, follow = surfaces_on(study, scene)
+    surfaces, follow = surfaces_on(scene, study.surface, study.seed)
     if follow != "material":
         moving = {
             "mean": "textures move with the mean velocity of their feature",
@@ -74,9 +74,11 @@ def fit(study: Study, scene: Scene) -> Fitted:
     return Fitted(scene, surfaces, notes)
 
 
-def surfaces_on(study: Study, scene: Scene) -> tuple[dict[str, Surface], Follow]:
-    """Return a study's surfaces, and how their textures follow the material as far as known."""
-    surfaces = surfaces_of(study.surface, study.seed)
+def surfaces_on(
+    scene: Scene, section: SurfaceSection, seed: int
+) -> tuple[dict[str, Surface], Follow]:
+    """Return a section's surfaces, and how their textures follow the material as far as known."""
+    surfaces = surfaces_of(section, seed)
     if scene.has_material_coordinates:
         return surfaces, "material"
     follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"

@@ -143,8 +143,12 @@ def blend_row(  # type: ignore[no-untyped-def]
                 _add_tabled(scratch[k], deviates, tables[n, k], result[n])
 
 
-def in_blocks(count: int, work: Callable[[int, int], None], size: int = 16) -> None:
-    """Work on rows (or columns) from a first up to a last number, a block in each call."""
+def in_blocks(count: int, work: Callable[[int, int], None], size: int | None = None) -> None:
+    """Work on rows (or columns) from a first up to a last number, a block in each call.
+
+    A block has `size` rows; by default 16, or all with one thread.
+    """
+    size = size or (count if get_num_threads() == 1 else 16)
     blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
     if get_num_threads() == 1:
         for first, last in blocks:
