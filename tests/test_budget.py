@@ -9,6 +9,7 @@ import pytest
 from analytic_chip import AnalyticChip
 from command import chipglow, refused
 from figure6 import figure_6
+from GTC import multiple_ureal, set_correlation, ureal
 from scipy import stats
 from scipy.special import ndtr
 
@@ -58,6 +59,11 @@ def test_a_correlated_linear_model_is_exact():
     estimate = found.estimate
     # JCGM 100:2008, 5.2.2.
     both = 2.0**2 + 2.0**2 - 2 * 0.6 * 2.0 * 2.0
+    a, c = multiple_ureal([1.0, -1.0], [2.0, 1.0], np.inf)
+    set_correlation(0.6, a, c)
+    peer = a + 4.0 * ureal(3.0, 0.5) - 2.0 * c
+    assert estimate.values == pytest.approx(peer.x)
+    assert estimate.standard_uncertainty == pytest.approx(peer.u)
     np.testing.assert_allclose(found.sensitivity[:, 0], slopes)
     np.testing.assert_allclose(estimate.values, 1.0 + 12.0 + 2.0)
     np.testing.assert_allclose(estimate.standard_uncertainty, np.sqrt(both + 2.0**2))
