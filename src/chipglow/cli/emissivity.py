@@ -229,8 +229,9 @@ def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Pat
         for name, estimate in estimates.items()
         for part in estimate.names
     ).dropna()
+    order = parts.sort_values(["region", "contribution_K"], ascending=[True, False])
     screen.heading()
-    screen.table("budget", parts.sort_values(["region", "contribution_K"], ascending=[True, False]))
+    screen.table("budget", order.round(3))
     return found.notes.about(str(study))
 
 
