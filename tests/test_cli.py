@@ -182,6 +182,7 @@ ENDINGS = {
     ("psf", "--out"): ".nc",
     ("wavelengths", "--out"): ".csv",
     ("budget", "--out"): ".csv",
+    ("design", "--out"): ".csv",
     ("register", "--out"): ".yaml or .yml",
     ("register", "--pairs"): ".csv",
     ("register", "--blink"): ".gif",

@@ -41,9 +41,6 @@ _SURROGATE: Final = "scene settings between the cut ones"
 _SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-out scenes"}
 """Sources of the inputs that the study does not state, by distribution."""
 
-_TRIALS: Final = 1000
-"""Trials that check the budget by which a measurement is corrected."""
-
 _NOMINAL_DRAWS: Final = 32
 """Draws of the random inputs over which the error of a cut scene is a mean."""
 
@@ -249,19 +246,14 @@ def corrected_temperatures(
     """
     study = changed(study, {"analysis.reference": "mean"})
     rows = {row.name: row for row in measured.rows}
-    found = study_budget(study, tuple(rows), _TRIALS, 2, progress=progress)
-    errors, trials = found.budget.estimate, found.budget.monte_carlo
-    validated, doubts, estimates = trials.validates(errors), [], {}
+    found = study_budget(study, tuple(rows), 100, 2, progress=progress)
+    estimates = {}
     for name, row in rows.items():
         names = zip(found.readings, found.places, strict=True)
         number = next(n for n, known in enumerate(names) if name in known)
-        estimates[name] = row.estimate - row.gain * errors[number].without(NOISE)
-        if not validated[number]:
-            doubts.append(
-                f"{name}: the error is not normal; by Monte Carlo it is "
-                f"{trials.low[number]:.3g} to {trials.high[number]:.3g} K (95 %)."
-            )
-    return estimates, replace(found, notes=found.notes + Notes(warnings=doubts))
+        error = found.budget.estimate[number].without(NOISE)
+        estimates[name] = row.estimate - row.gain * error
+    return estimates, found
 
 
 def errors_of(numbers: Array) -> Array:
