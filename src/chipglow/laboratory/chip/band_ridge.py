@@ -1,5 +1,6 @@
 """The shear band in a measured image: the ridge of the radiance temperature."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import Final
@@ -31,7 +32,6 @@ SHORTEST: Final = 15.0
 _SCALES: Final = (6e-6, 12e-6, 18e-6)
 _ALONG_THE_FACE: Final = (10.0, 30.0)
 _STRENGTH: Final = 5.0
-_TOLL: Final = 0.8
 _STEP: Final = 0.5
 _GAP: Final = 10.0
 _SEARCH: Final = 1.5
@@ -93,10 +93,8 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     try:
         return _ridge(image, tool, _response(image, tool))
     except NoShearBandError:
-        try:
+        with suppress(NoShearBandError):
             return _ridge(image, tool, _response(_without_below(image, tool), tool))
-        except NoShearBandError:
-            pass
         raise
 
 
@@ -164,13 +162,13 @@ def _path(image: ThermalImage, response: Array, tool: Tool) -> Array:
         raise NoShearBandError("shear band: no usable pixel is beside the tool")
     score = np.log1p(map_coordinates(response, polar.index, order=1) / _STRENGTH)
     if allowed[0].any():
-        i, j = polar.best_path(score, allowed, allowed, _TOLL)
+        i, j = polar.best_path(score, allowed, allowed, anywhere=False)
         points = polar.points[i, j]
         # It begins where the ridge does: near the edge the heat of the rake face may hide it.
         points = points[strongest_part(points, score[i, j], _GAP * image.raster.spacing)]
         if arc_length(points)[-1] >= SHORTEST * image.raster.spacing:
             return points
-    i, j = polar.best_path(score, allowed, allowed, _TOLL, anywhere=True)
+    i, j = polar.best_path(score, allowed, allowed, anywhere=True)
     if i.size < 2:
         raise NoShearBandError(_NO_RIDGE)
     return polar.points[i, j]

@@ -11,6 +11,7 @@ from chipglow.laboratory.chip.segment import contact_length, shear_band
 from chipglow.laboratory.chip.segmentation import (
     Segmentation,
     cut_history,
+    mean_and_deviation,
     resolution,
     segmentation,
 )
@@ -118,6 +119,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     period = segments.period
     passing = _passing(scene, tool, frames, scan, period)
     bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
+    contact, contact_deviation = mean_and_deviation(contacts)
     measured: dict[str, Any] = {
         **{name: getattr(history, name, nan) for name in _FORCES},
         **vars(segments),
@@ -133,8 +135,8 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
         spacing_uncertainty=segments.period_uncertainty * speed,
         chip_spacing=period * passing["chip_speed"],
         feed=feed,
-        contact=float(contacts.mean()),
-        contact_standard_deviation=_deviation(contacts),
+        contact=contact,
+        contact_standard_deviation=contact_deviation,
         ratio=feed / passing["thickness"],
         band_rate=max((band.middle_rate for band in bands), default=nan),
         scan=scan,
@@ -274,10 +276,5 @@ def _median(values: Array) -> float:
 def _with_deviation(name: str, values: ArrayLike) -> dict[str, float]:
     """Return the mean of the known values and the standard deviation, by their names."""
     every = np.asarray(values, np.float64)
-    known = every[np.isfinite(every)]
-    mean = float(known.mean()) if known.size else nan
-    return {name: mean, f"{name}_standard_deviation": _deviation(every)}
-
-
-def _deviation(values: Array) -> float:
-    return float(np.std(values, ddof=1)) if values.size > 1 else nan
+    mean, _ = mean_and_deviation(every[np.isfinite(every)])
+    return {name: mean, f"{name}_standard_deviation": mean_and_deviation(every)[1]}
