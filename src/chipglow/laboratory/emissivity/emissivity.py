@@ -3,12 +3,12 @@
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import hypot, inf, isfinite, nan, sqrt
 from typing import Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.laboratory.emissivity.observations import (
@@ -91,6 +91,12 @@ class Heating(Part):
                 f"{_celsius(self.reflected)}, by {_CLEARLY:g} standard uncertainties of "
                 f"{spread:.3g} K or more"
             )
+
+    def estimate(self, name: str) -> Estimate:
+        """Return ``reference`` or ``reflected`` in K; its error is one for all images."""
+        exact = Estimate(np.array(getattr(self, name)))
+        spread = getattr(self, f"{name}_uncertainty")
+        return exact.with_component(name, spread, identity=ALL_IMAGES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,19 +208,8 @@ class EmissivityMap:
 
     def _systematic(self, values: Array, radiance: Any, calibration: Any) -> Estimate:
         """Return emissivities with the components of `COMMON`."""
-
-        def found(reference: Any, reflected: Any) -> Any:
-            hot, cold = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
-            return (radiance - cold) / (hot - cold)
-
-        heating = self.heating
-        ends = [
-            Estimate(np.array(getattr(heating, name))).with_component(
-                name, getattr(heating, f"{name}_uncertainty"), identity=ALL_IMAGES
-            )
-            for name in ("reference", "reflected")
-        ]
-        known = propagate(found, *ends)
+        ends = [self.heating.estimate(name) for name in ("reference", "reflected")]
+        known = propagate(partial(_solved, radiance, self.band), *ends)
         effect = 0.0 if calibration is None else calibration / self._contrast
         known = known.with_component("calibration", effect, identity=ALL_IMAGES)
         return replace(known, values=values)
@@ -338,7 +333,11 @@ def _design(temperatures: Sequence[float]) -> Array:
 
 def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
     """Compute the emissivity from W/(m² sr): Equation 2 of Heigel and Whitenton (2010), solved."""
-    hot, cold = band.radiance(np.array([heating.reference, heating.reflected]))
+    return _solved(radiance, band, heating.reference, heating.reflected)
+
+
+def _solved(radiance: Array, band: Band, reference: ArrayLike, reflected: ArrayLike) -> Array:
+    hot, cold = (band.radiance(np.asarray(one)) for one in (reference, reflected))
     return np.asarray((radiance - cold) / (hot - cold), np.float64)
 
 

@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from chipglow.camera import FittedCalibration, Measurement
-from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
+from chipglow.laboratory.emissivity.emissivity import COMMON, LABORATORY, EmissivityLine
 from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
@@ -35,10 +35,7 @@ from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, MonteCarlo, monte_carlo, propagate
 
-TEMPERATURE_BUDGET: Final = (
-    *("reference", "reflected", "calibration", "emissivity"),
-    *("drift", "repeatability", "noise"),
-)
+TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", "repeatability", "noise")
 """Lines of the budget of a true temperature."""
 
 FAR: Final = 50.0
@@ -140,8 +137,10 @@ def true_temperature(
     used = used_pixels(area, radiance.mean(axis=0), observed_flags(measurements))
     values = radiance[:, used.mask]
     mean = float(values.mean())
-    reflecting = _surroundings(emissivity) if surroundings is None else surroundings
-    room = float(reflecting.values)
+    if surroundings is None:
+        seen = emissivity.heatings
+        surroundings = seen[0].estimate("reflected") if seen else reflected_temperature()
+    room = float(surroundings.values)
     if not mean > float(band.radiance(np.array(room))):
         raise ValueError(
             f"region {area.name}: is darker than its reflection at {room - ZERO_CELSIUS:.6g} °C, "
@@ -158,7 +157,7 @@ def true_temperature(
     inputs = (
         value.renamed(RANDOM, "emissivity"),
         _mean_radiance(values, error, shared, drift, len(measurements)),
-        reflecting,
+        surroundings,
     )
     estimate = propagate(
         lambda _, seen, __: temperature(seen),
@@ -402,16 +401,6 @@ def _emissivity_of_area(
         )
     ends = kelvins[hotter[0] - 1 : hotter[0] + 1]
     return line.at(scipy.optimize.brentq(excess, *ends, xtol=1e-6))
-
-
-def _surroundings(emissivity: EmissivityLine) -> Estimate:
-    """Return the reflected temperature in K, with the same error as in the emissivity."""
-    if not emissivity.heatings:
-        return reflected_temperature()
-    heating = emissivity.heatings[0]
-    return Estimate(np.array(heating.reflected)).with_component(
-        "reflected", heating.reflected_uncertainty, identity=ALL_IMAGES
-    )
 
 
 def _correlation(
