@@ -1,5 +1,6 @@
 """Images of edges, and which of their pixels can be used."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import sqrt
@@ -187,7 +188,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
         line, bend = find_edge(seen, image.x - image.x.mean(), image.y - image.y.mean())
         pixels = _pixels_of(image, line)
         quick = _quick_fit(pixels)
-        warnings = _bent(bend, image)
+        warnings = list(_bent(bend, image))
         limits, clipped = _limits(image, line.distance(*image.places))
         warnings += clipped
         if clipped:
@@ -326,13 +327,11 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
         )
 
 
-def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> list[str]:
+def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> Iterator[str]:
     if bend is None:
-        return ["The edge was found by its step only; its straightness could not be checked."]
-    bent, unsure = bend
-    if bent < 4 * unsure or bent < 0.05 * image.pitch:
-        return []
-    return [
-        f"The edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
-        f"{unsure * 1e6:.1g} um), which makes the point spread function too wide."
-    ]
+        yield "The edge was found by its step only; its straightness could not be checked."
+    elif bend[0] >= max(4 * bend[1], 0.05 * image.pitch):
+        yield (
+            f"The edge is bent by {bend[0] * 1e6:.2g} um over its length (standard uncertainty "
+            f"{bend[1] * 1e6:.1g} um), which makes the point spread function too wide."
+        )

@@ -154,9 +154,5 @@ def _line_of(slope: float, start: float, steep: bool, before: EdgeLine) -> EdgeL
 def _sagitta(place: Array, centre: Array) -> tuple[float, float]:
     """Return the deviation of a parabola from its chord, and its standard uncertainty."""
     unit = (place - place.mean()) / (np.ptp(place) / 2)
-    design = np.vander(unit, 3)
-    solution, *_ = np.linalg.lstsq(design, centre, rcond=None)
-    left = centre - design @ solution
-    variance = float(left @ left) / (place.size - 3)
-    inverse = np.linalg.inv(design.T @ design)
-    return abs(float(solution[0])), float(variance * inverse[0, 0]) ** 0.5
+    (bend, *_), covariance = np.polyfit(unit, centre, 2, cov=True)
+    return abs(float(bend)), float(covariance[0, 0]) ** 0.5
