@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 from math import hypot, inf, isfinite, nan, sqrt
 from typing import Annotated, Any, Final
 
@@ -15,14 +15,13 @@ from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
     UsedPixels,
-    area_estimate,
     calibration_uncertainty,
     check_same_pixels,
-    drift_effect,
     observed_flags,
     observed_radiance,
     used_pixels,
     with_drift,
+    with_observed,
 )
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.quantities.units import KELVINS, TEMPERATURE_DIFFERENCE
@@ -166,13 +165,9 @@ class EmissivityMap:
         calibration = None if self.calibration is None else self.calibration[used.mask].mean()
         pixels = values.mean(axis=0)
         mean = float(pixels.mean())
-        random = area_estimate(mean, values, f"{self.identity} {area.name}")
-        repeatability = float(random.contribution("repeatability"))
-        drift = drift_effect(
-            self.heating.drift, mean_radiance / self._contrast, self.recordings, repeatability
-        )
-        estimate = self._systematic(np.array(mean), mean_radiance, calibration)
-        estimate = with_drift(estimate, drift, self.identity) + (random - mean)
+        known = self._systematic(np.array(mean), mean_radiance, calibration)
+        by_drift, of = mean_radiance / self._contrast, f"{self.identity} {area.name}"
+        estimate = with_observed(known, values, self.heating.drift, by_drift, self.recordings, of)
         outside = (int((pixels < 0).sum()), int((pixels > 1).sum()))
         return RegionEmissivity(
             name=area.name,
@@ -404,7 +399,8 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     line = solve @ means
     freedom = means.size - 2
     residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
-    random = np.array([_without_common(one).standard_uncertainty for one in estimates])
+    own = [reduce(Estimate.without, COMMON, one) for one in estimates]
+    random = np.array([one.standard_uncertainty for one in own])
     if isfinite(residual):
         random = np.maximum(random, residual)
     identity = " ".join(
@@ -430,11 +426,6 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
         residual=residual,
         standard_deviation=float(np.mean([area.standard_deviation for area in areas])),
     )
-
-
-def _without_common(estimate: Estimate) -> Estimate:
-    own = tuple(one for one in estimate.components if one.cause.name not in COMMON)
-    return replace(estimate, components=own)
 
 
 def _floor(measurement: Measurement) -> float:

@@ -18,15 +18,13 @@ from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
     UsedPixels,
-    area_estimate,
     calibration_uncertainty,
     check_same_pixels,
-    drift_effect,
     observed_flags,
     observed_radiance,
     uncertainty_columns,
     used_pixels,
-    with_drift,
+    with_observed,
 )
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.units import HOTTEST
@@ -297,18 +295,14 @@ def _assumptions(
     unknown_drift: bool,
     stated_calibration: bool,
 ) -> list[str]:
-    def plays_a_part(cause: str) -> bool:
-        return any(row.estimate.contribution(cause) for row in rows)
-
+    exact = not any(row.estimate.contribution("emissivity") for row in rows)
     known = not any(line.heatings for line in lines)
     straight = any(len(line.heatings) > 1 for line in lines)
     texts = {
         "Every region is of uniform temperature and emissivity.": True,
         "The emissivity is a straight line over the temperature.": straight,
         "The emissivity is the same at all temperatures.": not straight and not known,
-        "The emissivity is exact (emissivity_uncertainty).": (
-            known and not plays_a_part("emissivity")
-        ),
+        "The emissivity is exact (emissivity_uncertainty).": known and exact,
         "The object reflects 293 K exactly (reflected, reflected_uncertainty).": (
             known and same_surroundings
         ),
@@ -335,13 +329,10 @@ def _mean_radiance(
 ) -> Estimate:
     """Return the mean radiance; `shared`: correlation of calibration errors with emissivity."""
     mean = float(values.mean())
-    random = area_estimate(mean, values, uuid4().hex)
-    repeatability = float(random.contribution("repeatability"))
     found, own = Estimate(np.array(mean)), sqrt(max(1 - shared**2, 0.0))
     for identity, part in ((ALL_IMAGES, shared), ("measurement", own)):
         found = found.with_component("calibration", part * calibration, identity=identity)
-    found = with_drift(found, drift_effect(drift, mean, recordings, repeatability))
-    return found + (random - mean)
+    return with_observed(found, values, drift, mean, recordings, uuid4().hex)
 
 
 def _temperature(emissivity: ArrayLike, reflected: ArrayLike, band: Band, radiance: Array) -> Array:
