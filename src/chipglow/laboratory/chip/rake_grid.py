@@ -242,8 +242,7 @@ def rake_grid(
             image = ThermalImage.of(measurement, int(numbers[index]))
             for change, displacement in zip(changes, displacements, strict=True):
                 change[index] = contribution(image, places, displacement).mean(axis=-1)
-        component = uncertainty.component(tool, np.where(np.isfinite(mean), changes, np.nan))
-        estimate = replace(estimate, components=(*estimate.components, component))
+        estimate = uncertainty.applied(tool, estimate, changes)
     return RakeGrid(
         along=along,
         depth=deep,

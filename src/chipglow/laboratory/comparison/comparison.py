@@ -396,10 +396,8 @@ def _laid_by_the_edge(
         image = _image(measured, frame)
         if image is not None:
             found[:, frame] = [contribution(image, points, move) for move in moves]
-    found[:, np.isnan(profile.temperature)] = np.nan
-    alone = profile.estimate.without(TOOL)
-    components = (*alone.components, uncertainty.component(tool, found))
-    return replace(profile, estimate=replace(alone, components=components))
+    estimate = uncertainty.applied(tool, profile.estimate.without(TOOL), found)
+    return replace(profile, estimate=estimate)
 
 
 def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Estimate:
