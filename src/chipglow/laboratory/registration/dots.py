@@ -1,5 +1,6 @@
 """Dots of a target that both cameras see, and the registration that they give."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -227,7 +228,7 @@ class _Disc:
 
 def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
     """Return discs of like radius at blobs, fitted again without their neighbours' skirts."""
-    first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
+    first = [_disc(image, known, blob) for blob in blobs[:, :3].tolist()]
     discs = _like(first, bright)
     for _ in range(_AGAIN):
         rest = image.copy()
@@ -235,7 +236,7 @@ def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -
             reach = disc.radius + 3 * disc.softness
             part, columns, rows = _window(image.shape, disc.column, disc.row, reach)
             rest[part] -= disc.brightness(columns, rows)
-        again = [_disc(rest, known, d.column, d.row, d.size, d) for d in discs]
+        again = [_disc(rest, known, (d.column, d.row, d.size), d) for d in discs]
         before, discs = discs, _like(again, bright)
         if _settled(before, discs):
             break
@@ -271,14 +272,10 @@ def _like(found: list[_Disc | None], bright: bool) -> list[_Disc]:
 
 
 def _disc(
-    image: Array,
-    known: NDArray[np.bool_],
-    column: float,
-    row: float,
-    size: float,
-    own: _Disc | None = None,
+    image: Array, known: NDArray[np.bool_], blob: Sequence[float], own: _Disc | None = None
 ) -> _Disc | None:
-    """Fit the disc near a place; its own brightness, if given, was taken from the image."""
+    """Fit the disc near a blob; its own brightness, if given, was taken from the image."""
+    column, row, size = blob
     reach = max(_WINDOW * size, _LEAST_WINDOW)
     part, columns, rows = _window(image.shape, column, row, reach)
     used = (np.hypot(columns - column, rows - row) <= reach) & known[part]
