@@ -279,11 +279,6 @@ class Estimate:
         components = tuple(one.taken(rows) for one in self.components)
         return replace(self, values=change(self.values), components=components)
 
-    def _broadcast(self, shape: tuple[int, ...]) -> "Estimate":
-        if shape == self.shape:
-            return self
-        return self._rearranged(lambda values: np.broadcast_to(values, shape))
-
     def linear(self, matrix: Any) -> "Estimate":
         """Return linear combinations of the flat values, matrix of shape (m, values)."""
         components = tuple(Component(one.cause, matrix @ one.effects) for one in self.components)
@@ -359,7 +354,9 @@ def chain(values: Array, inputs: Sequence[Estimate], partials: Sequence[Array]) 
     found: dict[tuple[str, str], Component] = {}
     for one, partial in zip(inputs, partials, strict=True):
         factors = np.broadcast_to(partial, shape).ravel()
-        for component in one._broadcast(shape).components:
+        if one.shape != shape:
+            one = one._rearranged(lambda values: np.broadcast_to(values, shape))
+        for component in one.components:
             cause, effects = component.cause, component.scaled(factors)
             before = found.get(cause.key)
             if before is not None:

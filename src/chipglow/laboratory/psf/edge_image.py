@@ -89,16 +89,10 @@ def edge_image(
         If the region is not within the image.
     """
     attributes = measurement.data.attrs
-    image = _mean_image(
-        measurement.radiance,
-        measurement.flags,
-        measurement.raster,
-        name,
-        region,
-        attributes.get("fill_factor"),
-        measurement.band if "band_lower" in attributes else None,
-        measurement.notes,
-    )
+    frames = measurement.radiance, measurement.flags, measurement.raster
+    band = measurement.band if "band_lower" in attributes else None
+    optics = attributes.get("fill_factor"), band
+    image = _mean_image(*frames, name, region, *optics, measurement.notes)
     assumed, below = image.notes.assumed, image.below
     if attributes.get("psf_order") == "detector":
         assumed.append(
