@@ -415,8 +415,7 @@ def _offset(line: Line | None, reference: Line) -> float:
     """Return the median distance of a band from the reference in m, positive toward the chip."""
     if line is None:
         return nan
-    away = line.points[:, None] - reference.points[None]
-    nearest = (away**2).sum(axis=-1).argmin(axis=1)
+    nearest = ((line.points[:, None] - reference.points) ** 2).sum(axis=-1).argmin(axis=1)
     beside = (nearest > 0) & (nearest < reference.distance.size - 1)
     if not beside.any():
         beside[:] = True

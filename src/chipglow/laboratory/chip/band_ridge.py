@@ -110,12 +110,11 @@ def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
 
 def _ridge(image: ThermalImage, tool: Tool, response: Array) -> Line:
     """Return the ridge of the strongest path through a response."""
-    pitch = image.raster.spacing
     points = _path(image, response, tool)
     coefficients = spline_filter(image.temperature, order=3)
     for _ in range(3):
         points = climbed(points, *_profiles(points, image, coefficients, _SEARCH))
-        points = even_steps(points, _STEP * pitch)
+        points = even_steps(points, _STEP * image.raster.spacing)
     points = _within(points, image)
     _check(points, image, coefficients)
     return Line(arc_length(points) + float(np.hypot(*(points[0] - tool.edge_point))), points)
@@ -194,8 +193,7 @@ def _within(points: Array, image: ThermalImage) -> Array:
 
 
 def _check(points: Array, image: ThermalImage, coefficients: Array) -> None:
-    pitch = image.raster.spacing
-    length = float(arc_length(points)[-1]) / pitch
+    length = float(arc_length(points)[-1]) / image.raster.spacing
     if length < SHORTEST:
         raise NoShearBandError(
             f"shear band: the longest ridge of the radiance temperature is {length:.3g} pixels "

@@ -195,8 +195,7 @@ def _passing(
 def _heights(raster: Raster, tool: Tool) -> Array:
     """Return heights on the rake face in the view, at steps of two samples."""
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
-    points = tool.rake_point(heights)
-    return heights[: max(1, int(_inside(raster, points).sum()))]
+    return heights[: max(1, int(_inside(raster, tool.rake_point(heights)).sum()))]
 
 
 def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
@@ -244,8 +243,7 @@ def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     """Return whole periods, the last at the end of the scene; without a period the scene."""
     if np.isnan(period):
         return [np.ones(time.size, dtype=np.bool_)]
-    step = (time[-1] - time[0]) / max(time.size - 1, 1)
-    end = time[-1] + step
+    end = time[-1] + (time[-1] - time[0]) / max(time.size - 1, 1)
     count = int((end - time[0]) / period + 1 - _WHOLE)
     before_end = (end - time) / period
     return [(before_end > k + 1e-9) & (before_end <= k + 1 + 1e-9) for k in range(count)]
@@ -263,8 +261,7 @@ def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
 def _angle(band: ShearBand) -> float:
     """Return the angle of the line through the middle half, over the horizontal to the left."""
     points = band.ridge.points[band.middle_half]
-    offset = points - points.mean(axis=0)
-    direction = np.linalg.svd(offset, full_matrices=False)[2][0]
+    direction = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
     return float(np.arctan2(-direction[1] * np.sign(direction[0]), abs(direction[0])))
 
 

@@ -55,8 +55,7 @@ class PolarGrid:
         left, right, _, top = raster.extent
         reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
         step = max(_RADIUS_STEP, raster.spacing / _STEPS_A_SAMPLE)
-        first = max(tool.corner_radius, step)
-        radii = np.arange(first, reach + 2 * step, step)
+        radii = np.arange(max(tool.corner_radius, step), reach + 2 * step, step)
         up = np.arctan2(tool.rake_direction[1], tool.rake_direction[0])
         angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

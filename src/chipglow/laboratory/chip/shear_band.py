@@ -171,5 +171,4 @@ def _half_crossing(values: Array, offsets: Array) -> Array:
     drop = upper - lower
     fraction = np.divide(upper - half[:, 0], drop, out=np.zeros_like(drop), where=drop > 0)
     crossing = offsets[first - 1] + fraction * (offsets[first] - offsets[first - 1])
-    found = below.any(axis=1) & (values[:, 0] > 0)
-    return np.where(found, crossing, np.nan)
+    return np.where(below.any(axis=1) & (values[:, 0] > 0), crossing, np.nan)

@@ -147,10 +147,9 @@ class EmissivityMap:
         count = len(self.radiance)
         if count == 1:
             return found.with_unevaluated("noise")
-        noise = self.radiance.std(axis=0, ddof=1) / sqrt(count) / self._contrast
         return found.with_component(
             "noise",
-            noise,
+            self.radiance.std(axis=0, ddof=1) / sqrt(count) / self._contrast,
             per_element=True,
             identity=self.identity,
             degrees_of_freedom=count - 1.0,

@@ -250,8 +250,7 @@ class MeasuredEmissivity(SurfaceFile):
             raise ValueError(
                 f"region: {self.region!r} is not in {self.file}, expected one of {', '.join(areas)}"
             )
-        trend = emissivity_trend(areas[self.region])
-        return TrendSurface(trend, origin=read_origin(self.file))
+        return TrendSurface(emissivity_trend(areas[self.region]), origin=read_origin(self.file))
 
 
 def surface_text(result: RegionEmissivities) -> str:

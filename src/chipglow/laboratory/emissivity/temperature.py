@@ -409,5 +409,4 @@ def _correlation(
         hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
         then = cold + emissivity * (hot - cold)
         correlations.append(calibration.errors.estimate([then, radiance]).correlation()[0, 1])
-    weighted = line.weights(temperature) @ np.nan_to_num(correlations)
-    return float(np.clip(weighted, -1.0, 1.0))
+    return float(np.clip(line.weights(temperature) @ np.nan_to_num(correlations), -1.0, 1.0))

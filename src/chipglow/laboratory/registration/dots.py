@@ -111,8 +111,7 @@ def fit_dots(
     positions = np.stack(
         [raster.x[0] + columns * raster.spacing, raster.y[0] - rows * raster.spacing], axis=1
     )
-    pixels = dots[1].pixels[second]
-    fit = fit_points(positions, pixels, model, picked=False)
+    fit = fit_points(positions, dots[1].pixels[second], model, picked=False)
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[second] ** 2).mean()))
@@ -228,8 +227,7 @@ class _Disc:
 
 def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
     """Return discs of like radius at blobs, fitted again without their neighbours' skirts."""
-    first = [_disc(image, known, blob) for blob in blobs[:, :3].tolist()]
-    discs = _like(first, bright)
+    discs = _like([_disc(image, known, blob) for blob in blobs[:, :3].tolist()], bright)
     for _ in range(_AGAIN):
         rest = image.copy()
         for disc in discs:

@@ -181,8 +181,7 @@ class _Level:
 
     def basis(self, matrix: Array, model: Model) -> Array:
         """Return the basis by which a parameter of 1 moves the image's corner by one sample."""
-        mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
-        return parameter_basis(model, mirrored) * self.step
+        return parameter_basis(model, mirrored=np.linalg.det(matrix[:2, :2]) < 0) * self.step
 
 
 def _levels(

@@ -278,9 +278,8 @@ def _least(
         return (mapped_places(matrix_of(parameters), found) - target).ravel()
 
     def slope(parameters: Array) -> Array:
-        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k)
+        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, basis.shape[1])
 
-    k = basis.shape[1]
     begin = _direct(found, target, basis)
     fit = least_squares(residual, begin, slope, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return basis, residual(fit.x), slope(fit.x), matrix_of(fit.x)
@@ -347,8 +346,7 @@ def element_slopes(matrix: Array, places: Array) -> Array:
     """Return the derivative of mapped places by the matrix elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]
-    mapped = mapped_places(matrix, places)
     slopes = np.zeros((*places.shape, 9))
     slopes[..., 0, 0:3] = slopes[..., 1, 3:6] = whole
-    slopes[..., 6:9] = -mapped[..., None] * whole[..., None, :]
+    slopes[..., 6:9] = -mapped_places(matrix, places)[..., None] * whole[..., None, :]
     return slopes

@@ -90,12 +90,11 @@ def simultaneous_frames(
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
     """Return the visible frames exposed within each integration; times in s are starts."""
-    begins = infrared_times + alignment.offset
     return [
         np.flatnonzero(
             (visible_times < begin + integration_time) & (visible_times + visible_exposure > begin)
         )
-        for begin in begins
+        for begin in infrared_times + alignment.offset
     ]
 
 
@@ -261,5 +260,4 @@ def align_recordings(
 
 def infrared_radiance(measurement: Measurement, frame: int) -> Array:
     """Return the radiance of a frame for `fit_images` and `fit_dots`: NaN where a pixel is dead."""
-    dead = measurement.flags[frame] & Flag.DEAD > 0
-    return np.where(dead, np.nan, measurement.radiance[frame])
+    return np.where(measurement.flags[frame] & Flag.DEAD, np.nan, measurement.radiance[frame])
