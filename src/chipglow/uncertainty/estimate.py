@@ -99,7 +99,9 @@ class Estimate:
         identity = uuid4().hex if identity is None else identity
         errors = signed.size if per_element else 1
         cause = Cause(name, identity, errors, degrees_of_freedom, pooled, (), distribution)
-        effects = _diagonal(signed) if per_element else signed[:, None]
+        effects: Any = signed[:, None]
+        if per_element:  # sparse, with those that are 0 too
+            effects = sparse.csr_array((signed, np.arange(errors), np.arange(errors + 1)))
         return replace(self, components=(*self.components, Component(cause, effects)))
 
     @classmethod
@@ -327,8 +329,7 @@ class Estimate:
         return chain(values, (one, two), (1 / two.values, -values / two.values))
 
     def __pow__(self, power: float) -> "Estimate":
-        partial = power * self.values ** (power - 1)
-        return chain(self.values**power, (self,), (partial,))
+        return chain(self.values**power, (self,), (power * self.values ** (power - 1),))
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -441,11 +442,6 @@ def check_same(one: Cause, other: Cause) -> None:
             f"component {one.name}: is {one} and {other}, they must be the same errors wherever "
             "its name appears; name it otherwise, or make it independent"
         )
-
-
-def _diagonal(values: Array) -> Any:
-    """Return a sparse array with values on its diagonal, those that are 0 too."""
-    return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, int]) -> Any:

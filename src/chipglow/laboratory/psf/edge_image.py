@@ -290,8 +290,7 @@ def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, 
     """Return the pixels without those that lie far from all others as near to the edge."""
     left = pixels.radiance - quick.predicted(0, pixels)
     spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-    limit = max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
-    kept = np.abs(left) <= limit
+    kept = np.abs(left) <= max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
     lost = int(np.count_nonzero(~kept))
     # More than a few are not dead pixels but an object that is not an edge.
     if lost == 0 or lost > 0.01 * kept.size:

@@ -73,8 +73,7 @@ class ApertureSignals:
     @cached_property
     def frequency(self) -> Array:
         """Frequencies in 1/m on which the transfer function is asked for."""
-        step = 1 / (16 * float(self.diameters.max()))
-        return np.arange(0.0, 3 / self.footprint, step)
+        return np.arange(0.0, 3 / self.footprint, 1 / (16 * float(self.diameters.max())))
 
     @cached_property
     def weights(self) -> Array:

@@ -415,5 +415,4 @@ def sampled_kernel(
 
 
 def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
-    sigma = fwhm / FWHM_PER_SIGMA
-    return np.exp(-2 * (pi * sigma * frequency) ** 2)
+    return np.exp(-2 * (pi * (fwhm / FWHM_PER_SIGMA) * frequency) ** 2)

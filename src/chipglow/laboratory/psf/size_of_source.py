@@ -86,12 +86,10 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     if not inner.any():
         raise ValueError(f"{image.name}: no usable pixel in the middle of the aperture")
     beside = known & (away > radius + 3 * pitch)
-    sigma = _noise(image.radiance, beside)
+    sigma = _noise(image.radiance, beside) / int(inner.sum()) ** 0.5
     outside = float(np.median(image.radiance[beside])) if beside.any() else float(low)
-    number = int(inner.sum())
     signal = float(image.radiance[inner].mean())
-    least = 1e-7 * float(high - low)
-    return signal, max(sigma / number**0.5, least), away[inner], outside
+    return signal, max(sigma, 1e-7 * float(high - low)), away[inner], outside
 
 
 def _noise(radiance: Array, outside: NDArray[np.bool_]) -> float:
