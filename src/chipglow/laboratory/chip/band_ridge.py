@@ -55,14 +55,13 @@ class ThermalImage:
     def of(cls, measurement: Measurement, frame: int) -> "ThermalImage":
         """Fill a frame of a measurement."""
         known = np.asarray(measurement.data["radiance_temperature"][frame].values, dtype=np.float64)
-        flags = np.asarray(measurement.data["flags"][frame].values)
         usable = np.isfinite(known)
         if not usable.any():
             raise NoShearBandError("shear band: no pixel of the frame has a radiance temperature")
         lower_limit = float(measurement.data.attrs.get("lower_limit", known[usable].min()))
         index = distance_transform_edt(~usable, return_distances=False, return_indices=True)
         filled = np.where(usable, known, known[tuple(index)])
-        filled[flags & Flag.UNDER_RANGE > 0] = lower_limit
+        filled[measurement.data["flags"][frame].values & Flag.UNDER_RANGE > 0] = lower_limit
         return cls(filled, usable, measurement.raster)
 
     def read(self, points: Array) -> Array:

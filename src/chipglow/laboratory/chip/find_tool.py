@@ -73,8 +73,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     value, within 2 pixels and half the edge radius.
     """
     shape, raster, pitch = shape or ToolGeometry(), measurement.raster, measurement.raster.spacing
-    received = measurement.radiance
-    image = np.where(np.isfinite(received), received, 0.0).mean(axis=0)
+    image = np.nan_to_num(measurement.radiance, posinf=0.0, neginf=0.0).mean(axis=0)
     angles = shape.rake_angle + np.arange(-_SEARCH, _SEARCH + _STEP / 2, _STEP)
     start, prominence = _best_line(image, angles)
     rows = _rows_with_face(image, start)

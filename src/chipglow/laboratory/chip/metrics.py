@@ -227,9 +227,8 @@ def _feed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
     top = int(void[-1]) + 1 if void.size else 0  # of the workpiece: a curled chip may be over it
     if not 0 < top < raster.rows:
         return nan
-    if frame.material_y is not None:
-        return float(frame.material_y[top, 0]) + raster.spacing / 2
-    return float(raster.y[top]) + raster.spacing / 2
+    middle = raster.y[top] if frame.material_y is None else frame.material_y[top, 0]
+    return float(middle) + raster.spacing / 2
 
 
 def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:

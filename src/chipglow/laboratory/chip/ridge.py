@@ -61,13 +61,8 @@ class PolarGrid:
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         points = edge + radii[:, None, None] * rays
         index = raster.index(points)
-        return cls(
-            points=points,
-            index=index,
-            on_raster=raster.covers(index),
-            off_face=off_face(points, tool),
-            slopes=radii * float(angles[1] - angles[0]) / step,
-        )
+        slopes = radii * float(angles[1] - angles[0]) / step
+        return cls(points, index, raster.covers(index), off_face(points, tool), slopes)
 
     def slopes_from_face(self, values: Array) -> NDArray[np.bool_]:
         """Return where values only fall, at one radius, from the layer along the rake face on."""

@@ -115,16 +115,8 @@ def cut_history(scene: Scene) -> CutHistory | None:
     first = end_of_build_up(cutting)
     segments = segmentation(time[first:], thickness[first:], resolution(scene))
     ends = np.searchsorted(time, segments.peaks)
-    return CutHistory(
-        time,
-        cutting,
-        thrust,
-        thickness,
-        float(time[first]),
-        *_mean_and_swing(cutting, first, ends),
-        *_mean_and_swing(thrust, first, ends),
-        segments,
-    )
+    forces = *_mean_and_swing(cutting, first, ends), *_mean_and_swing(thrust, first, ends)
+    return CutHistory(time, cutting, thrust, thickness, float(time[first]), *forces, segments)
 
 
 def resolution(scene: Scene) -> float:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
 from math import degrees, isnan, nan, radians, sqrt
 from typing import Annotated, Any, Final, NamedTuple
 
@@ -460,12 +459,10 @@ def _fits(labels: Sequence[str], grid: Readings | None, band: Readings | None) -
         if common.any():
             measured = readings.measured[common]
             simulated = [item[common] for item in readings.simulated]
-            fits = map(_fit, repeat(measured), simulated)
-            columns = zip(labels, fits, _confidences(measured, simulated), strict=True)
-            rows.extend(
-                {"place": place, "simulation": label, **fit, "confidence": confidence}
-                for label, fit, confidence in columns
-            )
+            confidences = _confidences(measured, simulated)
+            for label, item, confidence in zip(labels, simulated, confidences, strict=True):
+                fit = {"simulation": label, **_fit(measured, item), "confidence": confidence}
+                rows.append({"place": place, **fit})
     return pd.DataFrame(rows)
 
 

@@ -281,15 +281,9 @@ class EmissivityLine:
         cls, name: str, feature: str, heating: Heating, mean: Estimate, standard_deviation: float
     ) -> "EmissivityLine":
         """Return the emissivity of an area at one temperature as a constant line."""
-        return cls(
-            name,
-            feature,
-            mean.linear(_CONSTANT),
-            (heating,),
-            (float(mean.values),),
-            (float(mean.standard_uncertainty),),
-            standard_deviation=standard_deviation,
-        )
+        line = mean.linear(_CONSTANT)
+        value, spread = float(mean.values), float(mean.standard_uncertainty)
+        return cls(name, feature, line, (heating,), (value,), (spread,), nan, standard_deviation)
 
     @property
     def temperatures(self) -> tuple[float, ...]:

@@ -94,15 +94,11 @@ def measurement_of(
 ) -> Measurement:
     """Convert a recording to a measurement according to its description."""
     try:
-        correction, bad_pixels = pixel_correction(description, recording)
-        calibration = description.calibration
+        corrected = pixel_correction(description, recording)
+        file, limit = description.calibration, description.lower_limit
+        calibration = None if file is None else load_calibration(file)
         return calibrate_recording(
-            recording,
-            None if calibration is None else load_calibration(calibration),
-            correction,
-            bad_pixels,
-            description.lower_limit,
-            description.position(),
+            recording, calibration, *corrected, limit, description.position()
         )
     except ValueError as error:
         raise DescriptionError(f"{name}: {error}") from error

@@ -142,17 +142,14 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     strength = np.stack([size**2 * gaussian_laplace(filled, size) for size in sizes])
     groups = [_alike(_blobs(filled, sizes, sign * strength)) for sign in (-1.0, 1.0)]
     bright = _weight(groups[0]) >= _weight(groups[1])
-    discs = _discs(filled, known, groups[0 if bright else 1], bool(bright))
+    discs = _discs(filled, known, groups[0 if bright else 1], bright)
     if len(discs) < FEWEST_DOTS:
         raise ValueError(
             f"{name}: {len(discs)} dots are found, expected a target with {FEWEST_DOTS} or more"
         )
-    return Dots(
-        np.array([(disc.column, disc.row) for disc in discs]),
-        np.array([disc.unsure for disc in discs]) * _correlation(discs),
-        float(np.median([disc.radius for disc in discs])),
-        bool(bright),
-    )
+    middles = np.array([(disc.column, disc.row) for disc in discs])
+    uncertainty = np.array([disc.unsure for disc in discs]) * _correlation(discs)
+    return Dots(middles, uncertainty, float(np.median([disc.radius for disc in discs])), bright)
 
 
 def _blobs(image: Array, sizes: Array, strength: Array) -> Array:

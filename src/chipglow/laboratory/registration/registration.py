@@ -186,9 +186,10 @@ def fit_points(
     inverse = np.linalg.inv(slope.T @ slope)
     misplaced = _misplaced(residual, slope @ inverse @ slope.T, variance, freedom)
     full, spread = frame.undone(matrix, basis @ (variance * inverse) @ basis.T)
+    residuals = residual.reshape(-1, 2) * frame.pixel_scale
     warnings = [
-        f"Point {i + 1} is {hypot(*(residual.reshape(-1, 2)[i] * frame.pixel_scale)):.3g} visible "
-        "pixels from where the others expect it."
+        f"Point {i + 1} is {hypot(*residuals[i]):.3g} visible pixels from where the others expect "
+        "it."
         for i in np.flatnonzero(misplaced)
     ]
     scatter = float(np.sqrt(variance)) * frame.pixel_scale
@@ -197,14 +198,9 @@ def fit_points(
             f"The points agree to {scatter:.1g} visible pixels, better than anyone picks them: "
             "they may be computed from each other, and the resulting uncertainty is too small."
         )
-    return PointFit(
-        Registration(full, spread, model, "points", float(freedom), Notes(warnings=warnings)),
-        residual.reshape(-1, 2) * frame.pixel_scale,
-        scatter,
-        misplaced,
-        given,
-        seen,
-    )
+    notes = Notes(warnings=warnings)
+    registration = Registration(full, spread, model, "points", float(freedom), notes)
+    return PointFit(registration, residuals, scatter, misplaced, given, seen)
 
 
 @dataclass(frozen=True)
