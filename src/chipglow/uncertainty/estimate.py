@@ -254,8 +254,7 @@ class Estimate:
         """Return the covariance of all values, flat: JCGM 100:2008, H.2.3."""
         total = np.zeros((self.values.size, self.values.size))
         for component in self.components:
-            product = component.effects @ component.effects.T
-            total += product.toarray() if sparse.issparse(product) else product
+            total = total + component.effects @ component.effects.T  # of which some are sparse
         return total
 
     def correlation(self) -> Array:
