@@ -98,7 +98,6 @@ def budget(
     progress("sensitivities", 0.0)
     values, slopes, scatter = _first_order(model, inputs, generator)
     progress("sensitivities", 1.0)
-    estimate = _estimate(inputs, values, slopes, scatter)
     freedoms = [one.degrees_of_freedom for one in inputs.inputs if one.has_slope]
 
     def sample(count: int) -> Array:
@@ -116,6 +115,7 @@ def budget(
     progress("variance", 0.0)
     indices = _indices(model, inputs, samples, generator)
     progress("variance", 1.0)
+    estimate = _estimate(inputs, values, slopes, scatter)
     return Budget(inputs, estimate, slopes, monte_carlo, indices)
 
 
@@ -161,8 +161,7 @@ def _estimate(inputs: Inputs, values: Array, slopes: Array, scatter: Array) -> E
             signed = (
                 np.array([one.standard_uncertainty for one in parts])[:, None] * slopes[numbers]
             )
-            within = inputs.correlation[np.ix_(numbers, numbers)]
-            effects = signed.T @ np.linalg.cholesky(within)
+            effects = signed.T @ np.linalg.cholesky(inputs.correlation[np.ix_(numbers, numbers)])
         freedom = min(one.degrees_of_freedom for one in parts)
         name = ", ".join(one.name for one in parts)
         components.append(
@@ -196,12 +195,11 @@ def _indices(
     results = results.reshape(2 + len(groups), samples, -1)
     first, second, *others = np.moveaxis(results - results[0].mean(axis=0), 2, 1)
     every = np.stack([first, second, *others])  # (function, output, sample)
-    found = _sobol(every)
     chosen = generator.integers(samples, size=(_RESAMPLES, samples))
     spread = np.quantile([_sobol(every[..., one]) for one in chosen], [0.025, 0.975], axis=0)
     variables = {
         name + end: (("output", "group"), one[order])
-        for end, one in (("", found), ("_low", spread[0]), ("_high", spread[1]))
+        for end, one in (("", _sobol(every)), ("_low", spread[0]), ("_high", spread[1]))
         for order, name in enumerate(("first_order", "total_order"))
     }
     return xr.Dataset(variables, coords={"group": list(groups)})

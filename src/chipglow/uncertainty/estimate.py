@@ -99,7 +99,9 @@ class Estimate:
         identity = uuid4().hex if identity is None else identity
         errors = signed.size if per_element else 1
         cause = Cause(name, identity, errors, degrees_of_freedom, pooled, (), distribution)
-        effects = _diagonal(signed) if per_element else signed[:, None]
+        effects: Any = signed[:, None]
+        if per_element:  # sparse, with those that are 0 too
+            effects = sparse.csr_array((signed, np.arange(errors), np.arange(errors + 1)))
         return replace(self, components=(*self.components, Component(cause, effects)))
 
     @classmethod
@@ -252,8 +254,7 @@ class Estimate:
         """Return the covariance of all values, flat: JCGM 100:2008, H.2.3."""
         total = np.zeros((self.values.size, self.values.size))
         for component in self.components:
-            product = component.effects @ component.effects.T
-            total += product.toarray() if sparse.issparse(product) else product
+            total = total + component.effects @ component.effects.T  # of which some are sparse
         return total
 
     def correlation(self) -> Array:
@@ -278,11 +279,6 @@ class Estimate:
         rows = np.asarray(change(np.arange(self.values.size).reshape(self.shape))).ravel()
         components = tuple(one.taken(rows) for one in self.components)
         return replace(self, values=change(self.values), components=components)
-
-    def _broadcast(self, shape: tuple[int, ...]) -> "Estimate":
-        if shape == self.shape:
-            return self
-        return self._rearranged(lambda values: np.broadcast_to(values, shape))
 
     def linear(self, matrix: Any) -> "Estimate":
         """Return linear combinations of the flat values, matrix of shape (m, values)."""
@@ -332,8 +328,7 @@ class Estimate:
         return chain(values, (one, two), (1 / two.values, -values / two.values))
 
     def __pow__(self, power: float) -> "Estimate":
-        partial = power * self.values ** (power - 1)
-        return chain(self.values**power, (self,), (partial,))
+        return chain(self.values**power, (self,), (power * self.values ** (power - 1),))
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -359,7 +354,9 @@ def chain(values: Array, inputs: Sequence[Estimate], partials: Sequence[Array]) 
     found: dict[tuple[str, str], Component] = {}
     for one, partial in zip(inputs, partials, strict=True):
         factors = np.broadcast_to(partial, shape).ravel()
-        for component in one._broadcast(shape).components:
+        if one.shape != shape:
+            one = one._rearranged(lambda values: np.broadcast_to(values, shape))
+        for component in one.components:
             cause, effects = component.cause, component.scaled(factors)
             before = found.get(cause.key)
             if before is not None:
@@ -444,11 +441,6 @@ def check_same(one: Cause, other: Cause) -> None:
             f"component {one.name}: is {one} and {other}, they must be the same errors wherever "
             "its name appears; name it otherwise, or make it independent"
         )
-
-
-def _diagonal(values: Array) -> Any:
-    """Return a sparse array with values on its diagonal, those that are 0 too."""
-    return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, int]) -> Any:

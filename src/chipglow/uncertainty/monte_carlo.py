@@ -52,8 +52,7 @@ class MonteCarlo:
         The ends must agree to a digit less than the trials are stable (8.2), and to one at least.
         """
         reach = estimate.expanded_uncertainty(self.level)
-        digits = max(self.digits - 1, 1)
-        tolerance = numerical_tolerance(estimate.standard_uncertainty, digits)
+        tolerance = numerical_tolerance(estimate.standard_uncertainty, max(self.digits - 1, 1))
         ends = (estimate.values - reach - self.low, estimate.values + reach - self.high)
         return np.asarray(np.maximum(*np.abs(ends)) <= tolerance)
 

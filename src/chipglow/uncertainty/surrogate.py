@@ -1,6 +1,6 @@
 """A surrogate of a slow model: the polynomial that predicts left-out points best."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Final
@@ -14,7 +14,7 @@ _FORMS: Final[dict[str, Callable[[Array], Array]]] = {
     "plane": lambda x: np.column_stack([np.ones(len(x)), x]),
     "squares": lambda x: np.column_stack([np.ones(len(x)), x, x**2]),
     "quadratic": lambda x: np.column_stack(
-        [np.ones(len(x)), x, x**2, *(x[:, [i]] * x[:, [j]] for i, j in _pairs(x))]
+        [np.ones(len(x)), x, x**2, *(a[:, None] * b[:, None] for a, b in combinations(x.T, 2))]
     ),
 }
 """Terms of the polynomials, shape (point, term), by points of shape (point, input)."""
@@ -59,7 +59,3 @@ class Surrogate:
     def at(self, points: Array) -> Array:
         """Return the values at points of shape (point, input)."""
         return np.asarray(_FORMS[self.form](points) @ self.coefficients)
-
-
-def _pairs(points: Array) -> Iterator[tuple[int, int]]:
-    return combinations(range(points.shape[1]), 2)

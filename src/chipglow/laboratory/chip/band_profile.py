@@ -256,13 +256,10 @@ def band_profile(
     if curve is None:
         notes.warnings.extend(_joined(temperature, measurement.times[numbers]))
     estimate = measurement.estimate(temperature, calibration)
-    known = np.isfinite(temperature)
-    by_position = np.where(known, by_position, nan)
+    by_position = np.where(np.isfinite(temperature), by_position, nan)
     estimate = estimate.with_component(POSITION, by_position, per_element=True)
     if uncertainty is not None:
-        effects = np.where(known, np.swapaxes(edge, 0, 1), nan)
-        component = uncertainty.component(tool, effects)
-        estimate = replace(estimate, components=(*estimate.components, component))
+        estimate = uncertainty.applied(tool, estimate, np.swapaxes(edge, 0, 1))
     offset = np.array([_offset(line, base) for line in found])
     return BandProfile(
         reference=base,
@@ -418,8 +415,7 @@ def _offset(line: Line | None, reference: Line) -> float:
     """Return the median distance of a band from the reference in m, positive toward the chip."""
     if line is None:
         return nan
-    away = line.points[:, None] - reference.points[None]
-    nearest = (away**2).sum(axis=-1).argmin(axis=1)
+    nearest = ((line.points[:, None] - reference.points) ** 2).sum(axis=-1).argmin(axis=1)
     beside = (nearest > 0) & (nearest < reference.distance.size - 1)
     if not beside.any():
         beside[:] = True

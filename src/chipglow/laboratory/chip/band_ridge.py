@@ -1,5 +1,6 @@
 """The shear band in a measured image: the ridge of the radiance temperature."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil
 from typing import Final
@@ -31,7 +32,6 @@ SHORTEST: Final = 15.0
 _SCALES: Final = (6e-6, 12e-6, 18e-6)
 _ALONG_THE_FACE: Final = (10.0, 30.0)
 _STRENGTH: Final = 5.0
-_TOLL: Final = 0.8
 _STEP: Final = 0.5
 _GAP: Final = 10.0
 _SEARCH: Final = 1.5
@@ -55,14 +55,13 @@ class ThermalImage:
     def of(cls, measurement: Measurement, frame: int) -> "ThermalImage":
         """Fill a frame of a measurement."""
         known = np.asarray(measurement.data["radiance_temperature"][frame].values, dtype=np.float64)
-        flags = np.asarray(measurement.data["flags"][frame].values)
         usable = np.isfinite(known)
         if not usable.any():
             raise NoShearBandError("shear band: no pixel of the frame has a radiance temperature")
         lower_limit = float(measurement.data.attrs.get("lower_limit", known[usable].min()))
         index = distance_transform_edt(~usable, return_distances=False, return_indices=True)
         filled = np.where(usable, known, known[tuple(index)])
-        filled[flags & Flag.UNDER_RANGE > 0] = lower_limit
+        filled[measurement.data["flags"][frame].values & Flag.UNDER_RANGE > 0] = lower_limit
         return cls(filled, usable, measurement.raster)
 
     def read(self, points: Array) -> Array:
@@ -93,10 +92,8 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     try:
         return _ridge(image, tool, _response(image, tool))
     except NoShearBandError:
-        try:
+        with suppress(NoShearBandError):
             return _ridge(image, tool, _response(_without_below(image, tool), tool))
-        except NoShearBandError:
-            pass
         raise
 
 
@@ -112,12 +109,11 @@ def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
 
 def _ridge(image: ThermalImage, tool: Tool, response: Array) -> Line:
     """Return the ridge of the strongest path through a response."""
-    pitch = image.raster.spacing
     points = _path(image, response, tool)
     coefficients = spline_filter(image.temperature, order=3)
     for _ in range(3):
         points = climbed(points, *_profiles(points, image, coefficients, _SEARCH))
-        points = even_steps(points, _STEP * pitch)
+        points = even_steps(points, _STEP * image.raster.spacing)
     points = _within(points, image)
     _check(points, image, coefficients)
     return Line(arc_length(points) + float(np.hypot(*(points[0] - tool.edge_point))), points)
@@ -164,13 +160,13 @@ def _path(image: ThermalImage, response: Array, tool: Tool) -> Array:
         raise NoShearBandError("shear band: no usable pixel is beside the tool")
     score = np.log1p(map_coordinates(response, polar.index, order=1) / _STRENGTH)
     if allowed[0].any():
-        i, j = polar.best_path(score, allowed, allowed, _TOLL)
+        i, j = polar.best_path(score, allowed, allowed, anywhere=False)
         points = polar.points[i, j]
         # It begins where the ridge does: near the edge the heat of the rake face may hide it.
         points = points[strongest_part(points, score[i, j], _GAP * image.raster.spacing)]
         if arc_length(points)[-1] >= SHORTEST * image.raster.spacing:
             return points
-    i, j = polar.best_path(score, allowed, allowed, _TOLL, anywhere=True)
+    i, j = polar.best_path(score, allowed, allowed, anywhere=True)
     if i.size < 2:
         raise NoShearBandError(_NO_RIDGE)
     return polar.points[i, j]
@@ -196,8 +192,7 @@ def _within(points: Array, image: ThermalImage) -> Array:
 
 
 def _check(points: Array, image: ThermalImage, coefficients: Array) -> None:
-    pitch = image.raster.spacing
-    length = float(arc_length(points)[-1]) / pitch
+    length = float(arc_length(points)[-1]) / image.raster.spacing
     if length < SHORTEST:
         raise NoShearBandError(
             f"shear band: the longest ridge of the radiance temperature is {length:.3g} pixels "

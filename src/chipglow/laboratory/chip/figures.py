@@ -59,7 +59,6 @@ def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeG
 
 
 def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
-    several = grid.times.size > 1
     mean, bars = grid.frame_mean - ZERO_CELSIUS, grid.bars
     uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
@@ -87,7 +86,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
         hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
         axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
     axes.set(xlabel="distance along the rake face / µm", ylabel="radiance temperature / °C")
-    over = f"between {grid.times.size} frames" if several else "in a square"
+    over = f"between {grid.times.size} frames" if grid.times.size > 1 else "in a square"
     bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
     axes.set_title(f"b) profiles\nbars: standard deviation {over}{bands}")
 

@@ -73,8 +73,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     value, within 2 pixels and half the edge radius.
     """
     shape, raster, pitch = shape or ToolGeometry(), measurement.raster, measurement.raster.spacing
-    received = measurement.radiance
-    image = np.where(np.isfinite(received), received, 0.0).mean(axis=0)
+    image = np.nan_to_num(measurement.radiance, posinf=0.0, neginf=0.0).mean(axis=0)
     angles = shape.rake_angle + np.arange(-_SEARCH, _SEARCH + _STEP / 2, _STEP)
     start, prominence = _best_line(image, angles)
     rows = _rows_with_face(image, start)
@@ -205,8 +204,7 @@ class _Strip:
         self.up = _up(image, rows)
         nearest = np.rint(line[0] + line[1] * self.up).astype(np.int64)
         self.middle = np.clip(nearest, _REACH, image.shape[1] - 1 - _REACH)
-        columns = self.middle[:, None] + np.arange(-_REACH, _REACH + 1)
-        self.windows = image[rows[:, None], columns]
+        self.windows = image[rows[:, None], self.middle[:, None] + np.arange(-_REACH, _REACH + 1)]
         self.level = _level(self.windows, image)
 
     def place(self, line: Array) -> Array:
@@ -216,8 +214,7 @@ class _Strip:
     def residuals(self, line: Array) -> Array:
         """Return the residuals of each row as fractions of its level, shape (rows, pixels)."""
         steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
-        residuals = _residuals(self.windows, _decays(steps, float(line[2])))
-        return residuals / self.level[:, None]
+        return _residuals(self.windows, _decays(steps, float(line[2]))) / self.level[:, None]
 
 
 def _rows_with_face(image: Array, line: Array) -> NDArray[np.int64]:
@@ -271,8 +268,7 @@ def _jackknife(image: Array, rows: NDArray[np.int64], fit: Array) -> tuple[float
 
 def _tip_row(image: Array, line: Array, rows: NDArray[np.int64]) -> tuple[float, bool]:
     """Return the row at which the radiance on the face falls to half, and whether it does."""
-    every = np.arange(image.shape[0])
-    windows = _Strip(line, image, every).windows
+    windows = _Strip(line, image, np.arange(image.shape[0])).windows
     level = windows[:, _REACH - 1 : _REACH + 2].mean(axis=-1)
     hottest = int(rows[level[rows].argmax()])
     below = np.flatnonzero(level[hottest:] < level[hottest] / 2)

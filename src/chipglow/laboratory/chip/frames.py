@@ -40,14 +40,11 @@ def ratio(part: Array, whole: ArrayLike) -> Array:
 
 def changed(estimate: Estimate, change: Callable[[Array], Array]) -> Estimate:
     """Return an estimate of which a linear change is made to the values and to every effect."""
-    components = tuple(
-        Component(
-            one.cause,
-            np.stack([change(part.reshape(estimate.shape)).ravel() for part in one.effects.T], -1),
-        )
-        for one in estimate.components
-    )
-    return Estimate(change(estimate.values), components, estimate.unevaluated)
+    components = []
+    for one in estimate.components:
+        columns = [change(part.reshape(estimate.shape)).ravel() for part in one.effects.T]
+        components.append(Component(one.cause, np.stack(columns, -1)))
+    return Estimate(change(estimate.values), tuple(components), estimate.unevaluated)
 
 
 def frame_mean(estimate: Estimate) -> Estimate:

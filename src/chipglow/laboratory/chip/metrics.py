@@ -11,6 +11,7 @@ from chipglow.laboratory.chip.segment import contact_length, shear_band
 from chipglow.laboratory.chip.segmentation import (
     Segmentation,
     cut_history,
+    mean_and_deviation,
     resolution,
     segmentation,
 )
@@ -118,6 +119,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     period = segments.period
     passing = _passing(scene, tool, frames, scan, period)
     bands = _developed_bands(scene, frames[::_FRAMES_A_BAND])
+    contact, contact_deviation = mean_and_deviation(contacts)
     measured: dict[str, Any] = {
         **{name: getattr(history, name, nan) for name in _FORCES},
         **vars(segments),
@@ -133,8 +135,8 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
         spacing_uncertainty=segments.period_uncertainty * speed,
         chip_spacing=period * passing["chip_speed"],
         feed=feed,
-        contact=float(contacts.mean()),
-        contact_standard_deviation=_deviation(contacts),
+        contact=contact,
+        contact_standard_deviation=contact_deviation,
         ratio=feed / passing["thickness"],
         band_rate=max((band.middle_rate for band in bands), default=nan),
         scan=scan,
@@ -193,8 +195,7 @@ def _passing(
 def _heights(raster: Raster, tool: Tool) -> Array:
     """Return heights on the rake face in the view, at steps of two samples."""
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
-    points = tool.rake_point(heights)
-    return heights[: max(1, int(_inside(raster, points).sum()))]
+    return heights[: max(1, int(_inside(raster, tool.rake_point(heights)).sum()))]
 
 
 def _inside(raster: Raster, points: Array) -> NDArray[np.bool_]:
@@ -226,9 +227,8 @@ def _feed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
     top = int(void[-1]) + 1 if void.size else 0  # of the workpiece: a curled chip may be over it
     if not 0 < top < raster.rows:
         return nan
-    if frame.material_y is not None:
-        return float(frame.material_y[top, 0]) + raster.spacing / 2
-    return float(raster.y[top]) + raster.spacing / 2
+    middle = raster.y[top] if frame.material_y is None else frame.material_y[top, 0]
+    return float(middle) + raster.spacing / 2
 
 
 def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
@@ -242,8 +242,7 @@ def _windows(time: Array, period: float) -> list[NDArray[np.bool_]]:
     """Return whole periods, the last at the end of the scene; without a period the scene."""
     if np.isnan(period):
         return [np.ones(time.size, dtype=np.bool_)]
-    step = (time[-1] - time[0]) / max(time.size - 1, 1)
-    end = time[-1] + step
+    end = time[-1] + (time[-1] - time[0]) / max(time.size - 1, 1)
     count = int((end - time[0]) / period + 1 - _WHOLE)
     before_end = (end - time) / period
     return [(before_end > k + 1e-9) & (before_end <= k + 1 + 1e-9) for k in range(count)]
@@ -261,8 +260,7 @@ def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
 def _angle(band: ShearBand) -> float:
     """Return the angle of the line through the middle half, over the horizontal to the left."""
     points = band.ridge.points[band.middle_half]
-    offset = points - points.mean(axis=0)
-    direction = np.linalg.svd(offset, full_matrices=False)[2][0]
+    direction = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
     return float(np.arctan2(-direction[1] * np.sign(direction[0]), abs(direction[0])))
 
 
@@ -274,10 +272,5 @@ def _median(values: Array) -> float:
 def _with_deviation(name: str, values: ArrayLike) -> dict[str, float]:
     """Return the mean of the known values and the standard deviation, by their names."""
     every = np.asarray(values, np.float64)
-    known = every[np.isfinite(every)]
-    mean = float(known.mean()) if known.size else nan
-    return {name: mean, f"{name}_standard_deviation": _deviation(every)}
-
-
-def _deviation(values: Array) -> float:
-    return float(np.std(values, ddof=1)) if values.size > 1 else nan
+    mean, _ = mean_and_deviation(every[np.isfinite(every)])
+    return {name: mean, f"{name}_standard_deviation": mean_and_deviation(every)[1]}

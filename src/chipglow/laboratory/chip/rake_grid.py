@@ -106,8 +106,7 @@ class RakeGrid:
     @property
     def bars(self) -> Array:
         """Standard deviation in K between the frames, or in the squares of a single frame."""
-        several = self.times.size > 1
-        return self.frame_standard_deviation if several else self.standard_deviation[0]
+        return self.frame_standard_deviation if self.times.size > 1 else self.standard_deviation[0]
 
     def to_frame(self) -> pd.DataFrame:
         """Return every square of every frame; one row each."""
@@ -242,8 +241,7 @@ def rake_grid(
             image = ThermalImage.of(measurement, int(numbers[index]))
             for change, displacement in zip(changes, displacements, strict=True):
                 change[index] = contribution(image, places, displacement).mean(axis=-1)
-        component = uncertainty.component(tool, np.where(np.isfinite(mean), changes, np.nan))
-        estimate = replace(estimate, components=(*estimate.components, component))
+        estimate = uncertainty.applied(tool, estimate, changes)
     return RakeGrid(
         along=along,
         depth=deep,
@@ -270,8 +268,7 @@ class _Squares:
     def __init__(self, raster: Raster, tool: Tool, size: float, whole: NDArray[np.bool_]) -> None:
         rows, columns = whole.shape
         self.whole = whole
-        middles = raster.centres.reshape(-1, 2)
-        along, across = tool.face_coordinates(middles)
+        along, across = tool.face_coordinates(raster.centres.reshape(-1, 2))
         column = np.floor(along / size + _ROUNDING).astype(np.int64)
         row = np.floor(across / size + _ROUNDING).astype(np.int64)
         inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)

@@ -15,12 +15,14 @@ from chipglow.scene import Raster, Tool
 
 _RADIUS_STEP: Final = 2e-6
 _STEPS_A_SAMPLE: Final = 3
+"""Radii are 2 µm apart, or a third of a sample that is over 6 µm wide."""
 _ANGLES: Final = 401
 _BELOW_HORIZONTAL: Final = radians(10.0)
 _STEEPEST: Final = 2.0
 _STRAIGHTNESS: Final = 0.2
 _RAKE_LAYER: Final = 25e-6
 _RAKE_LAYER_SHARE: Final = 0.4
+_TOLL: Final = 0.8
 _SMOOTHING: Final = 50e-6
 _WEAK: Final = 0.5
 _NOWHERE: Final = np.int64(-1)
@@ -42,12 +44,8 @@ class PolarGrid:
     """Whether a place lies between the outermost centres of the raster."""
     off_face: NDArray[np.bool_]
     """Whether it lies beyond the layer along the rake face, which friction shears and heats."""
-    radii: Array
-    """Distances from the edge in m."""
-    radius_step: float
-    """Step of the radii in m: 2 µm, or a third of a sample that is over 6 µm wide."""
-    angle_step: float
-    """Angle between neighbours in rad."""
+    slopes: Array
+    """Way across to the next angle over the step outward, shape (radii,)."""
 
     @classmethod
     @lru_cache(maxsize=2)
@@ -57,22 +55,14 @@ class PolarGrid:
         left, right, _, top = raster.extent
         reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
         step = max(_RADIUS_STEP, raster.spacing / _STEPS_A_SAMPLE)
-        first = max(tool.corner_radius, step)
-        radii = np.arange(first, reach + 2 * step, step)
+        radii = np.arange(max(tool.corner_radius, step), reach + 2 * step, step)
         up = np.arctan2(tool.rake_direction[1], tool.rake_direction[0])
         angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         points = edge + radii[:, None, None] * rays
         index = raster.index(points)
-        return cls(
-            points=points,
-            index=index,
-            on_raster=raster.covers(index),
-            off_face=off_face(points, tool),
-            radii=radii,
-            radius_step=step,
-            angle_step=float(angles[1] - angles[0]),
-        )
+        slopes = radii * float(angles[1] - angles[0]) / step
+        return cls(points, index, raster.covers(index), off_face(points, tool), slopes)
 
     def slopes_from_face(self, values: Array) -> NDArray[np.bool_]:
         """Return where values only fall, at one radius, from the layer along the rake face on."""
@@ -81,24 +71,18 @@ class PolarGrid:
         return ~np.logical_or.accumulate(rises, axis=1)
 
     def best_path(
-        self,
-        score: Array,
-        allowed: NDArray[np.bool_],
-        ends: NDArray[np.bool_],
-        toll: float,
-        anywhere: bool = False,
+        self, score: Array, allowed: NDArray[np.bool_], ends: NDArray[np.bool_], anywhere: bool
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Find the path of the largest sum, one angle at every radius (dynamic programming)."""
         first = self._best(score, allowed, ends, anywhere)
-        after = score - toll * float(np.median(score[first]))
+        after = score - _TOLL * float(np.median(score[first]))
         return self._best(after, allowed, ends, anywhere)
 
     def _best(
         self, score: Array, allowed: NDArray[np.bool_], ends: NDArray[np.bool_], anywhere: bool
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         total = np.where(allowed, score, -np.inf)
-        slopes = self.radii * self.angle_step / self.radius_step
-        came_from = _add_up(total, slopes, anywhere)
+        came_from = _add_up(total, self.slopes, anywhere)
         ends = ends & np.isfinite(total)
         if not ends.any():
             raise NoShearBandError("shear band: no path leads from the edge through the chip")

@@ -33,14 +33,12 @@ def contact_length(
     foot = tool.rake_point(along)
     touches = np.zeros(along.size, dtype=np.bool_)
     for height in np.arange(raster.spacing / 4, touching + step, step):
-        places = foot + height * np.array(tool.rake_normal)
-        touches |= nearest(workpiece, raster, places) == 1
+        touches |= nearest(workpiece, raster, foot + height * np.array(tool.rake_normal)) == 1
     contacts = along[touches]
     if contacts.size == 0 or contacts[0] > _LONGEST_GAP:
         return 0.0
     gaps = np.diff(contacts) > _LONGEST_GAP
-    last = int(gaps.argmax()) if gaps.any() else contacts.size - 1
-    return float(contacts[last])
+    return float(contacts[gaps.argmax() if gaps.any() else -1])
 
 
 def contact_temperatures(

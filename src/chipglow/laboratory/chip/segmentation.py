@@ -72,19 +72,20 @@ def segmentation(time: ArrayLike, thickness: ArrayLike, resolution: float) -> Se
         times[tops],
         times[bottoms],
         *_mean_and_uncertainty(np.diff(times[bottoms])),
-        *_mean_and_deviation(peaks),
-        *_mean_and_deviation(valleys),
+        *mean_and_deviation(peaks),
+        *mean_and_deviation(valleys),
         *_mean_and_uncertainty(degrees),
     )
 
 
-def _mean_and_deviation(values: Array) -> tuple[float, float]:
+def mean_and_deviation(values: Array) -> tuple[float, float]:
+    """Return the mean and the standard deviation; NaN of too few values."""
     mean = float(values.mean()) if values.size else nan
     return mean, float(values.std(ddof=1)) if values.size > 1 else nan
 
 
 def _mean_and_uncertainty(values: Array) -> tuple[float, float]:
-    mean, deviation = _mean_and_deviation(values)
+    mean, deviation = mean_and_deviation(values)
     return mean, deviation / sqrt(max(values.size, 1))
 
 
@@ -114,16 +115,8 @@ def cut_history(scene: Scene) -> CutHistory | None:
     first = end_of_build_up(cutting)
     segments = segmentation(time[first:], thickness[first:], resolution(scene))
     ends = np.searchsorted(time, segments.peaks)
-    return CutHistory(
-        time,
-        cutting,
-        thrust,
-        thickness,
-        float(time[first]),
-        *_mean_and_swing(cutting, first, ends),
-        *_mean_and_swing(thrust, first, ends),
-        segments,
-    )
+    forces = *_mean_and_swing(cutting, first, ends), *_mean_and_swing(thrust, first, ends)
+    return CutHistory(time, cutting, thrust, thickness, float(time[first]), *forces, segments)
 
 
 def resolution(scene: Scene) -> float:

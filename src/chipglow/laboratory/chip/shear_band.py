@@ -25,7 +25,6 @@ from chipglow.scene import Line, Raster, Tool, sample, straight_line
 BAND_RATE: Final = 6000.0
 """Plastic strain rate in 1/s under which the paper sees no shear band."""
 
-_TOLL: Final = 0.8
 _GAP: Final = 15e-6
 _SEARCH: Final = 15e-6
 _CLIMB_BLUR: Final = (3.0, 1.5)
@@ -131,12 +130,12 @@ def _best_path(
     ends[:-1] = allowed[:-1] & outside[1:]
     score = np.log1p(np.maximum(values, 0.0) / BAND_RATE)
     score[polar.slopes_from_face(score)] = 0.0
-    i, j = polar.best_path(score, allowed, ends, _TOLL, anywhere=True)
+    i, j = polar.best_path(score, allowed, ends, anywhere=True)
     first = i[strongest_part(polar.points[i, j], score[i, j], _GAP).start]
     if first > i[0]:
         # The path leads from one band to another: the band is the best path beyond the gap.
-        beyond = allowed & (np.arange(polar.radii.size) >= first)[:, None]
-        i, j = polar.best_path(score, beyond, ends, _TOLL, anywhere=True)
+        beyond = allowed & (np.arange(len(allowed)) >= first)[:, None]
+        i, j = polar.best_path(score, beyond, ends, anywhere=True)
     largest = values[i, j].max()
     if not largest >= BAND_RATE:
         raise NoShearBandError(
@@ -172,5 +171,4 @@ def _half_crossing(values: Array, offsets: Array) -> Array:
     drop = upper - lower
     fraction = np.divide(upper - half[:, 0], drop, out=np.zeros_like(drop), where=drop > 0)
     crossing = offsets[first - 1] + fraction * (offsets[first] - offsets[first - 1])
-    found = below.any(axis=1) & (values[:, 0] > 0)
-    return np.where(found, crossing, np.nan)
+    return np.where(below.any(axis=1) & (values[:, 0] > 0), crossing, np.nan)

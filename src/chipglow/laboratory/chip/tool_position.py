@@ -1,8 +1,7 @@
 """Uncertainty of the position of a tool, and of readings relative to it."""
 
 import hashlib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
 import numpy as np
@@ -12,7 +11,7 @@ from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import ANGLE, LENGTH, POSITION
 from chipglow.scene import Tool
-from chipglow.uncertainty import Cause, Component
+from chipglow.uncertainty import Cause, Component, Estimate
 
 TOOL: Final = "tool"
 """Name of the component of uncertainty that the place of a tool makes."""
@@ -60,11 +59,16 @@ class ToolUncertainty(Part):
         moves = (self.along * direction, self.across * normal, self.angle * turned)
         return np.stack([np.broadcast_to(move, points.shape) for move in moves])
 
-    def component(self, tool: Tool, effects: Iterable[Array]) -> Component:
-        """Return the component ``tool`` with the effects of each standard uncertainty."""
-        columns = np.stack([one.ravel() for one in effects], axis=1)
+    def applied(self, tool: Tool, estimate: Estimate, effects: Array) -> Estimate:
+        """Return the estimate with the component ``tool``, by each standard uncertainty's effects.
+
+        `effects` has the shape (3, ...); where a value is not known, they are not either.
+        """
+        known = np.where(np.isfinite(estimate.values), effects, np.nan)
         identity = hashlib.sha256(repr((tool, self)).encode()).hexdigest()[:16]
-        return Component(Cause(TOOL, identity, len(TOOL_BUDGET), parts=TOOL_BUDGET), columns)
+        cause = Cause(TOOL, identity, len(TOOL_BUDGET), parts=TOOL_BUDGET)
+        own = Component(cause, known.reshape(len(TOOL_BUDGET), -1).T.copy())
+        return replace(estimate, components=(*estimate.components, own))
 
 
 def contribution(image: ThermalImage, points: Array, displacement: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import repeat
 from math import degrees, isnan, nan, radians, sqrt
 from typing import Annotated, Any, Final, NamedTuple
 
@@ -396,10 +395,8 @@ def _laid_by_the_edge(
         image = _image(measured, frame)
         if image is not None:
             found[:, frame] = [contribution(image, points, move) for move in moves]
-    found[:, np.isnan(profile.temperature)] = np.nan
-    alone = profile.estimate.without(TOOL)
-    components = (*alone.components, uncertainty.component(tool, found))
-    return replace(profile, estimate=replace(alone, components=components))
+    estimate = uncertainty.applied(tool, profile.estimate.without(TOOL), found)
+    return replace(profile, estimate=estimate)
 
 
 def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Estimate:
@@ -462,12 +459,10 @@ def _fits(labels: Sequence[str], grid: Readings | None, band: Readings | None) -
         if common.any():
             measured = readings.measured[common]
             simulated = [item[common] for item in readings.simulated]
-            fits = map(_fit, repeat(measured), simulated)
-            columns = zip(labels, fits, _confidences(measured, simulated), strict=True)
-            rows.extend(
-                {"place": place, "simulation": label, **fit, "confidence": confidence}
-                for label, fit, confidence in columns
-            )
+            confidences = _confidences(measured, simulated)
+            for label, item, confidence in zip(labels, simulated, confidences, strict=True):
+                fit = {"simulation": label, **_fit(measured, item), "confidence": confidence}
+                rows.append({"place": place, **fit})
     return pd.DataFrame(rows)
 
 

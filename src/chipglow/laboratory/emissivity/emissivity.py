@@ -3,26 +3,25 @@
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial, reduce
 from math import hypot, inf, isfinite, nan, sqrt
 from typing import Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
     UsedPixels,
-    area_estimate,
     calibration_uncertainty,
     check_same_pixels,
-    drift_effect,
     observed_flags,
     observed_radiance,
     used_pixels,
     with_drift,
+    with_observed,
 )
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.quantities.units import KELVINS, TEMPERATURE_DIFFERENCE
@@ -92,6 +91,12 @@ class Heating(Part):
                 f"{spread:.3g} K or more"
             )
 
+    def estimate(self, name: str) -> Estimate:
+        """Return ``reference`` or ``reflected`` in K; its error is one for all images."""
+        exact = Estimate(np.array(getattr(self, name)))
+        spread = getattr(self, f"{name}_uncertainty")
+        return exact.with_component(name, spread, identity=ALL_IMAGES)
+
 
 @dataclass(frozen=True, eq=False)
 class EmissivityMap:
@@ -142,10 +147,9 @@ class EmissivityMap:
         count = len(self.radiance)
         if count == 1:
             return found.with_unevaluated("noise")
-        noise = self.radiance.std(axis=0, ddof=1) / sqrt(count) / self._contrast
         return found.with_component(
             "noise",
-            noise,
+            self.radiance.std(axis=0, ddof=1) / sqrt(count) / self._contrast,
             per_element=True,
             identity=self.identity,
             degrees_of_freedom=count - 1.0,
@@ -160,13 +164,9 @@ class EmissivityMap:
         calibration = None if self.calibration is None else self.calibration[used.mask].mean()
         pixels = values.mean(axis=0)
         mean = float(pixels.mean())
-        random = area_estimate(mean, values, f"{self.identity} {area.name}")
-        repeatability = float(random.contribution("repeatability"))
-        drift = drift_effect(
-            self.heating.drift, mean_radiance / self._contrast, self.recordings, repeatability
-        )
-        estimate = self._systematic(np.array(mean), mean_radiance, calibration)
-        estimate = with_drift(estimate, drift, self.identity) + (random - mean)
+        known = self._systematic(np.array(mean), mean_radiance, calibration)
+        by_drift, of = mean_radiance / self._contrast, f"{self.identity} {area.name}"
+        estimate = with_observed(known, values, self.heating.drift, by_drift, self.recordings, of)
         outside = (int((pixels < 0).sum()), int((pixels > 1).sum()))
         return RegionEmissivity(
             name=area.name,
@@ -202,19 +202,8 @@ class EmissivityMap:
 
     def _systematic(self, values: Array, radiance: Any, calibration: Any) -> Estimate:
         """Return emissivities with the components of `COMMON`."""
-
-        def found(reference: Any, reflected: Any) -> Any:
-            hot, cold = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
-            return (radiance - cold) / (hot - cold)
-
-        heating = self.heating
-        ends = [
-            Estimate(np.array(getattr(heating, name))).with_component(
-                name, getattr(heating, f"{name}_uncertainty"), identity=ALL_IMAGES
-            )
-            for name in ("reference", "reflected")
-        ]
-        known = propagate(found, *ends)
+        ends = [self.heating.estimate(name) for name in ("reference", "reflected")]
+        known = propagate(partial(_solved, radiance, self.band), *ends)
         effect = 0.0 if calibration is None else calibration / self._contrast
         known = known.with_component("calibration", effect, identity=ALL_IMAGES)
         return replace(known, values=values)
@@ -292,15 +281,9 @@ class EmissivityLine:
         cls, name: str, feature: str, heating: Heating, mean: Estimate, standard_deviation: float
     ) -> "EmissivityLine":
         """Return the emissivity of an area at one temperature as a constant line."""
-        return cls(
-            name,
-            feature,
-            mean.linear(_CONSTANT),
-            (heating,),
-            (float(mean.values),),
-            (float(mean.standard_uncertainty),),
-            standard_deviation=standard_deviation,
-        )
+        line = mean.linear(_CONSTANT)
+        value, spread = float(mean.values), float(mean.standard_uncertainty)
+        return cls(name, feature, line, (heating,), (value,), (spread,), nan, standard_deviation)
 
     @property
     def temperatures(self) -> tuple[float, ...]:
@@ -338,7 +321,11 @@ def _design(temperatures: Sequence[float]) -> Array:
 
 def emissivity_of_radiance(radiance: Array, heating: Heating, band: Band) -> Array:
     """Compute the emissivity from W/(m² sr): Equation 2 of Heigel and Whitenton (2010), solved."""
-    hot, cold = band.radiance(np.array([heating.reference, heating.reflected]))
+    return _solved(radiance, band, heating.reference, heating.reflected)
+
+
+def _solved(radiance: Array, band: Band, reference: ArrayLike, reflected: ArrayLike) -> Array:
+    hot, cold = (band.radiance(np.asarray(one)) for one in (reference, reflected))
     return np.asarray((radiance - cold) / (hot - cold), np.float64)
 
 
@@ -405,7 +392,8 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     line = solve @ means
     freedom = means.size - 2
     residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
-    random = np.array([_without_common(one).standard_uncertainty for one in estimates])
+    own = [reduce(Estimate.without, COMMON, one) for one in estimates]
+    random = np.array([one.standard_uncertainty for one in own])
     if isfinite(residual):
         random = np.maximum(random, residual)
     identity = " ".join(
@@ -431,11 +419,6 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
         residual=residual,
         standard_deviation=float(np.mean([area.standard_deviation for area in areas])),
     )
-
-
-def _without_common(estimate: Estimate) -> Estimate:
-    own = tuple(one for one in estimate.components if one.cause.name not in COMMON)
-    return replace(estimate, components=own)
 
 
 def _floor(measurement: Measurement) -> float:

@@ -35,8 +35,7 @@ def draw_emissivity(
     )
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
     with drawing.style():
-        total = height + (_LINES if lines else 0.0)
-        figure = drawing.new_figure(total)
+        figure = drawing.new_figure(height + (_LINES if lines else 0.0))
         parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
         for axes, panel in zip(parts[0].subplots(1, 2, sharey=True), panels, strict=True):
             panel.draw(parts[0], axes, raster)

@@ -64,19 +64,14 @@ def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) ->
     image, table = ("reference", "y", "x"), ("reference", "region")
     shape, kelvins = (len(maps), -1), {"units": "K"}
     names = np.array([row.name for row in found.rows[0]], dtype=object)
+    covariances = [emissivity_covariance(of) for of in found.rows]
     data = xr.Dataset(
         {
-            "emissivity": (image, np.stack([one.emissivity for one in maps])),
-            "standard_uncertainty": (
-                image,
-                np.stack([one.estimate.standard_uncertainty for one in maps]),
-            ),
-            "flags": (image, np.stack([one.flags for one in maps])),
+            "emissivity": (image, [one.emissivity for one in maps]),
+            "standard_uncertainty": (image, [one.estimate.standard_uncertainty for one in maps]),
+            "flags": (image, [one.flags for one in maps]),
             **{f"region_{name}": (table, of.reshape(shape)) for name, of in columns.items()},
-            "region_covariance": (
-                (*table, "other_region"),
-                np.stack([emissivity_covariance(of) for of in found.rows]),
-            ),
+            "region_covariance": ((*table, "other_region"), covariances),
             **{
                 name: ("reference", [getattr(one.heating, name) for one in maps], kelvins)
                 for name in _HEATING
@@ -255,8 +250,7 @@ class MeasuredEmissivity(SurfaceFile):
             raise ValueError(
                 f"region: {self.region!r} is not in {self.file}, expected one of {', '.join(areas)}"
             )
-        trend = emissivity_trend(areas[self.region])
-        return TrendSurface(trend, origin=read_origin(self.file))
+        return TrendSurface(emissivity_trend(areas[self.region]), origin=read_origin(self.file))
 
 
 def surface_text(result: RegionEmissivities) -> str:

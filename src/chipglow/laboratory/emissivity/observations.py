@@ -100,14 +100,23 @@ def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPi
     return UsedPixels(area.name, usable, count, total - count, flagged)
 
 
-def drift_effect(
-    drift: float | None, effect: float, recordings: int, repeatability: float
-) -> float | None:
-    """Return the uncertainty by drift beyond the repeatability, by the effect of a drift of 1."""
-    if recordings == 1:
-        return None if drift is None else drift * effect
-    stated = (drift or 0.0) * effect / sqrt(recordings)
-    return sqrt(max(stated**2 - repeatability**2, 0.0))
+def with_observed(
+    known: Estimate, values: Array, drift: float | None, by_drift: float, recordings: int, of: str
+) -> Estimate:
+    """Add the random errors of an area's observations, and the drift beyond their repeatability.
+
+    `by_drift` is the effect of a relative drift of 1; `of` identifies the observations and, after
+    a space, their area.
+    """
+    mean = float(known.values)
+    random = area_estimate(mean, values, of)
+    if recordings > 1:
+        repeatability = float(random.contribution("repeatability"))
+        stated = (drift or 0.0) * by_drift / sqrt(recordings)
+        change: float | None = sqrt(max(stated**2 - repeatability**2, 0.0))
+    else:
+        change = None if drift is None else drift * by_drift
+    return with_drift(known, change, of.partition(" ")[0]) + (random - mean)
 
 
 def with_drift(estimate: Estimate, effect: Any, identity: str | None = None) -> Estimate:

@@ -66,17 +66,14 @@ def determine_emissivities(
     maps = tuple(determine_emissivity(group, heating) for heating, group in groups.items())
     found = areas(regions, maps[0].raster)
     rows = tuple(tuple(one.of(area) for area in found) for one in maps)
-    lines = (
-        [emissivity_line([row.line for row in of]) for of in zip(*rows, strict=True)]
-        if len(maps) > 1
-        else ()
-    )
+    by_area = zip(*rows, strict=True) if len(maps) > 1 else ()
+    lines = tuple(emissivity_line([row.line for row in of]) for of in by_area)
     notes = _notes(maps, rows)
     notes.assumed.extend(
         f"{one} and {other} share {count} pixels, which count in both."
         for (one, other), count in shared_pixels(regions, maps[0].raster).items()
     )
-    return RegionEmissivities(maps, rows, tuple(lines), notes, metal)
+    return RegionEmissivities(maps, rows, lines, notes, metal)
 
 
 def _row(row: RegionEmissivity) -> Mapping[str, float | str]:

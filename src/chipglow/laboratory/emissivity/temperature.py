@@ -13,20 +13,18 @@ import scipy
 from numpy.typing import ArrayLike
 
 from chipglow.camera import FittedCalibration, Measurement
-from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine
+from chipglow.laboratory.emissivity.emissivity import COMMON, LABORATORY, EmissivityLine
 from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
     UsedPixels,
-    area_estimate,
     calibration_uncertainty,
     check_same_pixels,
-    drift_effect,
     observed_flags,
     observed_radiance,
     uncertainty_columns,
     used_pixels,
-    with_drift,
+    with_observed,
 )
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.units import HOTTEST
@@ -35,10 +33,7 @@ from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, MonteCarlo, monte_carlo, propagate
 
-TEMPERATURE_BUDGET: Final = (
-    *("reference", "reflected", "calibration", "emissivity"),
-    *("drift", "repeatability", "noise"),
-)
+TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", "repeatability", "noise")
 """Lines of the budget of a true temperature."""
 
 FAR: Final = 50.0
@@ -140,8 +135,10 @@ def true_temperature(
     used = used_pixels(area, radiance.mean(axis=0), observed_flags(measurements))
     values = radiance[:, used.mask]
     mean = float(values.mean())
-    reflecting = _surroundings(emissivity) if surroundings is None else surroundings
-    room = float(reflecting.values)
+    if surroundings is None:
+        seen = emissivity.heatings
+        surroundings = seen[0].estimate("reflected") if seen else reflected_temperature()
+    room = float(surroundings.values)
     if not mean > float(band.radiance(np.array(room))):
         raise ValueError(
             f"region {area.name}: is darker than its reflection at {room - ZERO_CELSIUS:.6g} °C, "
@@ -158,7 +155,7 @@ def true_temperature(
     inputs = (
         value.renamed(RANDOM, "emissivity"),
         _mean_radiance(values, error, shared, drift, len(measurements)),
-        reflecting,
+        surroundings,
     )
     estimate = propagate(
         lambda _, seen, __: temperature(seen),
@@ -298,18 +295,14 @@ def _assumptions(
     unknown_drift: bool,
     stated_calibration: bool,
 ) -> list[str]:
-    def plays_a_part(cause: str) -> bool:
-        return any(row.estimate.contribution(cause) for row in rows)
-
+    exact = not any(row.estimate.contribution("emissivity") for row in rows)
     known = not any(line.heatings for line in lines)
     straight = any(len(line.heatings) > 1 for line in lines)
     texts = {
         "Every region is of uniform temperature and emissivity.": True,
         "The emissivity is a straight line over the temperature.": straight,
         "The emissivity is the same at all temperatures.": not straight and not known,
-        "The emissivity is exact (emissivity_uncertainty).": (
-            known and not plays_a_part("emissivity")
-        ),
+        "The emissivity is exact (emissivity_uncertainty).": known and exact,
         "The object reflects 293 K exactly (reflected, reflected_uncertainty).": (
             known and same_surroundings
         ),
@@ -336,13 +329,10 @@ def _mean_radiance(
 ) -> Estimate:
     """Return the mean radiance; `shared`: correlation of calibration errors with emissivity."""
     mean = float(values.mean())
-    random = area_estimate(mean, values, uuid4().hex)
-    repeatability = float(random.contribution("repeatability"))
     found, own = Estimate(np.array(mean)), sqrt(max(1 - shared**2, 0.0))
     for identity, part in ((ALL_IMAGES, shared), ("measurement", own)):
         found = found.with_component("calibration", part * calibration, identity=identity)
-    found = with_drift(found, drift_effect(drift, mean, recordings, repeatability))
-    return found + (random - mean)
+    return with_observed(found, values, drift, mean, recordings, uuid4().hex)
 
 
 def _temperature(emissivity: ArrayLike, reflected: ArrayLike, band: Band, radiance: Array) -> Array:
@@ -404,16 +394,6 @@ def _emissivity_of_area(
     return line.at(scipy.optimize.brentq(excess, *ends, xtol=1e-6))
 
 
-def _surroundings(emissivity: EmissivityLine) -> Estimate:
-    """Return the reflected temperature in K, with the same error as in the emissivity."""
-    if not emissivity.heatings:
-        return reflected_temperature()
-    heating = emissivity.heatings[0]
-    return Estimate(np.array(heating.reflected)).with_component(
-        "reflected", heating.reflected_uncertainty, identity=ALL_IMAGES
-    )
-
-
 def _correlation(
     line: EmissivityLine,
     temperature: float,
@@ -429,5 +409,4 @@ def _correlation(
         hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
         then = cold + emissivity * (hot - cold)
         correlations.append(calibration.errors.estimate([then, radiance]).correlation()[0, 1])
-    weighted = line.weights(temperature) @ np.nan_to_num(correlations)
-    return float(np.clip(weighted, -1.0, 1.0))
+    return float(np.clip(line.weights(temperature) @ np.nan_to_num(correlations), -1.0, 1.0))

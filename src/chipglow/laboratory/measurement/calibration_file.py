@@ -77,7 +77,6 @@ class CalibrationDescription(Part):
         """Return the description of a fit."""
         calibration = fit.calibration
         band, response = calibration.band, calibration.band.response
-        values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
         kelvins, residuals = fit.temperatures, fit.residuals_temperature
         points = np.stack([kelvins - ZERO_CELSIUS, fit.counts, fit.residuals, residuals], axis=1)
         rounded: Any = [[float(f"{one:.9g}") for one in row] for row in points.tolist()]
@@ -90,7 +89,7 @@ class CalibrationDescription(Part):
             highest=calibration.highest,
             integration_time=calibration.integration_time,
             range=calibration.range_name,
-            parameters=dict(values),
+            parameters=dict(zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)),
             covariance=tuple(map(tuple, calibration.covariance.tolist())),
             warnings=calibration.warnings,
             points=tuple(map(tuple, rounded)),
@@ -139,9 +138,8 @@ def load_calibration(path: str | Path) -> FittedCalibration:
 
 def write_calibration(fit: CalibrationFit[FittedCalibration], path: str | Path) -> None:
     """Write a calibration to a YAML file for `load_calibration`."""
-    text = calibration_text(CalibrationDescription.of(fit))
     with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(calibration_text(CalibrationDescription.of(fit)), encoding="utf-8")
 
 
 def calibration_text(description: CalibrationDescription) -> str:

@@ -1,6 +1,6 @@
 """Measurements as the laboratory's commands take them."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,6 +21,7 @@ from chipglow.io import is_measurement, is_scene, read_measurement
 from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
 from chipglow.io.cameras.stacks import MissingError
+from chipglow.io.column_file import read_bad_pixels
 from chipglow.laboratory.measurement.calibration_file import load_calibration
 from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
 from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
@@ -75,10 +76,10 @@ def load_recording(description: MeasurementDescription) -> Recording:
         raise DescriptionError("; ".join(missing)) from None
 
 
-def _read(description: MeasurementDescription, file: str, every: bool = False) -> Recording:
+def _read(description: MeasurementDescription, file: str) -> Recording:
     return read_recording(
         file,
-        None if every else description.chosen_frames(),
+        description.chosen_frames(),
         description.format,
         quantity=description.quantity,
         unit=description.unit,
@@ -93,15 +94,11 @@ def measurement_of(
 ) -> Measurement:
     """Convert a recording to a measurement according to its description."""
     try:
-        correction, bad_pixels = pixel_correction(description, recording)
-        calibration = description.calibration
+        corrected = pixel_correction(description, recording)
+        file, limit = description.calibration, description.lower_limit
+        calibration = None if file is None else load_calibration(file)
         return calibrate_recording(
-            recording,
-            None if calibration is None else load_calibration(calibration),
-            correction,
-            bad_pixels,
-            description.lower_limit,
-            description.position(),
+            recording, calibration, *corrected, limit, description.position()
         )
     except ValueError as error:
         raise DescriptionError(f"{name}: {error}") from error
@@ -156,21 +153,20 @@ def pixel_correction(
     description: MeasurementDescription, recording: Recording, read: "FlatFieldReader | None" = None
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
     """Return the pixel correction and the bad pixels that a description defines."""
-    section, finds = description.flat_field, description.bad_pixels == "find"
+    section, table = description.flat_field, description.bad_pixels
     rows, columns = recording.signal.shape[1:]
-    bad = None if finds else description.listed_bad_pixels((rows, columns))
+    bad = None if table in (None, "find") else read_bad_pixels(str(table), (rows, columns))
     if section.low is None:
-        if section.high is not None or finds:
+        if section.high is not None or table == "find":
             raise ValueError("flat_field.low: is missing, expected frames of a flat-field source")
         return None, bad
     # The correction does not depend on the file and frames that are corrected.
     fields = (read or read_flat_fields)(replace(description, file=None, frames=None))
     for name, frames in (("high", fields.high), ("low", fields.low)):
-        problem = None if frames is None else _unsuitable(frames, recording)
-        if problem is not None:
+        for problem in () if frames is None else _problems(frames, recording):
             raise ValueError(f"flat_field.{name}: {problem}")
     correction = fields.correction if section.correct else None
-    return correction, fields.bad_pixels.mask if finds else bad
+    return correction, fields.bad_pixels.mask if table == "find" else bad
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,21 +207,20 @@ def _uniform(description: MeasurementDescription, file: str) -> Recording:
     if camera_formats()[find_format(Path(file))].states_quantity:
         # This file states the settings that a description gives for a recording.
         return read_recording(file)
-    return _read(description, file, every=True)
+    return _read(description, file)
 
 
-def _unsuitable(uniform: Recording, recording: Recording) -> str | None:
-    """Return the reason why frames of a flat-field source are of no use for a recording."""
+def _problems(uniform: Recording, recording: Recording) -> Iterator[str]:
+    """Yield the reasons why frames of a flat-field source are of no use for a recording."""
     if uniform.quantity != recording.quantity:
-        return f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
+        yield f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
     theirs, ours = uniform.integration_time, recording.integration_time
     if theirs is not None and ours is not None and not np.isclose(theirs, ours, rtol=0.01):
-        return (
+        yield (
             f"has an integration time of {1e6 * theirs:g} us, the recording {1e6 * ours:g} us, "
             "they must be the same"
         )
     if recording.saturation is not None:
         fraction = float(np.mean(uniform.signal > recording.saturation))
         if fraction > _MOST_SATURATED:
-            return f"{fraction:.0%} of it is saturated, expected a darker flat-field source"
-    return None
+            yield f"{fraction:.0%} of it is saturated, expected a darker flat-field source"

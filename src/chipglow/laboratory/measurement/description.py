@@ -6,12 +6,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, ValidationInfo
 
 from chipglow.camera import Recording
-from chipglow.io.column_file import read_bad_pixels, read_response
+from chipglow.io.column_file import read_response
 from chipglow.laboratory.measurement.radiometric_calibration import ImagePosition, Mirror, Pixels
 from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
 from chipglow.quantities.units import LENGTH, TEMPERATURE, TIME, WAVELENGTHS
@@ -219,12 +217,6 @@ class MeasurementDescription(Part):
         }
         said = {name: value for name, value in said.items() if value is not None}
         return replace(recording, **said)
-
-    def listed_bad_pixels(self, shape: tuple[int, int]) -> NDArray[np.bool_] | None:
-        """Return the bad pixels of the table for an image of this shape; None without a table."""
-        if self.bad_pixels in (None, "find"):
-            return None
-        return read_bad_pixels(Path(str(self.bad_pixels)), shape)
 
 
 def load_description(source: str | Path, settings: Iterable[str] = ()) -> MeasurementDescription:

@@ -34,8 +34,7 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
     index = shown_frame(measurement.times, time, "measurement")
     celsius = measurement.radiance_temperature()[index] - ZERO_CELSIUS
     flags, raster = measurement.flags[index], measurement.raster
-    least, most = _IMAGE_HEIGHTS
-    height = min(max(5.6 * raster.rows / raster.columns, least), most)
+    height = float(np.clip(5.6 * raster.rows / raster.columns, *_IMAGE_HEIGHTS))
     with drawing.style():
         figure = drawing.new_figure(height + _HISTOGRAM + 0.9)
         upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM))

@@ -108,15 +108,11 @@ def calibrate_recording(
     radiance, flags = (position.place(np.concatenate(some)) for some in zip(*parts, strict=True))
     if calibration is not None:
         lower_limit = max(lower_limit or 0.0, calibration.lowest) or None
+    raster = position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch)
+    errors = None if calibration is None else calibration.errors
+    attributes = _attributes(recording, calibration, position)
     return Measurement.from_radiance(
-        radiance,
-        band,
-        recording.times,
-        position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch),
-        lower_limit,
-        flags,
-        None if calibration is None else calibration.errors,
-        _attributes(recording, calibration, position),
+        radiance, band, recording.times, raster, lower_limit, flags, errors, attributes
     )
 
 

@@ -1,5 +1,6 @@
 """Images of edges, and which of their pixels can be used."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import sqrt
@@ -88,16 +89,10 @@ def edge_image(
         If the region is not within the image.
     """
     attributes = measurement.data.attrs
-    image = _mean_image(
-        measurement.radiance,
-        measurement.flags,
-        measurement.raster,
-        name,
-        region,
-        attributes.get("fill_factor"),
-        measurement.band if "band_lower" in attributes else None,
-        measurement.notes,
-    )
+    frames = measurement.radiance, measurement.flags, measurement.raster
+    band = measurement.band if "band_lower" in attributes else None
+    optics = attributes.get("fill_factor"), band
+    image = _mean_image(*frames, name, region, *optics, measurement.notes)
     assumed, below = image.notes.assumed, image.below
     if attributes.get("psf_order") == "detector":
         assumed.append(
@@ -187,7 +182,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
         line, bend = find_edge(seen, image.x - image.x.mean(), image.y - image.y.mean())
         pixels = _pixels_of(image, line)
         quick = _quick_fit(pixels)
-        warnings = _bent(bend, image)
+        warnings = list(_bent(bend, image))
         limits, clipped = _limits(image, line.distance(*image.places))
         warnings += clipped
         if clipped:
@@ -295,8 +290,7 @@ def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, 
     """Return the pixels without those that lie far from all others as near to the edge."""
     left = pixels.radiance - quick.predicted(0, pixels)
     spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-    limit = max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
-    kept = np.abs(left) <= limit
+    kept = np.abs(left) <= max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
     lost = int(np.count_nonzero(~kept))
     # More than a few are not dead pixels but an object that is not an edge.
     if lost == 0 or lost > 0.01 * kept.size:
@@ -326,13 +320,11 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
         )
 
 
-def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> list[str]:
+def _bent(bend: tuple[float, float] | None, image: EdgeImage) -> Iterator[str]:
     if bend is None:
-        return ["The edge was found by its step only; its straightness could not be checked."]
-    bent, unsure = bend
-    if bent < 4 * unsure or bent < 0.05 * image.pitch:
-        return []
-    return [
-        f"The edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
-        f"{unsure * 1e6:.1g} um), which makes the point spread function too wide."
-    ]
+        yield "The edge was found by its step only; its straightness could not be checked."
+    elif bend[0] >= max(4 * bend[1], 0.05 * image.pitch):
+        yield (
+            f"The edge is bent by {bend[0] * 1e6:.2g} um over its length (standard uncertainty "
+            f"{bend[1] * 1e6:.1g} um), which makes the point spread function too wide."
+        )

@@ -100,7 +100,6 @@ def _refined(
     pitch = abs(float(along[1] - along[0]))
     middles = (along[:-1] + along[1:]) / 2
     derivative = np.diff(rows, axis=1)
-    bend = None
     for _ in range(_ROUNDS):
         a, b = cos(line.normal), sin(line.normal)
         here, there = (b, a) if steep else (a, b)
@@ -111,8 +110,10 @@ def _refined(
             return line, None
         slope, start = np.polyfit(place[kept], centre[kept], 1)
         line = _line_of(float(slope), float(start), steep, line)
-        bend = _sagitta(place[kept], centre[kept])
-    return line, bend
+    # A parabola through the centroids deviates from its chord.
+    unit = (place[kept] - place[kept].mean()) / (np.ptp(place[kept]) / 2)
+    (bend, *_), covariance = np.polyfit(unit, centre[kept], 2, cov=True)
+    return line, (abs(float(bend)), float(covariance[0, 0]) ** 0.5)
 
 
 def _centroids(
@@ -149,14 +150,3 @@ def _line_of(slope: float, start: float, steep: bool, before: EdgeLine) -> EdgeL
     normal = (-slope / length, 1 / length) if steep else (1 / length, -slope / length)
     sign = 1.0 if normal[0] * cos(before.normal) + normal[1] * sin(before.normal) > 0 else -1.0
     return EdgeLine(atan2(sign * normal[1], sign * normal[0]), sign * start / length)
-
-
-def _sagitta(place: Array, centre: Array) -> tuple[float, float]:
-    """Return the deviation of a parabola from its chord, and its standard uncertainty."""
-    unit = (place - place.mean()) / (np.ptp(place) / 2)
-    design = np.vander(unit, 3)
-    solution, *_ = np.linalg.lstsq(design, centre, rcond=None)
-    left = centre - design @ solution
-    variance = float(left @ left) / (place.size - 3)
-    inverse = np.linalg.inv(design.T @ design)
-    return abs(float(solution[0])), float(variance * inverse[0, 0]) ** 0.5

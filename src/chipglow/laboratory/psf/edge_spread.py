@@ -73,8 +73,7 @@ def _transfer(
     frequency = np.linspace(0.0, 1 / pixels.pitch, _FREQUENCIES)
     optics = fit.model.transfer(fit.values, frequency, edge.line.normal)
     model = optics * footprint_transfer(frequency, edge.line.normal, pixels.footprint)
-    window = max(_WINDOW_PITCHES * pixels.pitch, _WINDOW_WIDTHS * fit.fwhm)
-    near = np.abs(distance) < window
+    near = np.abs(distance) < max(_WINDOW_PITCHES * pixels.pitch, _WINDOW_WIDTHS * fit.fwhm)
     phase = np.exp(-2j * np.pi * frequency[:, None] * distance[near])
     weight = 2j * np.pi * frequency[:, None] * phase * width
     weight /= np.sinc(frequency * width)[:, None]

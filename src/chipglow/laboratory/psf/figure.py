@@ -106,8 +106,7 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.plot(frequency, mtf, color=GREY, label="measured, 2 u")
     axes.plot(frequency, model, color=VERMILLION, label="fit: optics and pixel")
     axes.plot(frequency, optics, color=BLUE, linestyle="--", label="fit: optics alone")
-    nyquist = 0.5e-3 / edge.image.pitch
-    axes.axvline(nyquist, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
+    axes.axvline(0.5e-3 / edge.image.pitch, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
     axes.set_ylim(-0.05, 1.05)
     axes.set(title="modulation transfer function", xlabel="frequency / (1/mm)")
     # The curves go from one corner to the other: beside them there is no place for it.

@@ -43,8 +43,7 @@ def load_edge(
         calibration = load_calibration(described.calibration)
         recording = replace(recording, band=recording.band or calibration.band)
     try:
-        corrected = pixel_correction(described, recording)
-        signal, flags = repaired_signal(recording, *corrected)
+        signal, flags = repaired_signal(recording, *pixel_correction(described, recording))
         return counts_image(recording, signal, flags, name, region)
     except ValueError as error:
         raise DescriptionError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error

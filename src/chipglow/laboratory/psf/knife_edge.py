@@ -5,7 +5,7 @@ with the point spread function; temperature, a bent function of it, is not.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import cosh, degrees, exp, hypot, log, sqrt
 from typing import Final
@@ -162,11 +162,10 @@ class KnifeEdge:
 
     def fit(self, name: str) -> ModelFit:
         """Return the fit of a model by its name."""
-        for fit in self.fits:
-            if fit.model.name == name:
-                return fit
-        known = ", ".join(fit.model.name for fit in self.fits)
-        raise ValueError(f"model: {name!r} was not fitted, expected one of {known}")
+        fits = {fit.model.name: fit for fit in self.fits}
+        if name not in fits:
+            raise ValueError(f"model: {name!r} was not fitted, expected one of {', '.join(fits)}")
+        return fits[name]
 
     def psf(self, model: str | None = None) -> PointSpreadFunction:
         """Return the optics' point spread function, for ``Camera(psf=...)``."""
@@ -291,61 +290,56 @@ def _result(
     return EdgeResult(image, pixels, curves, noise, own.fwhm, own.fwhm_uncertainty, line_fwhm)
 
 
-def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
-    """Return warnings about the edge's place in its image."""
+def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> Iterator[str]:
+    """Yield warnings about the edge's place in its image."""
     pixels, name = result.pixels, result.image.name
     distance = best.edges[k].line.distance(pixels.x, pixels.y)
-    warnings = []
     core = np.sort(distance[np.abs(distance) < max(best.fwhm, 2 * pixels.pitch)])
     gap = float(np.diff(core).max()) if core.size > 1 else pixels.pitch
     if gap > 1.05 * pixels.pitch / BINS_PER_PITCH:
-        warnings.append(
+        yield (
             f"{name}: With a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
             f"distances up to {gap * 1e6:.2g} um apart, not at a quarter of the pitch: beyond "
             f"{0.5 / gap / 1e3:.3g} /mm the MTF is aliased; tilt the edge by 2 deg to 10 deg."
         )
     short = min(-float(distance.min()), float(distance.max()))
     if short < _PLATEAU * result.line_fwhm:
-        warnings.append(
+        yield (
             f"{name}: Only {short * 1e6:.3g} um of one side of the edge are seen, under "
             f"{_PLATEAU:g} widths: tails and brightness of the side cannot be distinguished."
         )
-    return warnings
 
 
-def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
-    """Return warnings about the best fit."""
-    warnings = []
+def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> Iterator[str]:
+    """Yield warnings about the best fit."""
     footprint = max(edge.image.footprint for edge in edges)
     if best.fwhm < _UNRESOLVED * footprint or best.fwhm_uncertainty > 0.5 * best.fwhm:
-        warnings.append(
+        yield (
             f"The optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the pixel's "
             f"{footprint * 1e6:.3g} um: take it for an upper limit."
         )
     left = max(_left(edge) for edge in edges)
     if best.reduced_chi_squared > _NOISE_ALONE and left > _NOTHING:
-        warnings.append(
+        yield (
             f"No model fits: the best, {best.model.name}, leaves "
             f"{sqrt(best.reduced_chi_squared):.2g} times the noise in the means at a distance, "
             f"{100 * left:.2g} % of the step near the edge; uncertainties are enlarged by it, "
             "and all models have the same weight."
         )
-    return warnings
 
 
-def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
+def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> Iterator[str]:
     """Warn if apertures contradict the edges."""
     fractions = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
     left = (signals.radiance - best.aperture_background) / best.source - fractions
     square = float(np.sum((left * best.source / signals.sigma) ** 2))
     largest = int(np.argmax(np.abs(left)))
-    if square < _APERTURES_APART * left.size or abs(left[largest]) < _NOTHING:
-        return []
-    return [
-        f"The apertures and the edges contradict each other: the signal of "
-        f"{signals.diameters[largest] * 1e6:.4g} um is {100 * abs(left[largest]):.2g} % of the "
-        "source away from the fit; check the diameters and that the source is even."
-    ]
+    if square >= _APERTURES_APART * left.size and abs(left[largest]) >= _NOTHING:
+        yield (
+            f"The apertures and the edges contradict each other: the signal of "
+            f"{signals.diameters[largest] * 1e6:.4g} um is {100 * abs(left[largest]):.2g} % of the "
+            "source away from the fit; check the diameters and that the source is even."
+        )
 
 
 def _left(edge: EdgeResult) -> float:

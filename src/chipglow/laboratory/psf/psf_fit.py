@@ -8,6 +8,7 @@ fitted with the rest, broaden nothing.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import cos, inf, log, pi, sin, sqrt
 from typing import Final
 
@@ -72,8 +73,7 @@ class ApertureSignals:
     @cached_property
     def frequency(self) -> Array:
         """Frequencies in 1/m on which the transfer function is asked for."""
-        step = 1 / (16 * float(self.diameters.max()))
-        return np.arange(0.0, 3 / self.footprint, step)
+        return np.arange(0.0, 3 / self.footprint, 1 / (16 * float(self.diameters.max())))
 
     @cached_property
     def weights(self) -> Array:
@@ -174,10 +174,8 @@ class _Problem:
     ) -> None:
         self.model, self.edges, self.apertures = model, edges, apertures
         self.shapes = len(model.parameters)
-        self.rows = [
-            slice(last - edge.x.size, last)
-            for last, edge in zip(np.cumsum([edge.x.size for edge in edges]), edges, strict=True)
-        ]
+        limits = np.cumsum([0, *(edge.x.size for edge in edges)])
+        self.rows = [slice(first, last) for first, last in pairwise(limits)]
         pitch = min(edge.pitch for edge in edges)
         low, high = model.bounds(pitch, max(edge.reach for edge in edges))
         scales = [pitch if is_length(name) else 1.0 for name in model.parameters]

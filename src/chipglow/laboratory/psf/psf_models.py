@@ -246,7 +246,8 @@ class DefocusedDiscModel(PSFModel):
     lowest, highest = (0.1, 0.02), (inf, inf)
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
-        return disc_transfer(values[0] / 2 * frequency) * _gaussian_transfer(values[1], frequency)
+        disc = jinc(2 * pi * (values[0] / 2 * frequency))
+        return disc * _gaussian_transfer(values[1], frequency)
 
     def density(self, values: Array, x: Array, y: Array) -> Array:
         return _blurred_disc(values[0] / 2, values[1] / FWHM_PER_SIGMA, np.hypot(x, y))
@@ -267,8 +268,8 @@ class DefocusedRingModel(PSFModel):
 
     def transfer(self, values: Array, frequency: Array, angle: float) -> Array:
         radius, area = values[0] / 2, values[2]
-        inner = disc_transfer(radius * sqrt(max(area, 0.0)) * frequency)
-        ring = (disc_transfer(radius * frequency) - area * inner) / (1 - area)
+        inner = jinc(2 * pi * (radius * sqrt(max(area, 0.0)) * frequency))
+        ring = (jinc(2 * pi * (radius * frequency)) - area * inner) / (1 - area)
         return np.asarray(ring * _gaussian_transfer(values[1], frequency))
 
     def density(self, values: Array, x: Array, y: Array) -> Array:
@@ -413,11 +414,5 @@ def sampled_kernel(
     return kernel, spacing
 
 
-def disc_transfer(cycles: Array) -> Array:
-    """Return the transfer function of an even disc over frequency times radius."""
-    return jinc(2 * pi * cycles)
-
-
 def _gaussian_transfer(fwhm: float, frequency: Array) -> Array:
-    sigma = fwhm / FWHM_PER_SIGMA
-    return np.exp(-2 * (pi * sigma * frequency) ** 2)
+    return np.exp(-2 * (pi * (fwhm / FWHM_PER_SIGMA) * frequency) ** 2)

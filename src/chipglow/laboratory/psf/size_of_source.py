@@ -44,20 +44,15 @@ def aperture_image(measurement: Measurement, diameter: float, name: str) -> Aper
 
 def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
     """Read the pixels within a pitch of the centroid of the bright pixels in each aperture."""
-    if len({image.diameter for image in images}) < _LEAST_APERTURES:
+    diameters = np.array([image.diameter for image in images])
+    if (several := np.unique(diameters).size) < _LEAST_APERTURES:
         raise ValueError(
-            f"apertures: {len(images)} images of {len({i.diameter for i in images})} diameters, "
+            f"apertures: {len(images)} images of {several} diameters, "
             f"expected {_LEAST_APERTURES} diameters or more"
         )
     signals, sigmas, radii, outside = zip(*map(_middle, images), strict=True)
-    return ApertureSignals(
-        np.array([image.diameter for image in images]),
-        np.array(signals),
-        np.array(sigmas),
-        radii,
-        footprint,
-        min(outside),
-    )
+    radiance, sigma = np.array(signals), np.array(sigmas)
+    return ApertureSignals(diameters, radiance, sigma, radii, footprint, min(outside))
 
 
 def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
@@ -86,12 +81,10 @@ def _middle(image: ApertureImage) -> tuple[float, float, Array, float]:
     if not inner.any():
         raise ValueError(f"{image.name}: no usable pixel in the middle of the aperture")
     beside = known & (away > radius + 3 * pitch)
-    sigma = _noise(image.radiance, beside)
+    sigma = _noise(image.radiance, beside) / int(inner.sum()) ** 0.5
     outside = float(np.median(image.radiance[beside])) if beside.any() else float(low)
-    number = int(inner.sum())
     signal = float(image.radiance[inner].mean())
-    least = 1e-7 * float(high - low)
-    return signal, max(sigma / number**0.5, least), away[inner], outside
+    return signal, max(sigma, 1e-7 * float(high - low)), away[inner], outside
 
 
 def _noise(radiance: Array, outside: NDArray[np.bool_]) -> float:

@@ -1,5 +1,6 @@
 """Which dot of one image is which of another: by their arrangement."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -63,7 +64,7 @@ def match_dots(
             f"image and {len(second.pixels)} in the visible picture match; both must show the "
             "same target, not mirrored, turned by at most 30 degrees"
         )
-    return best.pairs, _rivals(best, judged, first.pixels, spacing)
+    return best.pairs, tuple(_rivals(best, judged, first.pixels, spacing))
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,8 @@ class _Placement:
 
 def _rivals(
     best: _Placement, judged: list[_Placement], first: Array, spacing: float
-) -> tuple[str, ...]:
-    """Return a warning for the best other placement that hardly more speaks against."""
+) -> Iterator[str]:
+    """Yield a warning for the best other placement that hardly more speaks against."""
     others = [
         other
         for other in judged
@@ -93,13 +94,12 @@ def _rivals(
         and 2 * other.count >= best.count
         and other.contradictions < best.contradictions + _CONTRADICTED
     ]
-    if not others:
-        return ()
-    away = _distance(max(others, key=_Placement.worth).matrix, best.matrix, first)
-    return (
-        f"The dots match {away:.0f} visible pixels further on as well; a target that both cameras "
-        "see whole, or whose grid has a gap, would decide.",
-    )
+    if others:
+        away = _distance(max(others, key=_Placement.worth).matrix, best.matrix, first)
+        yield (
+            f"The dots match {away:.0f} visible pixels further on as well; a target that both "
+            "cameras see whole, or whose grid has a gap, would decide."
+        )
 
 
 def _hypotheses(

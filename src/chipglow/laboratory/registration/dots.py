@@ -1,5 +1,6 @@
 """Dots of a target that both cameras see, and the registration that they give."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -110,8 +111,7 @@ def fit_dots(
     positions = np.stack(
         [raster.x[0] + columns * raster.spacing, raster.y[0] - rows * raster.spacing], axis=1
     )
-    pixels = dots[1].pixels[second]
-    fit = fit_points(positions, pixels, model, picked=False)
+    fit = fit_points(positions, dots[1].pixels[second], model, picked=False)
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[second] ** 2).mean()))
@@ -142,17 +142,14 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     strength = np.stack([size**2 * gaussian_laplace(filled, size) for size in sizes])
     groups = [_alike(_blobs(filled, sizes, sign * strength)) for sign in (-1.0, 1.0)]
     bright = _weight(groups[0]) >= _weight(groups[1])
-    discs = _discs(filled, known, groups[0 if bright else 1], bool(bright))
+    discs = _discs(filled, known, groups[0 if bright else 1], bright)
     if len(discs) < FEWEST_DOTS:
         raise ValueError(
             f"{name}: {len(discs)} dots are found, expected a target with {FEWEST_DOTS} or more"
         )
-    return Dots(
-        np.array([(disc.column, disc.row) for disc in discs]),
-        np.array([disc.unsure for disc in discs]) * _correlation(discs),
-        float(np.median([disc.radius for disc in discs])),
-        bool(bright),
-    )
+    middles = np.array([(disc.column, disc.row) for disc in discs])
+    uncertainty = np.array([disc.unsure for disc in discs]) * _correlation(discs)
+    return Dots(middles, uncertainty, float(np.median([disc.radius for disc in discs])), bright)
 
 
 def _blobs(image: Array, sizes: Array, strength: Array) -> Array:
@@ -227,15 +224,14 @@ class _Disc:
 
 def _discs(image: Array, known: NDArray[np.bool_], blobs: Array, bright: bool) -> list[_Disc]:
     """Return discs of like radius at blobs, fitted again without their neighbours' skirts."""
-    first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
-    discs = _like(first, bright)
+    discs = _like([_disc(image, known, blob) for blob in blobs[:, :3].tolist()], bright)
     for _ in range(_AGAIN):
         rest = image.copy()
         for disc in discs:
             reach = disc.radius + 3 * disc.softness
             part, columns, rows = _window(image.shape, disc.column, disc.row, reach)
             rest[part] -= disc.brightness(columns, rows)
-        again = [_disc(rest, known, d.column, d.row, d.size, d) for d in discs]
+        again = [_disc(rest, known, (d.column, d.row, d.size), d) for d in discs]
         before, discs = discs, _like(again, bright)
         if _settled(before, discs):
             break
@@ -271,14 +267,10 @@ def _like(found: list[_Disc | None], bright: bool) -> list[_Disc]:
 
 
 def _disc(
-    image: Array,
-    known: NDArray[np.bool_],
-    column: float,
-    row: float,
-    size: float,
-    own: _Disc | None = None,
+    image: Array, known: NDArray[np.bool_], blob: Sequence[float], own: _Disc | None = None
 ) -> _Disc | None:
-    """Fit the disc near a place; its own brightness, if given, was taken from the image."""
+    """Fit the disc near a blob; its own brightness, if given, was taken from the image."""
+    column, row, size = blob
     reach = max(_WINDOW * size, _LEAST_WINDOW)
     part, columns, rows = _window(image.shape, column, row, reach)
     used = (np.hypot(columns - column, rows - row) <= reach) & known[part]

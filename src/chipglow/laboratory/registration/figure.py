@@ -59,27 +59,20 @@ def blink_pictures(
     """Return the visible picture, and the infrared image as the visible camera would have it."""
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - ZERO_CELSIUS, raster, shape)
-    plain = _rendered(registration, tool, visible, "gray", scales.ends(visible, 0.5, 99.5))
-    limits = scales.ends(celsius, 0.5, 99.8, 1.0)
-    return plain, _rendered(registration, tool, celsius, HEAT, limits)
 
+    def rendered(image: NDArray[Any], colours: str, limits: tuple[float, float]) -> Any:
+        height = _BLINK_WIDTH * shape[0] / shape[1]
+        figure = Figure(figsize=(_BLINK_WIDTH, height), dpi=100)
+        canvas: Any = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=VOID)
+        _show(axes, image, colours, limits)
+        axes.set(xticks=[], yticks=[])
+        _draw_tool(axes, registration, tool, shape)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba(), np.uint8)[..., :3].copy()
 
-def _rendered(
-    registration: Registration,
-    tool: Tool | None,
-    image: NDArray[Any],
-    colours: Any,
-    limits: tuple[float, float],
-) -> NDArray[np.uint8]:
-    height = _BLINK_WIDTH * image.shape[0] / image.shape[1]
-    figure = Figure(figsize=(_BLINK_WIDTH, height), dpi=100)
-    canvas: Any = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), facecolor=VOID)
-    _show(axes, image, colours, limits)
-    axes.set(xticks=[], yticks=[])
-    _draw_tool(axes, registration, tool, image.shape)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba(), np.uint8)[..., :3].copy()
+    plain = rendered(visible, "gray", scales.ends(visible, 0.5, 99.5))
+    return plain, rendered(celsius, HEAT, scales.ends(celsius, 0.5, 99.8, 1.0))
 
 
 def _show(

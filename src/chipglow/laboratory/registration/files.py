@@ -93,10 +93,9 @@ def load_registration(path: str | Path) -> Registration:
             np.inf if freedom is None else freedom,
             Notes(data.get("assumed", []), data.get("warnings", [])),
         )
-    except ValidationError as error:
-        raise DescriptionError(f"{path.name}: {problem(error)}") from None
     except ValueError as error:
-        raise DescriptionError(f"{path.name}: {error}") from None
+        reason = problem(error) if isinstance(error, ValidationError) else error
+        raise DescriptionError(f"{path.name}: {reason}") from None
 
 
 def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
@@ -116,8 +115,7 @@ def _frames(path: Path) -> NDArray[np.float32]:
         raise ValueError(f"{path}: is empty, expected a picture")
     try:
         with Image.open(path) as picture:
-            count = getattr(picture, "n_frames", 1)
-            if count * picture.width * picture.height > _MOST_PIXELS:
+            if getattr(picture, "n_frames", 1) * picture.width * picture.height > _MOST_PIXELS:
                 raise ValueError(f"{path}: expected up to {_MOST_PIXELS} pixels in all")
             frames = [_brightness(page) for page in ImageSequence.Iterator(picture)]
     except (UnidentifiedImageError, Image.DecompressionBombError):

@@ -181,8 +181,7 @@ class _Level:
 
     def basis(self, matrix: Array, model: Model) -> Array:
         """Return the basis by which a parameter of 1 moves the image's corner by one sample."""
-        mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
-        return parameter_basis(model, mirrored) * self.step
+        return parameter_basis(model, mirrored=np.linalg.det(matrix[:2, :2]) < 0) * self.step
 
 
 def _levels(
@@ -416,27 +415,26 @@ def _window(pixels: Array, shape: tuple[int, ...], fade: float) -> tuple[Array, 
 # The verdict
 
 
-def _rivals(fits: list[tuple[Array, float]], level: _Level) -> tuple[str, ...]:
-    """Return a warning for the best other placement that is nearly as good."""
+def _rivals(fits: list[tuple[Array, float]], level: _Level) -> Iterator[str]:
+    """Yield a warning for the best other placement that is nearly as good."""
     best, most = fits[0]
     for matrix, common in fits[1:]:
         distance = level.apart(best, matrix)
         if distance > _FAR and common > _RIVAL * most:
-            return (
+            yield (
                 f"Another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
-                "points or dots would decide.",
+                "points or dots would decide."
             )
-    return ()
+            return
 
 
-def _unsure(found: Registration, raster: Raster) -> tuple[str, ...]:
+def _unsure(found: Registration, raster: Raster) -> Iterator[str]:
     typical = found.uncertainty(raster)[0] / raster.spacing
-    if typical < _UNSURE:
-        return ()
-    return (
-        f"The standard uncertainty of a position is {typical:.2g} infrared pixels in the median: "
-        "the images have too little in common.",
-    )
+    if typical >= _UNSURE:
+        yield (
+            f"The standard uncertainty of a position is {typical:.2g} infrared pixels in the "
+            "median: the images have too little in common."
+        )
 
 
 def _sandwich(level: _Level, matrix: Array, basis: Array) -> tuple[Array, bool]:

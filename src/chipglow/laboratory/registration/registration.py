@@ -17,7 +17,6 @@ from chipglow.text import Notes
 
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
 Method: TypeAlias = Literal["points", "dots", "mutual-information"]
-MODELS: Final = ("similarity", "affine", "homography")
 
 _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
 _FLATTEST: Final = 0.01
@@ -50,10 +49,8 @@ class Registration:
     """Assumptions, and reasons why it may be wrong."""
 
     def __post_init__(self) -> None:
-        for name, value, shape in (
-            ("matrix", self.matrix, (3, 3)),
-            ("covariance", self.covariance, (9, 9)),
-        ):
+        for name, shape in (("matrix", (3, 3)), ("covariance", (9, 9))):
+            value = getattr(self, name)
             if value.shape != shape or not np.isfinite(value).all():
                 raise ValueError(f"registration: {name}: expected finite numbers, shape {shape}")
         if self.matrix[2, 2] != 1.0:
@@ -95,8 +92,7 @@ class Registration:
 
     def uncertainty(self, raster: Raster) -> tuple[float, float]:
         """Return median and largest standard uncertainty in m, of x and y together."""
-        places = raster.centres
-        variance = np.trace(self.position_covariance(places), axis1=-2, axis2=-1)
+        variance = np.trace(self.position_covariance(raster.centres), axis1=-2, axis2=-1)
         found = np.sqrt(np.maximum(variance, 0.0))
         return float(np.median(found)), float(found.max())
 
@@ -190,9 +186,10 @@ def fit_points(
     inverse = np.linalg.inv(slope.T @ slope)
     misplaced = _misplaced(residual, slope @ inverse @ slope.T, variance, freedom)
     full, spread = frame.undone(matrix, basis @ (variance * inverse) @ basis.T)
+    residuals = residual.reshape(-1, 2) * frame.pixel_scale
     warnings = [
-        f"Point {i + 1} is {hypot(*(residual.reshape(-1, 2)[i] * frame.pixel_scale)):.3g} visible "
-        "pixels from where the others expect it."
+        f"Point {i + 1} is {hypot(*residuals[i]):.3g} visible pixels from where the others expect "
+        "it."
         for i in np.flatnonzero(misplaced)
     ]
     scatter = float(np.sqrt(variance)) * frame.pixel_scale
@@ -201,14 +198,9 @@ def fit_points(
             f"The points agree to {scatter:.1g} visible pixels, better than anyone picks them: "
             "they may be computed from each other, and the resulting uncertainty is too small."
         )
-    return PointFit(
-        Registration(full, spread, model, "points", float(freedom), Notes(warnings=warnings)),
-        residual.reshape(-1, 2) * frame.pixel_scale,
-        scatter,
-        misplaced,
-        given,
-        seen,
-    )
+    notes = Notes(warnings=warnings)
+    registration = Registration(full, spread, model, "points", float(freedom), notes)
+    return PointFit(registration, residuals, scatter, misplaced, given, seen)
 
 
 @dataclass(frozen=True)
@@ -251,12 +243,9 @@ class NormalisedFrame:
         column, row = self.pixel_centre
         after = np.array([[self.pixel_scale, 0, column], [0, self.pixel_scale, row], [0, 0, 1]])
         whole = after @ matrix @ before
-        slope = np.kron(after, before.T)
-        last = np.zeros(9)
-        last[8] = 1.0
-        slope = (slope - np.outer(whole.ravel() / whole[2, 2], last @ slope)) / whole[2, 2]
         full = whole / whole[2, 2]
-        full[2, 2] = 1.0
+        slope = np.kron(after, before.T)
+        slope = (slope - np.outer(full, slope[8])) / whole[2, 2]
         return full, slope @ covariance @ slope.T
 
 
@@ -285,9 +274,8 @@ def _least(
         return (mapped_places(matrix_of(parameters), found) - target).ravel()
 
     def slope(parameters: Array) -> Array:
-        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k)
+        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, basis.shape[1])
 
-    k = basis.shape[1]
     begin = _direct(found, target, basis)
     fit = least_squares(residual, begin, slope, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return basis, residual(fit.x), slope(fit.x), matrix_of(fit.x)
@@ -302,8 +290,8 @@ def _direct(found: Array, target: Array, basis: Array) -> Array:
 
 def _checked(positions: ArrayLike, pixels: ArrayLike, model: Model) -> tuple[Array, Array]:
     given, seen = np.asarray(positions, np.float64), np.asarray(pixels, np.float64)
-    if model not in MODELS:
-        raise ValueError(f"model: {model!r}, expected {', '.join(MODELS)}")
+    if model not in _PARAMETERS:
+        raise ValueError(f"model: {model!r}, expected {', '.join(_PARAMETERS)}")
     if given.ndim != 2 or given.shape[1:] != (2,) or given.shape != seen.shape:
         raise ValueError(f"points: shapes {given.shape} and {seen.shape}, expected (n, 2) twice")
     if not (np.isfinite(given).all() and np.isfinite(seen).all()):
@@ -354,8 +342,7 @@ def element_slopes(matrix: Array, places: Array) -> Array:
     """Return the derivative of mapped places by the matrix elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]
-    mapped = mapped_places(matrix, places)
     slopes = np.zeros((*places.shape, 9))
     slopes[..., 0, 0:3] = slopes[..., 1, 3:6] = whole
-    slopes[..., 6:9] = -mapped[..., None] * whole[..., None, :]
+    slopes[..., 6:9] = -mapped_places(matrix, places)[..., None] * whole[..., None, :]
     return slopes

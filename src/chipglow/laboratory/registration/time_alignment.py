@@ -1,5 +1,6 @@
 """Offset and drift of two cameras' clocks, from an event that both recorded."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from math import log
 from typing import Final
@@ -89,12 +90,11 @@ def simultaneous_frames(
     visible_exposure: float,
 ) -> list[NDArray[np.int64]]:
     """Return the visible frames exposed within each integration; times in s are starts."""
-    begins = infrared_times + alignment.offset
     return [
         np.flatnonzero(
             (visible_times < begin + integration_time) & (visible_times + visible_exposure > begin)
         )
-        for begin in begins
+        for begin in infrared_times + alignment.offset
     ]
 
 
@@ -174,17 +174,16 @@ def _refined(times: Array, target: Array, spline: CubicSpline, begin: float) -> 
     return TimeAlignment(offset, unit * float(np.sqrt(variance)), correlation, freedom)
 
 
-def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
-    """Return a warning if one of the offsets would have this correlation by chance."""
+def _chance(correlation: float, freedom: float, offsets: int) -> Iterator[str]:
+    """Yield a warning if one of the offsets would have this correlation by chance."""
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
-    if likely < _CHANCE:
-        return ()
-    return (f"A correlation of {correlation:.2f} is no better than that of unrelated signals.",)
+    if likely >= _CHANCE:
+        yield f"A correlation of {correlation:.2f} is no better than that of unrelated signals."
 
 
-def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> tuple[str, ...]:
-    """Return a warning for another offset beyond the best one's peak that is nearly as likely."""
+def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> Iterator[str]:
+    """Yield a warning for another offset beyond the best one's peak that is nearly as likely."""
     squares = correlations**2
     below = squares < squares[best] / 2
     left = np.flatnonzero(below[:best])
@@ -193,12 +192,12 @@ def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> tuple
     others[(left[-1] if left.size else 0) : (best + right[0] if right.size else None)] = 0.0
     rival = int(others.argmax())
     gain = count * log((1 - others[rival] + 1e-12) / (1 - squares[best] + 1e-12))
-    if gain > _RIVAL or others[rival] == 0.0:
-        return ()
-    return (
-        f"An offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as well, "
-        f"with a correlation of {correlations[rival]:.2f}: they are periodic, or say little.",
-    )
+    if gain <= _RIVAL and others[rival] > 0.0:
+        yield (
+            f"An offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as "
+            f"well, with a correlation of {correlations[rival]:.2f}: they are periodic, or say "
+            "little."
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,19 +247,17 @@ def align_recordings(
     signals = infrared.radiance[:, hot].mean(axis=1), visible.signal[:, seen].mean(axis=1)
     heat, brightness = (np.asarray(signal, np.float64) for signal in signals)
     exposure = visible.integration_time or float(np.median(np.diff(visible.times)))
-    notes = Notes()
+    times = infrared.times
+    clocks = align_times(times + integration / 2, heat, visible.times + exposure / 2, brightness)
+    within = simultaneous_frames(clocks, times, integration, visible.times, exposure)
+    notes = Notes(warnings=list(clocks.warnings))
     if visible.integration_time is None:
         notes.assumed.append(
             f"A visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
         )
-    times = infrared.times
-    clocks = align_times(times + integration / 2, heat, visible.times + exposure / 2, brightness)
-    within = simultaneous_frames(clocks, times, integration, visible.times, exposure)
-    notes.warnings.extend(clocks.warnings)
     return RecordingAlignment(clocks, times, within, notes)
 
 
 def infrared_radiance(measurement: Measurement, frame: int) -> Array:
     """Return the radiance of a frame for `fit_images` and `fit_dots`: NaN where a pixel is dead."""
-    dead = measurement.flags[frame] & Flag.DEAD > 0
-    return np.where(dead, np.nan, measurement.radiance[frame])
+    return np.where(measurement.flags[frame] & Flag.DEAD, np.nan, measurement.radiance[frame])
