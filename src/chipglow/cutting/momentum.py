@@ -152,19 +152,9 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
     txx, tyy = force * (soft * p.dxx + tension), force * (soft * p.dyy + tension)
     txy = force * soft * p.dxy
     mx, my = mass * p.own_vx, mass * p.own_vy
-    hx, hy = step.time_step * fx, step.time_step * fy
-    add_to_nodes(
-        nodes,
-        i,
-        j,
-        wx,
-        wy,
-        _distances(ax),
-        _distances(ay),
-        (mass, mx, my, hx, hy, limit),
-        (0.0, qxx, qyx, -txx, -txy),
-        (0.0, qxy, qyy, -txy, -tyy),
-    )
+    level = (mass, mx, my, step.time_step * fx, step.time_step * fy, limit)
+    by_x, by_y = (0.0, qxx, qyx, -txx, -txy), (0.0, qxy, qyy, -txy, -tyy)
+    add_to_nodes(nodes, i, j, wx, wy, _distances(ax), _distances(ay), level, by_x, by_y)
     return True
 
 

@@ -196,7 +196,6 @@ class CuttingSimulation:
         done = restore(state, resume, records) if resume is not None else 0
         recorder.replay(records[:done, 0])
         for record in range(done + 1, last + 1):
-            state.mark()
             records[record - 1] = state.advance()
             if recorder.wants(record, records[record - 1, 0]):
                 on_frame(state.frame(picture))
@@ -407,10 +406,7 @@ class _State:
         self.velocity[..., VELOCITY_X] = conditions.speed
         self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat_nodes = np.zeros((*shape, 3))
-        self.rate_nodes = np.zeros((2, *shape))
-        self.rate_spare = np.zeros((2, *shape))
         self.increment = np.zeros(shape)
-        self.touched = np.zeros(shape)
         self.entered = np.zeros((*shape, 2))
         self.contact_area = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
@@ -424,7 +420,6 @@ class _State:
         self.grids = (
             self.starts, self.velocity, self.nodes, self.friction_heat, self.tool, self.grid
         )  # fmt: skip
-        self.right, self.top = numerics.downstream, numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
         self.choose_steps()
@@ -495,8 +490,9 @@ class _State:
         self.count += new.size
 
     def _sort(self) -> None:
+        right, top = self.simulation.numerics.downstream, self.simulation.numerics.height
         count = sort_by_cell(
-            self.points, self.count, self.grid, self.right, self.top, self.spare, self.starts
+            self.points, self.count, self.grid, right, top, self.spare, self.starts
         )
         if count < 0:
             self._fail("a point's position is not finite", -1 - count)
@@ -510,6 +506,9 @@ class _State:
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; return mean forces in N/m, thickness in m, and the energies."""
         sums, threads = np.zeros_like(self.work), get_num_threads()
+        resists = self.simulation.workpiece.nonlocal_viscosity
+        points = self.points[: self.count]
+        points["strain_before"] = points["strain"]
         for _ in range(self.cycles):
             before = self._held().sum()
             self._let_in(self.time)
@@ -522,7 +521,8 @@ class _State:
             if not good:
                 self._stop_at(find_off_grid(self.points[: self.count], self.grid))
             self._conduct()
-            self._average_rates()
+            if resists is not None:
+                average_rates(self.points, self.count, self.grid, self.cycle, resists.length)
         self._stop_at(find_trouble(self.points[: self.count]))
         self.work += sums
         forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
@@ -559,12 +559,6 @@ class _State:
             held_energy(self.points, self.count, self.step, self.elastic, self.grid.cell)
         )
 
-    def _average_rates(self) -> None:
-        resists = self.simulation.workpiece.nonlocal_viscosity
-        if resists is not None:
-            nodes, spare, length = self.rate_nodes, self.rate_spare, resists.length
-            average_rates(self.points, self.count, nodes, spare, self.grid, self.cycle, length)
-
     def _conduct(self) -> None:
         points, count, grid, cycle = self.points, self.count, self.grid, self.cycle
         nodes, rise, mass = self.heat_nodes, self.increment, self.step.heat_mass
@@ -577,8 +571,8 @@ class _State:
         if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
             self.lost_heat += lose_heat(nodes, rise, tool, filled, heat, self.loss, grid, cycle)
         heat_contact(
-            points, count, self.friction_heat, self.touched, self.entered, rise, nodes, tool,
-            filled, self.tool, heat, capacity, mass, grid,
+            points, count, self.friction_heat, self.entered, rise, nodes, tool, filled, self.tool,
+            heat, capacity, mass, grid,
         )  # fmt: skip
         return_heat(points, count, rise, grid)
 
@@ -614,11 +608,6 @@ class _State:
         ends = np.flatnonzero(np.diff(distance) > _GAP * self.spacing)
         first, last = np.append(0, ends + 1), np.append(ends, distance.size - 1)
         return float((distance[last] - distance[first]).max() + self.spacing)
-
-    def mark(self) -> None:
-        """Start a new interval of the strain rate."""
-        points = self.points[: self.count]
-        points["strain_before"] = points["strain"]
 
     def _stop_at(self, trouble: Trouble | None) -> None:
         if trouble is not None:

@@ -55,12 +55,6 @@ class _Vectors:
         """Return c + a b."""
         return self.builder.fadd(c, self.product(a, b), flags=_FUSE)
 
-    def load(self, place: Any) -> Any:
-        return self.builder.load(place, align=_ALIGNED_TO)
-
-    def store(self, vector: Any, place: Any) -> None:
-        self.builder.store(vector, place, align=_ALIGNED_TO)
-
     def nodes(self, array: Any, i: Any, j: Any) -> list[list[Any]]:
         """Return the addresses of the nodes (i + a, j + b), [a][b]."""
         rows = self.builder.extract_value(array.shape, 1)
@@ -108,7 +102,7 @@ def sum_nodes(_context, nodes, i, j, wx, wy, dx, dy):  # type: ignore[no-untyped
         for a in range(3):
             column, column_by_y = vectors.zero, vectors.zero
             for b in range(3):
-                value = vectors.load(places[a][b])
+                value = builder.load(places[a][b], align=_ALIGNED_TO)
                 column = vectors.add_product(column, weights[b], value)
                 column_by_y = vectors.add_product(column_by_y, slopes[b], value)
             weight, slope = wx[a], vectors.product(wx[a], dx[a])
@@ -153,10 +147,10 @@ def add_to_nodes(_context, nodes, i, j, wx, wy, dx, dy, level, by_x, by_y):  # t
             column = vectors.add_product(level, vectors.repeated(dx[a]), by_x)
             column, column_by_y = vectors.product(weight, column), vectors.product(weight, by_y)
             for b in range(3):
-                value = vectors.load(places[a][b])
+                value = builder.load(places[a][b], align=_ALIGNED_TO)
                 value = vectors.add_product(value, weights[b], column)
                 value = vectors.add_product(value, slopes[b], column_by_y)
-                vectors.store(value, places[a][b])
+                builder.store(value, places[a][b], align=_ALIGNED_TO)
         return context.get_dummy_value()
 
     return (
