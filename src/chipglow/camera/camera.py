@@ -26,6 +26,7 @@ from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
+from chipglow.scene.raster import check_shape
 from chipglow.surface import EmissivityField, Surface
 
 BORDER_TOLERANCE: Final = 1.0
@@ -314,22 +315,10 @@ class Camera(Part):
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
-        """Measure a scene.
+        """Measure a scene, which has the true temperatures, with the emissivity of a surface.
 
-        Parameters
-        ----------
-        scene : Scene
-            The true temperatures.
-        surface : Surface
-            The emissivity.
-        start : float or sequence of float
-            Start of each frame's integration in s; `frame_times` returns a sequence at the frame
-            rate.
-
-        Returns
-        -------
-        Measurement
-            One frame for each start, with the scene's tool and attributes of camera and surface.
+        Returns one frame for each `start` of the integration in s (`frame_times` returns a sequence
+        at the frame rate), with the scene's tool and attributes of camera and surface.
         """
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)
@@ -356,8 +345,7 @@ class Camera(Part):
         and the fill factor; it returns what the pixels receive, such as the mean over each square.
         """
         image = np.asarray(radiance, np.float64)
-        if image.shape != scene.shape:
-            raise ValueError(f"camera: radiance must have shape {scene.shape}, not {image.shape}")
+        check_shape("camera: radiance", image.shape, scene.shape)
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and not negative")
         if self.psf is None or self.optics or gather is not integrate:

@@ -67,12 +67,8 @@ class Picture:
         nodes = np.concatenate([coefficients, filled[..., None], tool], axis=2)
         limits = np.stack([at_points.min(axis=0), at_points.max(axis=0)], axis=1)
         from_the_top = nodes[self._seen_nodes][:, ::-1].transpose(2, 1, 0)
-        return SplineFrame(
-            self._lattice,
-            time,
-            np.ascontiguousarray(from_the_top, np.float32),
-            limits.astype(np.float32),
-        ).frame()
+        from_the_top = np.ascontiguousarray(from_the_top, np.float32)
+        return SplineFrame(self._lattice, time, from_the_top, limits.astype(np.float32)).frame()
 
 
 def lattice_of(grid: Grid, raster: Raster, tool: Tool, ambient: float) -> Lattice:

@@ -135,36 +135,25 @@ class CuttingSimulation:
     Material points (MLS-MPM with affine velocities) carry stress, strain, temperature and their
     place before the cut; the tool is rigid and conducts heat. The cut starts at time 0, when the
     workpiece touches the rake face.
-
-    Parameters
-    ----------
-    conditions : CuttingConditions
-        Speed, feed, cutting length.
-    tool : Tool
-        Outline of the tool.
-    workpiece : WorkpieceMaterial
-        The workpiece's material.
-    tool_material : ToolMaterial
-        The tool's material.
-    friction : Friction
-        Friction and heat in the contact.
-    numerics : Numerics
-        Cells, time steps and region.
-    surroundings : Surroundings
-        Surroundings to which free surfaces lose heat.
-    tool_temperature : float or ToolBody, optional
-        Initial temperature of the tool in K. A body: the steady-state temperature of a long cut,
-        by conduction through this body. None: the temperature of the workpiece, as in the paper.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
+    """Speed, feed, cutting length."""
     tool: Tool = field(default_factory=ToolGeometry)
+    """Outline of the tool."""
     workpiece: WorkpieceMaterial = field(default_factory=partial(workpiece, "aisi-1045"))
+    """The workpiece's material."""
     tool_material: ToolMaterial = field(default_factory=partial(tool_material, "carbide"))
+    """The tool's material."""
     friction: Friction = field(default_factory=Friction)
+    """Friction and heat in the contact."""
     numerics: Numerics = field(default_factory=Numerics)
+    """Cells, time steps and region."""
     surroundings: Surroundings = field(default_factory=Surroundings)
+    """Surroundings to which free surfaces lose heat."""
     tool_temperature: float | ToolBody | None = None
+    """Initial temperature of the tool in K. A body: the steady-state temperature of a long cut, by
+    conduction through this body. None: the temperature of the workpiece, as in the paper."""
 
     def run(
         self,
@@ -375,17 +364,12 @@ class _State:
             friction_melting=inf if exponent is None else material.melting_temperature,
             viscosity=resists.viscosity if resists is not None else 0.0,
         )
-        law, damage = material.flow_stress.numbers(), material.damage
+        law = material.flow_stress.numbers()
+        damage = Damage.of(material.damage, material.failing_layer(cell))
         self.step_points = advance_with(law)
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.matter = (
-            law,
-            Damage.of(damage, material.failing_layer(cell)),
-            self.elastic,
-            self.capacity,
-            material.heat_fractions(),
-        )
+        self.matter = law, damage, self.elastic, self.capacity, material.heat_fractions()
         self.conductivity = material.conductivity.sampled()
         start, of_tool = conditions.initial_temperature, simulation.tool_material
         conductivity = float(material.conductivity.at(start))

@@ -22,6 +22,7 @@ _DOUBLE: Final = ir.DoubleType()
 _LANE: Final = ir.IntType(32)
 _NODES: Final = types.float64[:, :, ::1]
 _THREE: Final = types.UniTuple(types.float64, 3)
+_AROUND: Final = (_NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE)
 _FUSE: Final = ("contract",)
 _ALIGNED_TO: Final = 8
 
@@ -119,7 +120,7 @@ def sum_nodes(_context, nodes, i, j, wx, wy, dx, dy):  # type: ignore[no-untyped
         ]
         return context.make_tuple(builder, sums, each)
 
-    return sums(_NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE), write
+    return sums(*_AROUND), write
 
 
 @intrinsic
@@ -153,9 +154,4 @@ def add_to_nodes(_context, nodes, i, j, wx, wy, dx, dy, level, by_x, by_y):  # t
                 builder.store(value, places[a][b], align=_ALIGNED_TO)
         return context.get_dummy_value()
 
-    return (
-        types.void(
-            _NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE, level, by_x, by_y
-        ),
-        write,
-    )
+    return types.void(*_AROUND, level, by_x, by_y), write

@@ -234,7 +234,11 @@ def _finished(
         velocity = _velocity(now, others, raster, completion)
         fields |= zip(("velocity_x", "velocity_y"), velocity, strict=True)
         if "plastic_strain_rate" in names and "plastic_strain_rate" not in fields:
-            fields["plastic_strain_rate"] = _rate(now, others, velocity, raster, completion)
+            other = others[max(len(others) - completion.rate_frames, 0)]
+            strain, before = (frame.fields["plastic_strain"] for frame in (now, other))
+            interval, spacing = now.time - other.time, raster.spacing
+            rate = strain_rate_along(strain, before, velocity, interval, spacing)
+            fields["plastic_strain_rate"] = rate
     whole: dict[str, Any] = {name: _elsewhere(values) for name, values in fields.items()}
     for name in ("plastic_strain", "plastic_strain_rate"):
         if name in whole:
@@ -244,19 +248,6 @@ def _finished(
 
 
 _Velocity: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
-
-
-def _rate(
-    now: SampledFrame,
-    others: Sequence[SampledFrame],
-    velocity: _Velocity,
-    raster: Raster,
-    completion: Completion,
-) -> NDArray[np.float32]:
-    """Strain rate from the change of the strain along the motion."""
-    other = others[max(len(others) - completion.rate_frames, 0)]
-    strain, before = (frame.fields["plastic_strain"] for frame in (now, other))
-    return strain_rate_along(strain, before, velocity, now.time - other.time, raster.spacing)
 
 
 def _velocity(
@@ -296,7 +287,7 @@ def _elsewhere(values: NDArray[np.float32], value: float = 0.0) -> NDArray[np.fl
 def strain_rate_along(
     strain: NDArray[np.float32],
     before: NDArray[np.float32],
-    velocity: tuple[NDArray[np.float32], NDArray[np.float32]],
+    velocity: _Velocity,
     interval: float,
     spacing: float,
 ) -> NDArray[np.float32]:
@@ -317,7 +308,7 @@ def strain_rate_along(
 
 def optical_flow(
     before: NDArray[np.float32], after: NDArray[np.float32], interval: float, spacing: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> _Velocity:
     """Return the velocity along x and up in m/s by which a pattern moved, shape (y, x) each.
 
     Total variation with the L1 norm (Zach, Pock and Bischof 2007) by scikit-image, on a picture of

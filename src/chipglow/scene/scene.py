@@ -111,27 +111,14 @@ class Scene:
         tool: Tool | None = None,
         attributes: Mapping[str, Any] | None = None,
     ) -> "Scene":
-        """Scene from arrays in SI units.
+        """Return a scene from arrays in SI units.
 
-        Parameters
-        ----------
-        raster : Raster
-            The samples.
-        times : array_like
-            Times of the frames in s, shape (time,).
-        fields : mapping
-            Arrays of shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
-            `MATERIAL_COORDINATE_UNITS` and `QUALITY`.
-        tool : Tool, optional
-            The tool's outline, for the analyses that need the rake face.
-        attributes : mapping, optional
-            Further attributes of the dataset, such as provenance.
-
-        Raises
-        ------
-        SceneError
-            If an array is unknown, missing, of another shape or with values that cannot be; the
-            message names the field.
+        `times` of the frames in s have the shape (time,), `fields` on the samples of `raster` the
+        shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
+        `MATERIAL_COORDINATE_UNITS` and `QUALITY`. `tool` is the tool's outline, for the analyses
+        that need the rake face; `attributes` are further ones of the dataset, such as provenance.
+        A SceneError that names the field if an array is unknown, missing, of another shape or with
+        values that cannot be.
         """
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         unknown = sorted(set(fields) - set(units))
@@ -344,17 +331,12 @@ def check_frame(frame: Frame) -> None:
         )
 
 
-def raster_of(data: xr.Dataset) -> Raster:
-    """Return the grid of the samples of a scene's dataset."""
+def raster_of(data: xr.Dataset, spacing: float | None = None) -> Raster:
+    """Return the grid of the samples of a dataset; from several columns without a spacing in m."""
     x, y = data["x"].values, data["y"].values
-    spacing = float((x[-1] - x[0]) / (len(x) - 1))
-    return Raster(
-        left=float(x[0]) - spacing / 2,
-        top=float(y[0]) + spacing / 2,
-        spacing=spacing,
-        rows=len(y),
-        columns=len(x),
-    )
+    if spacing is None:
+        spacing = float((x[-1] - x[0]) / (len(x) - 1))
+    return Raster(float(x[0]) - spacing / 2, float(y[0]) + spacing / 2, spacing, len(y), len(x))
 
 
 def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
+from chipglow.scene.raster import check_shape
 from chipglow.surface.blend import (
     RATE_OF_CHIP,
     RATE_OF_SHEAR_BAND,
@@ -186,10 +187,7 @@ class Features:
 
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample for every surface, shape (surface, y, x)."""
-        if frame.material.shape != self.raster.shape:
-            raise ValueError(
-                f"frame: has shape {frame.material.shape}, expected {self.raster.shape}"
-            )
+        check_shape("frame", frame.material.shape, self.raster.shape)
         rate = frame.plastic_strain_rate
         result = np.empty((len(self.surfaces), *self.raster.shape), dtype=np.float32)
         fields = (

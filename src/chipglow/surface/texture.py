@@ -133,14 +133,8 @@ class Texture:
         """Return the emissivity of the enlarged map at places in m."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
         result = np.empty(x.size, dtype=np.float32)
-        _look_up(
-            padded(self.nodes),
-            self.emissivity.table,
-            1.0 / self.grain,
-            x.ravel(),
-            y.ravel(),
-            result,
-        )
+        nodes, table = padded(self.nodes), self.emissivity.table
+        _look_up(nodes, table, 1.0 / self.grain, x.ravel(), y.ravel(), result)
         return result.reshape(x.shape)
 
 
