@@ -71,7 +71,7 @@ class Camera(Part):
         default_factory=lambda: Band(3.8e-6, 5.1e-6)
     )
     pitch: Annotated[
-        float, Parameter("Distance between pixels on the scene.", LENGTH, over=0.0, most=1e-2)
+        float, Parameter("Distance between pixels on the scene.", LENGTH, most=1e-2)
     ] = 6e-6
     shape: Annotated[
         tuple[int, int] | None,
@@ -104,15 +104,14 @@ class Camera(Part):
             "values, as the paper does, so that the footprint counts twice."
         ),
     ] = "optics"
-    integration_time: Annotated[float, Parameter("Exposure time.", TIME, over=0.0)] = 10e-6
-    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
+    integration_time: Annotated[float, Parameter("Exposure time.", TIME)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0
     line_time: Annotated[
         float | None,
         Parameter(
             "Rolling shutter: delay between the exposures of successive rows; none: global "
             "shutter.",
             TIME,
-            over=0.0,
         ),
     ] = None
     time_constant: Annotated[
@@ -121,7 +120,6 @@ class Camera(Part):
             "Thermal time constant of a microbolometer, which makes frames lag; none: a photon "
             "detector.",
             TIME,
-            over=0.0,
         ),
     ] = None
     lower_limit: Annotated[

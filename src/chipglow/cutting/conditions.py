@@ -23,17 +23,14 @@ _FROM_CONTACT: Final = replace(CUT_LENGTH, positive=False)
 class CuttingConditions(Part):
     """Orthogonal cut; Table 2 of Heigel and Whitenton (2010) by default."""
 
-    speed: Annotated[float, Parameter("Cutting speed.", SPEED, over=0.0)] = 250.0 / 60.0
-    feed: Annotated[
-        float, Parameter("Feed: thickness of the uncut chip.", CUT_LENGTH, over=0.0)
-    ] = 0.3e-3
+    speed: Annotated[float, Parameter("Cutting speed.", SPEED)] = 250.0 / 60.0
+    feed: Annotated[float, Parameter("Feed: thickness of the uncut chip.", CUT_LENGTH)] = 0.3e-3
     cutting_length: Annotated[
         float,
         Parameter(
             "Cutting length, from the first contact. The paper's window ends at 1.958 mm; "
             "segments after it make the scatter of the headlines known.",
             CUT_LENGTH,
-            over=0.0,
         ),
     ] = 2.6e-3
     initial_temperature: Annotated[float, INITIAL_TEMPERATURE] = 293.15
@@ -99,7 +96,7 @@ class Surroundings(Part):
         ),
     ] = 0.0
     temperature: Annotated[
-        float, Parameter("Temperature of air and surroundings.", TEMPERATURE, over=0.0, most=1500.0)
+        float, Parameter("Temperature of air and surroundings.", TEMPERATURE, most=1500.0)
     ] = 293.15
 
 
@@ -115,9 +112,9 @@ class OutputWindow(Part):
     start: Annotated[
         float, Parameter("Cutting length at the first frame, under end.", _FROM_CONTACT, least=0.0)
     ] = 1.579e-3
-    end: Annotated[
-        float, Parameter("Cutting length at the last frame.", CUT_LENGTH, over=0.0, under=1.0)
-    ] = 1.958e-3
+    end: Annotated[float, Parameter("Cutting length at the last frame.", CUT_LENGTH, under=1.0)] = (
+        1.958e-3
+    )
     interval: Annotated[
         float,
         Parameter(

@@ -31,7 +31,7 @@ class ToolBody(Part):
     """Body through which the heat of a steady tool flows."""
 
     width: Annotated[
-        float, Parameter("Width of cut; the paper's discs are 3 mm thick.", LENGTH, over=0.0)
+        float, Parameter("Width of cut; the paper's discs are 3 mm thick.", LENGTH)
     ] = 3e-3
     holder_distance: Annotated[
         float,

@@ -38,7 +38,8 @@ class Parameter:
     quantity : Quantity, optional
         How a description writes it; without one it is a plain number, word or file.
     over, least, under, most : float, optional
-        Limits: `over` and `under` are excluded, `least` and `most` are included.
+        Limits: `over` and `under` are excluded, `least` and `most` are included. A quantity that is
+        positive is `over` 0 by itself.
     allowed : str
         Allowed values that the limits do not state.
     """
@@ -50,6 +51,11 @@ class Parameter:
     under: float | None = None
     most: float | None = None
     allowed: str = ""
+
+    def __post_init__(self) -> None:
+        positive = self.quantity is not None and self.quantity.positive
+        if positive and self.over is None and self.least is None:
+            object.__setattr__(self, "over", 0.0)
 
     @property
     def limits(self) -> str:

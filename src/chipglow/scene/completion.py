@@ -49,9 +49,7 @@ class Completion(Part):
     surroundings: Annotated[
         float,
         Parameter(
-            "Temperature where there is no material, and of a tool that has none.",
-            TEMPERATURE,
-            over=0.0,
+            "Temperature where there is no material, and of a tool that has none.", TEMPERATURE
         ),
     ] = 293.15
     tool: Tool | None = None

@@ -146,9 +146,7 @@ class Chamfer(Part):
     The land's rake angle is the rake angle minus the chamfer's angle.
     """
 
-    width: Annotated[
-        float, Parameter("Width of the land, between its sharp corners.", LENGTH, over=0.0)
-    ]
+    width: Annotated[float, Parameter("Width of the land, between its sharp corners.", LENGTH)]
     angle: Annotated[
         float,
         Parameter("Angle between the land and the rake face.", ANGLE, over=0.0, under=_RIGHT_ANGLE),
@@ -166,9 +164,9 @@ class Hone(Part):
     """
 
     rake: Annotated[
-        float, Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH, over=0.0)
+        float, Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH)
     ]
-    clearance: Annotated[float, Parameter("The same on the flank face.", LENGTH, over=0.0)]
+    clearance: Annotated[float, Parameter("The same on the flank face.", LENGTH)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -219,7 +217,7 @@ class ToolGeometry(Tool, Part):
         ),
     ] = radians(7.0)
     edge_radius: Annotated[
-        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH, over=0.0)
+        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH)
     ] = 20e-6
     chamfer: Annotated[
         Chamfer | None,

@@ -43,9 +43,7 @@ class Oxide(Modifier):
     opaque: Annotated[
         float,
         Parameter(
-            "Thickness over which a film takes on 63 % of that emissivity; an assumption.",
-            LENGTH,
-            over=0.0,
+            "Thickness over which a film takes on 63 % of that emissivity; an assumption.", LENGTH
         ),
     ] = 0.5e-6
 
@@ -82,9 +80,9 @@ class ParabolicOxide(Oxide):
 
     kind = "parabolic"
     example = "{kind: parabolic, rate: 6.1e-4 m^2/s, activation_energy: 169.5 kJ/mol}"
-    rate: Annotated[float, Parameter("Its factor k₀.", OXIDATION_RATE, over=0.0)] = 6.1e-4
+    rate: Annotated[float, Parameter("Its factor k₀.", OXIDATION_RATE)] = 6.1e-4
     activation_energy: Annotated[
-        float, Parameter("Its activation energy Q.", ACTIVATION_ENERGY, over=0.0)
+        float, Parameter("Its activation energy Q.", ACTIVATION_ENERGY)
     ] = 169_452.0
 
     def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:

@@ -288,7 +288,7 @@ class Wedge(SideShape):
         ),
     ] = radians(45.0)
     bulge_radius: Annotated[
-        float, Parameter("Radius of the bulge's arc; an assumption.", LENGTH, over=0.0)
+        float, Parameter("Radius of the bulge's arc; an assumption.", LENGTH)
     ] = 100e-6
 
     @property

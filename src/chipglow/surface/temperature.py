@@ -96,12 +96,8 @@ class PhaseSurface(HomogeneousSurface):
         float,
         Parameter("Emissivity from the liquidus on; between them linear.", least=0.0, most=1.0),
     ]
-    solidus: Annotated[
-        float, Parameter("Temperature at which melting begins.", TEMPERATURE, over=0.0)
-    ]
-    liquidus: Annotated[
-        float, Parameter("Temperature at which all is melted.", TEMPERATURE, over=0.0)
-    ]
+    solidus: Annotated[float, Parameter("Temperature at which melting begins.", TEMPERATURE)]
+    liquidus: Annotated[float, Parameter("Temperature at which all is melted.", TEMPERATURE)]
 
     def __post_init__(self) -> None:
         super().__post_init__()

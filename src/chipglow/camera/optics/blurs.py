@@ -44,9 +44,7 @@ class BlurTerm(Part, ABC):
         """
 
 
-Deviation = Annotated[
-    float, Parameter("Standard deviation along each axis, on the scene.", LENGTH, over=0.0)
-]
+Deviation = Annotated[float, Parameter("Standard deviation along each axis, on the scene.", LENGTH)]
 Direction = Annotated[
     float, Parameter("Direction, counter-clockwise from the right.", ANGLE, least=-pi, most=pi)
 ]
@@ -92,9 +90,7 @@ class LinearMotion(BlurTerm):
 
     kind = "linear-motion"
     example = "{kind: linear-motion, distance: 4 um, direction: 0 deg}"
-    distance: Annotated[
-        float, Parameter("Path during the integration time, on the scene.", LENGTH, over=0.0)
-    ]
+    distance: Annotated[float, Parameter("Path during the integration time, on the scene.", LENGTH)]
     direction: Direction = 0.0
 
     @property
@@ -113,7 +109,7 @@ class Vibration(BlurTerm):
     kind = "vibration"
     example = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
     amplitude: Annotated[
-        float, Parameter("Largest displacement from the centre, on the scene.", LENGTH, over=0.0)
+        float, Parameter("Largest displacement from the centre, on the scene.", LENGTH)
     ]
     direction: Direction = 0.0
 

@@ -54,7 +54,6 @@ DiffractionWavelength = Annotated[
     Parameter(
         "Wavelength of the diffraction; none: the centre of the camera's band.",
         WAVELENGTH,
-        over=0.0,
         most=0.1,
     ),
 ]
@@ -200,7 +199,7 @@ class GaussianPSF(PointSpreadFunction):
 
     kind = "gaussian"
     example = "{kind: gaussian, fwhm: 12 um}"
-    fwhm: Annotated[float, Parameter("Full width at half maximum.", LENGTH, over=0.0, most=0.1)]
+    fwhm: Annotated[float, Parameter("Full width at half maximum.", LENGTH, most=0.1)]
 
     def __str__(self) -> str:
         return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
@@ -379,10 +378,7 @@ class MeasuredPSFFile(PSFChoice):
     spacing: Annotated[
         float | None,
         Parameter(
-            "Distance between the samples of the kernel; a .nc file states it.",
-            LENGTH,
-            over=0.0,
-            most=0.1,
+            "Distance between the samples of the kernel; a .nc file states it.", LENGTH, most=0.1
         ),
     ] = None
 

@@ -95,9 +95,7 @@ class Narcissus(OpticsTerm):
     reflectance: Annotated[
         float, Parameter("Total reflectance of the lens surfaces.", least=0.0, most=1.0)
     ]
-    radius: Annotated[
-        float, Parameter("Radius at half of the maximum, on the scene.", LENGTH, over=0.0)
-    ]
+    radius: Annotated[float, Parameter("Radius at half of the maximum, on the scene.", LENGTH)]
     housing: Annotated[float, Parameter("Temperature of the housing.", TEMPERATURE)] = 293.15
     detector: Annotated[float, Parameter("Temperature of the detector.", TEMPERATURE)] = 77.0
     corrected_at: Annotated[
@@ -153,10 +151,7 @@ class Veil(OpticsTerm):
     example = "{kind: veil, fraction: 0.03, radius: 300 um}"
     fraction: Annotated[float, Parameter("Scattered fraction of the light.", least=0.0, under=1.0)]
     radius: Annotated[
-        float,
-        Parameter(
-            "Radius that contains half of the scattered light, on the scene.", LENGTH, over=0.0
-        ),
+        float, Parameter("Radius that contains half of the scattered light, on the scene.", LENGTH)
     ]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
@@ -185,7 +180,7 @@ class Distortion(OpticsTerm):
             most=0.3,
         ),
     ]
-    radius: Annotated[float, Parameter("Radius R, on the scene.", LENGTH, over=0.0)]
+    radius: Annotated[float, Parameter("Radius R, on the scene.", LENGTH)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
@@ -213,9 +208,7 @@ class FieldBlur(OpticsTerm):
     standard_deviation: Annotated[
         float, Parameter("Standard deviation s of the blur, on the scene.", LENGTH, least=0.0)
     ]
-    radius: Annotated[
-        float, Parameter("Radius R at which it holds, on the scene.", LENGTH, over=0.0)
-    ]
+    radius: Annotated[float, Parameter("Radius R at which it holds, on the scene.", LENGTH)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
