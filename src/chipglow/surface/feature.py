@@ -60,9 +60,9 @@ class FeatureSurface(Surface, Part):
         Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
     ] = _WORKPIECE
     tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
-    grain: Annotated[
-        float, Parameter("Size of a grain of the emissivity's texture.", LENGTH, over=0.0)
-    ] = 20e-6
+    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
+        20e-6
+    )
     follow: Annotated[
         Literal["material", "mean", "none"],
         Parameter(
@@ -188,14 +188,11 @@ class Features:
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample for every surface, shape (surface, y, x)."""
         check_shape("frame", frame.material.shape, self.raster.shape)
-        rate = frame.plastic_strain_rate
+        strain, rate = frame.needed("plastic_strain"), frame.plastic_strain_rate
+        if rate is None:
+            rate = np.zeros(self.raster.shape, np.float32)
         result = np.empty((len(self.surfaces), *self.raster.shape), dtype=np.float32)
-        fields = (
-            frame.material,
-            frame.needed("plastic_strain"),
-            np.zeros(self.raster.shape, np.float32) if rate is None else rate,
-            *self.positions(frame),
-        )
+        fields = frame.material, strain, rate, *self.positions(frame)
         shift, textures = self.shift(frame.time), self.textures
         in_blocks(
             self.raster.rows,
