@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Final, Self
 
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Parameter, Part, zero_to_one
 from chipglow.quantities.units import CUT_LENGTH, HEAT_TRANSFER, LENGTH, SPEED, TEMPERATURE, TIME
 from chipglow.scene import Raster
 
@@ -51,11 +51,7 @@ class Friction(Part):
     coefficient: Annotated[float, Parameter("Coulomb's coefficient.", least=0.0, most=2.0)] = 0.5
     friction_factor: Annotated[
         float,
-        Parameter(
-            "Limit of the friction stress, as a fraction of the chip's shear flow stress.",
-            least=0.0,
-            most=1.0,
-        ),
+        zero_to_one("Limit of the friction stress, as a fraction of the chip's shear flow stress."),
     ] = 1.0
     conductance: float = 1e7
     thermal_exponent: Annotated[
@@ -89,10 +85,8 @@ class Surroundings(Part):
     ] = 0.0
     emissivity: Annotated[
         float,
-        Parameter(
-            "Total hemispherical emissivity with which free surfaces cool; not the camera's.",
-            least=0.0,
-            most=1.0,
+        zero_to_one(
+            "Total hemispherical emissivity with which free surfaces cool; not the camera's."
         ),
     ] = 0.0
     temperature: Annotated[
@@ -133,11 +127,9 @@ class OutputWindow(Part):
     ] = 2
     band_delay: Annotated[
         float,
-        Parameter(
+        zero_to_one(
             "When the band is developed: this part of the time between the last two valleys of "
-            "the cutting force after the later one.",
-            least=0.0,
-            most=1.0,
+            "the cutting force after the later one."
         ),
     ] = 0.22
     band_duration: Annotated[

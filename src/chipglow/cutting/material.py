@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.cutting.damage import BAND_CELLS, BAND_LENGTHS, FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Parameter, Part, zero_to_one
 from chipglow.quantities.units import (
     CONDUCTIVITY,
     DENSITY,
@@ -120,9 +120,9 @@ class WorkpieceMaterial(Part):
     ]
     conductivity: Annotated[TemperatureTable, Parameter("Conductivity.", CONDUCTIVITY)]
     heat_capacity: Annotated[TemperatureTable, Parameter("Heat.", HEAT_CAPACITY)]
-    taylor_quinney: Annotated[
-        float | RateTable, Parameter("Fraction of work that is heat.", least=0.0, most=1.0)
-    ] = 0.9
+    taylor_quinney: Annotated[float | RateTable, zero_to_one("Fraction of work that is heat.")] = (
+        0.9
+    )
     fitted_damage: Annotated[
         FittedDamage | None, Parameter("Uncertainty of fitted numbers of the damage.")
     ] = None

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from types import NoneType, UnionType
 from typing import Any, Final, Literal, Union, get_args, get_origin
@@ -193,6 +194,10 @@ class Parameter:
             "" if self.most is None else f"up to {text(self.most)}",
         )
         return ", ".join(word for word in words if word) or "a finite number"
+
+
+zero_to_one: Final = partial(Parameter, least=0.0, most=1.0)
+"""Declares a fraction: a number from 0 to 1."""
 
 
 def _take_lists(schema: Any) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import R
 
-from chipglow.quantities import Family, Parameter
+from chipglow.quantities import Family, Parameter, zero_to_one
 from chipglow.quantities.units import ACTIVATION_ENERGY, LENGTH, OXIDATION_RATE, POSITION
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
@@ -38,7 +38,7 @@ class Oxide(Modifier):
         ),
     ] = 0.0
     emissivity: Annotated[
-        float, Parameter("Emissivity under much oxide: chip 2 of the paper.", least=0.0, most=1.0)
+        float, zero_to_one("Emissivity under much oxide: chip 2 of the paper.")
     ] = 0.77
     opaque: Annotated[
         float,

@@ -9,7 +9,7 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Array, Family, Parameter
+from chipglow.quantities import Array, Family, Parameter, zero_to_one
 from chipglow.quantities.units import ANGLE, LENGTH, POSITION
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
@@ -135,18 +135,14 @@ class SideShape(Modifier):
     ] = 0.0
     mirror: Annotated[
         float,
-        Parameter(
-            "Fraction of the reflected light that is reflected as by a mirror; the rest diffusely.",
-            least=0.0,
-            most=1.0,
+        zero_to_one(
+            "Fraction of the reflected light that is reflected as by a mirror; the rest diffusely."
         ),
     ] = 0.0
     rake_emissivity: Annotated[
         float | None,
-        Parameter(
-            "Emissivity of the rake face beside the chip; none: that of the tool's side there.",
-            least=0.0,
-            most=1.0,
+        zero_to_one(
+            "Emissivity of the rake face beside the chip; none: that of the tool's side there."
         ),
     ] = None
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import correlate1d
 from scipy.special import betainccinv, betaincinv, ndtr
 
-from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities import Array, Parameter, Part, zero_to_one
 
 REACH: Final = 8.0
 """Normal deviates are limited to −8 to 8."""
@@ -34,7 +34,7 @@ class Emissivity(Part):
     deviation with it: there it is a beta distribution, which stays within 0 to 1 by itself.
     """
 
-    mean: Annotated[float, Parameter("Mean emissivity.", least=0.0, most=1.0)]
+    mean: Annotated[float, zero_to_one("Mean emissivity.")]
     standard_deviation: Annotated[
         float, Parameter("Standard deviation over the surface.", least=0.0)
     ] = 0.0

@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import half_size, poisson_squares
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA, GaussianPSF, PointSpreadFunction
-from chipglow.quantities import Array, Family, Parameter, Part
+from chipglow.quantities import Array, Family, Parameter, Part, zero_to_one
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
@@ -92,9 +92,7 @@ class Narcissus(OpticsTerm):
         "{kind: narcissus, reflectance: 0.01, radius: 150 um, housing: 45 degC,\n"
         "    corrected_at: 25 degC}"
     )
-    reflectance: Annotated[
-        float, Parameter("Total reflectance of the lens surfaces.", least=0.0, most=1.0)
-    ]
+    reflectance: Annotated[float, zero_to_one("Total reflectance of the lens surfaces.")]
     radius: Annotated[float, Parameter("Radius at half of the maximum, on the scene.", LENGTH)]
     housing: Annotated[float, Parameter("Temperature of the housing.", TEMPERATURE)] = 293.15
     detector: Annotated[float, Parameter("Temperature of the detector.", TEMPERATURE)] = 77.0
