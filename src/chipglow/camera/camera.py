@@ -320,10 +320,8 @@ class Camera(Part):
         """
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)
-        measured = self.form_measurement(
-            self.expose(scene, surface, at, field)
-            for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
-        )
+        starts = np.atleast_1d(np.asarray(start, np.float64)).tolist()
+        measured = self.form_measurement(self.expose(scene, surface, at, field) for at in starts)
         if sparse := sparse_frames(scene, self.integration_time):
             warnings = filter(None, (measured.data.attrs.get("warnings"), sparse))
             measured.data.attrs["warnings"] = "\n".join(warnings)

@@ -107,14 +107,11 @@ class Measurement:
         if lower_limit is not None:
             known["lower_limit"] = lower_limit
         known |= {"band_lower": band.lower, "band_upper": band.upper}
-        data = xr.Dataset(
-            {
-                name: (("time", "y", "x"), values[name], {"units": unit})
-                for name, unit in MEASUREMENT_UNITS.items()
-            },
-            coords=raster_coordinates(raster, times),
-            attrs=known,
-        )
+        variables = {
+            name: (("time", "y", "x"), values[name], {"units": unit})
+            for name, unit in MEASUREMENT_UNITS.items()
+        }
+        data = xr.Dataset(variables, raster_coordinates(raster, times), known)
         if band.response is not None:
             # The response at the nodes of the band's quadrature keeps the integral.
             data.coords["wavelength"] = "wavelength", band.wavelengths, {"units": "m"}

@@ -348,15 +348,10 @@ class HeatLoss(NamedTuple):
     def of(cls, surroundings: Surroundings, numerics: Numerics) -> "HeatLoss":
         """Return losses in the computed region, whose own border is not a free surface."""
         edge = 2 * numerics.cell
-        return cls(
-            surroundings.convection,
-            surroundings.emissivity,
-            surroundings.temperature,
-            left=-numerics.upstream,
-            right=numerics.downstream - edge,
-            bottom=-numerics.depth,
-            top=numerics.height - edge,
-        )
+        surface = surroundings.convection, surroundings.emissivity, surroundings.temperature
+        left, right = -numerics.upstream, numerics.downstream - edge
+        bottom, top = -numerics.depth, numerics.height - edge
+        return cls(*surface, left, right, bottom, top)
 
 
 @njit

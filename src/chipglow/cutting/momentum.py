@@ -64,13 +64,12 @@ class Step(NamedTuple):
     """Constants of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume without stress at room temperature
-    (m²), time step (s),
-    fraction of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli at room temperature
-    (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of
-    a point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
-    `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature over
-    `friction_melting` (K): see `friction_coefficient`. `viscosity` (Pa s) is
-    that of `NonlocalViscosity`.
+    (m²), time step (s), fraction of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli
+    at room temperature (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point
+    touches (m), area of a point (m²/m), friction; boundary: nodes under `floor`, and those left of
+    `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature
+    over `friction_melting` (K): see `friction_coefficient`. `viscosity` (Pa s) is that of
+    `NonlocalViscosity`.
     """
 
     mass: float

@@ -34,10 +34,8 @@ class Picture:
         self._grid, self._lattice, self._filled_by_tool = grid, lattice, filled_by_tool
         across = round((lattice.left - grid.left) / grid.cell)
         highest = round((lattice.top - grid.bottom) / grid.cell)
-        self._seen_nodes = (
-            slice(across, across + lattice.columns),
-            slice(highest - lattice.rows + 1, highest + 1),
-        )
+        rows = slice(highest - lattice.rows + 1, highest + 1)
+        self._seen_nodes = slice(across, across + lattice.columns), rows
         margin = 3 * grid.cell
         left, right, bottom, top = lattice.raster.extent
         self._view = (left - margin, right + margin, bottom - margin, top + margin)

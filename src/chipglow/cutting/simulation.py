@@ -612,13 +612,9 @@ def _grid(numerics: Numerics) -> Grid:
     margin = _MARGIN * numerics.cell
     width = numerics.upstream + numerics.downstream + 2 * margin
     height = numerics.depth + numerics.height + 2 * margin
-    return Grid(
-        left=-numerics.upstream - margin,
-        bottom=-numerics.depth - margin,
-        cell=numerics.cell,
-        columns=round(width / numerics.cell) + 1,
-        rows=round(height / numerics.cell) + 1,
-    )
+    columns, rows = (round(length / numerics.cell) + 1 for length in (width, height))
+    left, bottom = -numerics.upstream - margin, -numerics.depth - margin
+    return Grid(left, bottom, numerics.cell, columns, rows)
 
 
 def _sound(simulation: CuttingSimulation) -> float:

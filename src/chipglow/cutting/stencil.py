@@ -110,14 +110,10 @@ def sum_nodes(_context, nodes, i, j, wx, wy, dx, dy):  # type: ignore[no-untyped
             total = vectors.add_product(total, vectors.repeated(weight), column)
             by_x = vectors.add_product(by_x, vectors.repeated(slope), column)
             by_y = vectors.add_product(by_y, vectors.repeated(weight), column_by_y)
-        each = [
-            context.make_tuple(
-                builder,
-                sums.dtype,
-                [builder.extract_element(one, _LANE(lane)) for lane in range(SUMMED)],
-            )
-            for one in (total, by_x, by_y)
-        ]
+        each = []
+        for one in (total, by_x, by_y):
+            values = [builder.extract_element(one, _LANE(lane)) for lane in range(SUMMED)]
+            each.append(context.make_tuple(builder, sums.dtype, values))
         return context.make_tuple(builder, sums, each)
 
     return sums(*_AROUND), write

@@ -128,19 +128,12 @@ class Scene:
         if times.ndim != 1:
             raise SceneError(f"scene: times have shape {times.shape}, expected (time,)")
         shape = (times.size, *raster.shape)
-        data = xr.Dataset(
-            {
-                name: (
-                    ("time", "y", "x"),
-                    _as_stored(name, np.asarray(values), shape),
-                    {"units": units[name]},
-                )
-                for name, values in fields.items()
-            },
-            coords=raster_coordinates(raster, times),
-            attrs={**(attributes or {}), **(tool_attributes(tool) if tool else {})},
-        )
-        return cls(data)
+        variables: dict[str, Any] = {}
+        for name, values in fields.items():
+            stored = _as_stored(name, np.asarray(values), shape)
+            variables[name] = ("time", "y", "x"), stored, {"units": units[name]}
+        attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
+        return cls(xr.Dataset(variables, raster_coordinates(raster, times), attributes))
 
     def __len__(self) -> int:
         """Return the number of frames."""

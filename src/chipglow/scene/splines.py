@@ -24,8 +24,7 @@ SPLINE_FIELDS: Final = (
     "tool_temperature",
 )
 """Quantities of the coefficients: the workpiece's fields, the fraction of the area that chip and
-tool
-fill, and the tool's temperature."""
+tool fill, and the tool's temperature."""
 
 FILLED_SPLINE: Final = SPLINE_FIELDS.index("filled")
 TOOL_SPLINE: Final = SPLINE_FIELDS.index("tool_temperature")

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import ceil, cos, degrees, isfinite, pi, radians, sin, tan
 from typing import Annotated, Any, Final, Self
 
@@ -122,12 +123,9 @@ class Tool(ABC):
         rake, clearance = np.array(self.rake_direction), np.array(self.clearance_direction)
         pieces = np.concatenate([[-rake], np.diff(self.corners, axis=0), [clearance]])
         heading = np.unwrap(np.arctan2(pieces[:, 1], pieces[:, 0]))
-        round_edge = np.concatenate(
-            [
-                corner + self.corner_radius * _right_of(start, end, self.corner_radius > 0)
-                for corner, start, end in zip(self.corners, heading[:-1], heading[1:], strict=True)
-            ]
-        )
+        radius = self.corner_radius
+        arcs = [radius * _right_of(*turn, radius > 0) for turn in pairwise(heading)]
+        round_edge = np.concatenate([c + arc for c, arc in zip(self.corners, arcs, strict=True)])
         top, right = round_edge[0] + length * rake, round_edge[-1] + length * clearance
         return np.concatenate([top[None], round_edge, right[None]])
 

@@ -100,12 +100,9 @@ def _sections(raster: Raster, tool: Tool, elements: SideElements) -> _Sections:
     placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number)
     # So far from the face that a sample is on its element's side of it; the rake face has the
     # temperature of the tool beside it.
-    inside, of_chip = _INSIDE * raster.spacing, np.arange(elements.depths.size)
-    looked_up = np.where(
-        of_chip < elements.chip.start,
-        np.minimum(elements.depths, -inside),
-        np.maximum(elements.depths, inside),
-    )
+    inside, depths = _INSIDE * raster.spacing, elements.depths
+    of_tool = np.arange(depths.size) < elements.chip.start
+    looked_up = np.where(of_tool, np.minimum(depths, -inside), np.maximum(depths, inside))
     rows, columns = _samples_at(raster, tool, foot, looked_up)
     probes = _samples_at(raster, tool, foot, heights)
     return _Sections(rows, columns, probes, np.stack(placed), weight)
@@ -214,12 +211,10 @@ class SideShape(Modifier):
             if self.rake_emissivity is not None:
                 values[:, self.elements.face] = self.rake_emissivity
             incident = np.full((len(touching), values.shape[1]), surroundings)
+            light = np.where(void, surroundings, black(frame, rows, columns))
+            values = np.where(void, 1.0, values)
             incident[touching] = self.elements.exchange.incident(
-                np.where(void, surroundings, black(frame, rows, columns)),
-                np.where(void, 1.0, values),
-                surroundings,
-                self.mirror,
-                TOWARD_CAMERA,
+                light, values, surroundings, self.mirror, TOWARD_CAMERA
             )
             rows, columns, section, _ = sections.samples
             visible = touching[section] & (frame.material[rows, columns] != Material.VOID)
