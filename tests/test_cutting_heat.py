@@ -57,11 +57,11 @@ class WarmBlock(Block):
         )  # fmt: skip
 
     def contact(self):
-        shape = self.friction.shape
+        entered = np.zeros((*self.friction.shape, 2))
         heat_contact(
-            self.points, self.count, self.friction, np.zeros(shape), np.zeros((*shape, 2)),
-            self.increment, self.heat_nodes, self.tool_temperature, self.fraction, self.outline,
-            self.tool_heat, constant_properties()[1], self.step.heat_mass, self.grid,
+            self.points, self.count, self.friction, entered, self.increment, self.heat_nodes,
+            self.tool_temperature, self.fraction, self.outline, self.tool_heat,
+            constant_properties()[1], self.step.heat_mass, self.grid,
         )  # fmt: skip
         return_heat(self.points, self.count, self.increment, self.grid)
 

@@ -143,7 +143,7 @@ REFUSED = {
     "image 2: has other pix": lambda: emissivity(heated(), SMALL),
     "all: 0 of its 1200 pixels .*1200 s": lambda: emissivity(heated(flags=SATURATED)),
     "are all the same": lambda: em.emissivity_line(2 * [emissivity(heated()).line]),
-    "have shape": lambda: MapSurface(EVEN[:3], RASTER),
+    "values has shape": lambda: MapSurface(EVEN[:3], RASTER),
     "goes from 1.01 to 1.01, expected 0 to 1": lambda: MapSurface(2.02 * EVEN, RASTER),
     "no pixel is known": lambda: MapSurface(np.nan * EVEN, RASTER),
     "temperature: there is no image": lambda: em.true_temperature([], WHOLE, KNOWN),

@@ -321,7 +321,7 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
         (["frames=one"], "frames: 'one', expected first:end"),
         (["flat_field.low=none"], "flat_field.low: is missing"),
         (["flat_field.high=cold.npy", "flat_field.low=hot.npy"], "second brighter"),
-        (["flat_field.low=small.npy", "flat_field.high=none"], "of 4 x 3 pixels"),
+        (["flat_field.low=small.npy", "flat_field.high=none"], "pixels, expected 4 x 3"),
         (["flat_field.low=few.npy"], "2 frames, expected 8 or more"),
         (["saturation=5000"], "flat_field.high: .* saturated"),
         (["mirror=left"], "mirror: 'left', expected"),

@@ -17,8 +17,7 @@ def averaged(block, rate, length=LENGTH, duration=1e-6):
     """Mean rates of a block's points that have had a rate (1/s) for a time."""
     points = block.points
     points["strain"] = points["averaged_strain"] + rate * duration
-    nodes = np.zeros((2, block.grid.columns, block.grid.rows))
-    average_rates(points, block.count, nodes, np.zeros_like(nodes), block.grid, duration, length)
+    average_rates(points, block.count, block.grid, duration, length)
     return points["mean_rate"].copy()
 
 

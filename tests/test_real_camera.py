@@ -256,12 +256,12 @@ BAD = np.zeros((3, 3), bool)
         (lambda: NonUniformity.two_point(uniform(2000.0), uniform(1000.0)), "second brighter"),
         (
             lambda: NonUniformity.two_point(uniform(1000.0), uniform(2000.0, shape=(3, 4))),
-            "16 x 12 and 4 x 3 pixels",
+            "the second of 4 x 3 pixels, expected 16 x 12",
         ),
         (lambda: NonUniformity.one_point(np.ones((3, 4))), "expected \\(time, y, x\\)"),
-        (lambda: NonUniformity.one_point(np.ones((1, 3, 4))).apply(uniform(1.0)), "of 4 x 3"),
+        (lambda: NonUniformity.one_point(np.ones((1, 3, 4))).apply(uniform(1.0)), "expected 4 x 3"),
         (lambda: find_bad_pixels(uniform(2000.0), uniform(1000.0)), "second brighter"),
-        (lambda: replace_bad_pixels(np.ones((1, 3, 4)), np.zeros((2, 2), bool)), "of 2 x 2"),
+        (lambda: replace_bad_pixels(np.ones((1, 3, 4)), np.zeros((2, 2), bool)), "expected 2 x 2"),
         (lambda: ImagePosition(tip=(np.nan, 0.0)), "tip"),
         (
             lambda: calibrated(calibration=replace(LINE, range_name="A"), range_name="B"),
@@ -269,7 +269,7 @@ BAD = np.zeros((3, 3), bool)
         ),
         (lambda: calibrated("radiance"), "holds radiance, expected counts"),
         (lambda: calibrated("temperature", None, band=None), "band: is missing"),
-        (lambda: calibrated("radiance", None, {"bad_pixels": BAD}), "are of 3 x 3 pixels"),
+        (lambda: calibrated("radiance", None, {"bad_pixels": BAD}), "2 x 2 pixels, expected 3 x 3"),
     ],
 )
 def test_what_does_not_fit_is_refused(call, message):

@@ -26,6 +26,7 @@ from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
+from chipglow.scene.raster import check_shape
 from chipglow.surface import EmissivityField, Surface
 
 BORDER_TOLERANCE: Final = 1.0
@@ -70,7 +71,7 @@ class Camera(Part):
         default_factory=lambda: Band(3.8e-6, 5.1e-6)
     )
     pitch: Annotated[
-        float, Parameter("Distance between pixels on the scene.", LENGTH, over=0.0, most=1e-2)
+        float, Parameter("Distance between pixels on the scene.", LENGTH, most=1e-2)
     ] = 6e-6
     shape: Annotated[
         tuple[int, int] | None,
@@ -103,15 +104,14 @@ class Camera(Part):
             "values, as the paper does, so that the footprint counts twice."
         ),
     ] = "optics"
-    integration_time: Annotated[float, Parameter("Exposure time.", TIME, over=0.0)] = 10e-6
-    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
+    integration_time: Annotated[float, Parameter("Exposure time.", TIME)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0
     line_time: Annotated[
         float | None,
         Parameter(
             "Rolling shutter: delay between the exposures of successive rows; none: global "
             "shutter.",
             TIME,
-            over=0.0,
         ),
     ] = None
     time_constant: Annotated[
@@ -120,7 +120,6 @@ class Camera(Part):
             "Thermal time constant of a microbolometer, which makes frames lag; none: a photon "
             "detector.",
             TIME,
-            over=0.0,
         ),
     ] = None
     lower_limit: Annotated[
@@ -314,29 +313,15 @@ class Camera(Part):
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
-        """Measure a scene.
+        """Measure a scene, which has the true temperatures, with the emissivity of a surface.
 
-        Parameters
-        ----------
-        scene : Scene
-            The true temperatures.
-        surface : Surface
-            The emissivity.
-        start : float or sequence of float
-            Start of each frame's integration in s; `frame_times` returns a sequence at the frame
-            rate.
-
-        Returns
-        -------
-        Measurement
-            One frame for each start, with the scene's tool and attributes of camera and surface.
+        Returns one frame for each `start` of the integration in s (`frame_times` returns a sequence
+        at the frame rate), with the scene's tool and attributes of camera and surface.
         """
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)
-        measured = self.form_measurement(
-            self.expose(scene, surface, at, field)
-            for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
-        )
+        starts = np.atleast_1d(np.asarray(start, np.float64)).tolist()
+        measured = self.form_measurement(self.expose(scene, surface, at, field) for at in starts)
         if sparse := sparse_frames(scene, self.integration_time):
             warnings = filter(None, (measured.data.attrs.get("warnings"), sparse))
             measured.data.attrs["warnings"] = "\n".join(warnings)
@@ -356,8 +341,7 @@ class Camera(Part):
         and the fill factor; it returns what the pixels receive, such as the mean over each square.
         """
         image = np.asarray(radiance, np.float64)
-        if image.shape != scene.shape:
-            raise ValueError(f"camera: radiance must have shape {scene.shape}, not {image.shape}")
+        check_shape("camera: radiance", image.shape, scene.shape)
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and not negative")
         if self.psf is None or self.optics or gather is not integrate:

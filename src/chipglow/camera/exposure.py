@@ -78,12 +78,11 @@ def expose(
     if delays is None:
         delays = np.zeros(scene.raster.rows)
     indices, weights, middles = _row_weights(scene, start, duration, delays)
-    fields = list({id(view.emissivity): view.emissivity for view in views}.values())
+    fields = list(dict.fromkeys(view.emissivity for view in views))
     bands = list(dict.fromkeys(view.band for view in views))
-    indices_of_fields = {id(field): number for number, field in enumerate(fields)}
     stack = EmissivityStack(fields)
     sums = Sums(
-        np.array([[indices_of_fields[id(v.emissivity)], bands.index(v.band)] for v in views]),
+        np.array([[fields.index(view.emissivity), bands.index(view.band)] for view in views]),
         np.stack([_fine_table(band) for band in bands]),
         np.array([surroundings_radiance(v.band, v.reflected) for v in views], np.float32),
         max(field.max_emissivity for field in fields),

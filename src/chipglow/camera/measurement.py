@@ -15,7 +15,7 @@ from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
 from chipglow.scene.notebook import frames_text, plot_image
-from chipglow.scene.scene import raster_coordinates
+from chipglow.scene.scene import raster_coordinates, raster_of
 from chipglow.scene.tool_outline import stored_tool, tool_attributes
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
@@ -107,18 +107,20 @@ class Measurement:
         if lower_limit is not None:
             known["lower_limit"] = lower_limit
         known |= {"band_lower": band.lower, "band_upper": band.upper}
-        data = xr.Dataset(
-            {
-                name: (("time", "y", "x"), values[name], {"units": unit})
-                for name, unit in MEASUREMENT_UNITS.items()
-            },
-            coords=raster_coordinates(raster, times),
-            attrs=known,
-        )
+        variables = {
+            name: (("time", "y", "x"), values[name], {"units": unit})
+            for name, unit in MEASUREMENT_UNITS.items()
+        }
+        data = xr.Dataset(variables, raster_coordinates(raster, times), known)
         if band.response is not None:
-            data = data.assign(_response(band))
+            # The response at the nodes of the band's quadrature keeps the integral.
+            data.coords["wavelength"] = "wavelength", band.wavelengths, {"units": "m"}
+            response = np.asarray(band.response(band.wavelengths), np.float64)
+            data["response"] = "wavelength", response, {"units": "1"}
         if calibration_errors is not None:
-            data = data.assign(_errors(calibration_errors))
+            units = {"units": MEASUREMENT_UNITS["radiance"]}
+            data.coords[_ERRORS[1]] = _ERRORS[1], calibration_errors.radiance, units
+            data["calibration_errors"] = _ERRORS, calibration_errors.effects, units
         return cls(data)
 
     def __len__(self) -> int:
@@ -163,8 +165,7 @@ class Measurement:
     @cached_property
     def raster(self) -> Raster:
         """Grid of the pixels."""
-        x, y, pitch = self.data["x"].values, self.data["y"].values, float(self.data.attrs["pitch"])
-        return Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
+        return raster_of(self.data, float(self.data.attrs["pitch"]))
 
     @property
     def tool(self) -> Tool | None:
@@ -260,19 +261,3 @@ class Measurement:
 
 
 _ERRORS: Final = ("calibration_error", "calibration_radiance")
-
-
-def _errors(errors: CalibrationErrors) -> dict[str, xr.DataArray]:
-    """Return the variable of the calibration errors."""
-    units = {"units": MEASUREMENT_UNITS["radiance"]}
-    coords = {_ERRORS[1]: (_ERRORS[1], errors.radiance, units)}
-    return {"calibration_errors": xr.DataArray(errors.effects, coords, _ERRORS, attrs=units)}
-
-
-def _response(band: Band) -> dict[str, xr.DataArray]:
-    """Return the response at the band's quadrature nodes, which keeps the integral."""
-    assert band.response is not None
-    wavelength = ("wavelength", band.wavelengths, {"units": "m"})
-    values = np.asarray(band.response(band.wavelengths), np.float64)
-    coords = {"wavelength": wavelength}
-    return {"response": xr.DataArray(values, coords, ("wavelength",), attrs={"units": "1"})}

@@ -107,13 +107,10 @@ class RatioCamera(Part):
     ) -> RatioMeasurement:
         """Measure a scene; `start` is when the first channel begins to integrate frames in s."""
         starts = np.atleast_1d(np.asarray(start, np.float64)).tolist()
-        exposed = [self.expose(scene, surface, one) for one in starts]
-        first, second = (
-            camera.form_measurement(of_one)
-            for camera, of_one in zip(
-                self.with_common_pixels(scene.raster), zip(*exposed, strict=True), strict=True
-            )
-        )
+        exposed = [self.expose(scene, surface, at) for at in starts]
+        one, other = self.with_common_pixels(scene.raster)
+        first = one.form_measurement(of_both[0] for of_both in exposed)
+        second = other.form_measurement(of_both[1] for of_both in exposed)
         told = self.thermometer.temperature(first.radiance, second.radiance)
         usable = np.isfinite(first.radiance_temperature() + second.radiance_temperature())
         return RatioMeasurement(first, second, np.where(usable, told, np.nan))

@@ -235,14 +235,10 @@ def _add_features(fields, shifts, textures, weights, middles, first, last, sums)
 
 
 @njit(**_FAST)
-def _weighted(upper, middle, lower, u, v, w, result):
+def _combine(wide, base, u, v, w, result):
+    upper, middle, lower = wide[base], wide[base + 1], wide[base + 2]
     for i in range(result.size):
         result[i] = u * upper[i] + v * middle[i] + w * lower[i]
-
-
-@njit(**_FAST)
-def _combine(wide, base, u, v, w, result):
-    _weighted(wide[base], wide[base + 1], wide[base + 2], u, v, w, result)
 
 
 @njit(**_FAST)

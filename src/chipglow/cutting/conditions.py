@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Final, Self
 
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Parameter, Part, zero_to_one
 from chipglow.quantities.units import CUT_LENGTH, HEAT_TRANSFER, LENGTH, SPEED, TEMPERATURE, TIME
 from chipglow.scene import Raster
 
@@ -23,17 +23,14 @@ _FROM_CONTACT: Final = replace(CUT_LENGTH, positive=False)
 class CuttingConditions(Part):
     """Orthogonal cut; Table 2 of Heigel and Whitenton (2010) by default."""
 
-    speed: Annotated[float, Parameter("Cutting speed.", SPEED, over=0.0)] = 250.0 / 60.0
-    feed: Annotated[
-        float, Parameter("Feed: thickness of the uncut chip.", CUT_LENGTH, over=0.0)
-    ] = 0.3e-3
+    speed: Annotated[float, Parameter("Cutting speed.", SPEED)] = 250.0 / 60.0
+    feed: Annotated[float, Parameter("Feed: thickness of the uncut chip.", CUT_LENGTH)] = 0.3e-3
     cutting_length: Annotated[
         float,
         Parameter(
             "Cutting length, from the first contact. The paper's window ends at 1.958 mm; "
             "segments after it make the scatter of the headlines known.",
             CUT_LENGTH,
-            over=0.0,
         ),
     ] = 2.6e-3
     initial_temperature: Annotated[float, INITIAL_TEMPERATURE] = 293.15
@@ -54,11 +51,7 @@ class Friction(Part):
     coefficient: Annotated[float, Parameter("Coulomb's coefficient.", least=0.0, most=2.0)] = 0.5
     friction_factor: Annotated[
         float,
-        Parameter(
-            "Limit of the friction stress, as a fraction of the chip's shear flow stress.",
-            least=0.0,
-            most=1.0,
-        ),
+        zero_to_one("Limit of the friction stress, as a fraction of the chip's shear flow stress."),
     ] = 1.0
     conductance: float = 1e7
     thermal_exponent: Annotated[
@@ -92,14 +85,12 @@ class Surroundings(Part):
     ] = 0.0
     emissivity: Annotated[
         float,
-        Parameter(
-            "Total hemispherical emissivity with which free surfaces cool; not the camera's.",
-            least=0.0,
-            most=1.0,
+        zero_to_one(
+            "Total hemispherical emissivity with which free surfaces cool; not the camera's."
         ),
     ] = 0.0
     temperature: Annotated[
-        float, Parameter("Temperature of air and surroundings.", TEMPERATURE, over=0.0, most=1500.0)
+        float, Parameter("Temperature of air and surroundings.", TEMPERATURE, most=1500.0)
     ] = 293.15
 
 
@@ -115,9 +106,9 @@ class OutputWindow(Part):
     start: Annotated[
         float, Parameter("Cutting length at the first frame, under end.", _FROM_CONTACT, least=0.0)
     ] = 1.579e-3
-    end: Annotated[
-        float, Parameter("Cutting length at the last frame.", CUT_LENGTH, over=0.0, under=1.0)
-    ] = 1.958e-3
+    end: Annotated[float, Parameter("Cutting length at the last frame.", CUT_LENGTH, under=1.0)] = (
+        1.958e-3
+    )
     interval: Annotated[
         float,
         Parameter(
@@ -136,11 +127,9 @@ class OutputWindow(Part):
     ] = 2
     band_delay: Annotated[
         float,
-        Parameter(
+        zero_to_one(
             "When the band is developed: this part of the time between the last two valleys of "
-            "the cutting force after the later one.",
-            least=0.0,
-            most=1.0,
+            "the cutting force after the later one."
         ),
     ] = 0.22
     band_duration: Annotated[

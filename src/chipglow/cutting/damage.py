@@ -43,7 +43,7 @@ class JohnsonCookDamage(Part):
     d3: Annotated[float, Parameter("D₃.")]
     d4: Annotated[float, Parameter("D₄.", least=0.0)]
     d5: Annotated[float, Parameter("D₅.", over=-1.0)]
-    fracture_energy: Annotated[float, Parameter("G.", FRACTURE_ENERGY, over=0.0)]
+    fracture_energy: Annotated[float, Parameter("G.", FRACTURE_ENERGY)]
     loss: Annotated[
         float,
         Parameter(

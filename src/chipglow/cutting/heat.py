@@ -62,18 +62,11 @@ def conduct(  # type: ignore[no-untyped-def]
 
 
 @njit
-def _place(p, grid):  # type: ignore[no-untyped-def]
-    """Return the first node around a point, column and row, and the offset from it in cells."""
+def nodes_around(p, grid):  # type: ignore[no-untyped-def]
+    """Return the first node around a point, the offset from it in cells, and the weights."""
     i, ax = spline((p.x - grid.left) / grid.cell)
     j, ay = spline((p.y - grid.bottom) / grid.cell)
-    return i, j, ax, ay
-
-
-@njit
-def nodes_around(p, grid):  # type: ignore[no-untyped-def]
-    """Return the first node around a point, column and row, and the weights each way."""
-    i, j, ax, ay = _place(p, grid)
-    return i, j, spline_weights(ax), spline_weights(ay)
+    return i, j, ax, ay, spline_weights(ax), spline_weights(ay)
 
 
 @njit
@@ -92,8 +85,7 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
     nodes[:] = 0.0
     for k in range(count):
         p = points[k]
-        i, j, ax, ay = _place(p, grid)
-        wx, wy = spline_weights(ax), spline_weights(ay)
+        i, j, ax, ay, wx, wy = nodes_around(p, grid)
         heat = heat_mass * property_at(capacity, p.temperature)
         filled = p.volume / (grid.cell * grid.cell)
         for a in range(3):
@@ -112,8 +104,7 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
 @njit
 def _conduct_at(p, nodes, increment, conductivity, grid, duration, part):  # type: ignore[no-untyped-def]
     """Set the slopes of a point's temperature, damp its noise, and give its flux to its nodes."""
-    i, j, ax, ay = _place(p, grid)
-    wx, wy = spline_weights(ax), spline_weights(ay)
+    i, j, ax, ay, wx, wy = nodes_around(p, grid)
     sx, sy = _slopes(ax), _slopes(ay)
     seen = rise_x = rise_y = slope_x = slope_y = 0.0
     for a in range(3):
@@ -203,18 +194,17 @@ def conduct_beyond(temperature, far, border, fraction, tool_heat, grid, duration
 
 @njit(cache=True)
 def heat_contact(  # type: ignore[no-untyped-def]
-    points, count, friction, touched, entered, increment, nodes, temperature, fraction, tool,
-    tool_heat, capacity, heat_mass, grid,
+    points, count, friction, entered, increment, nodes, temperature, fraction, tool, tool_heat,
+    capacity, heat_mass, grid,
 ):  # fmt: skip
     """Share the friction work and exchange heat through the contact.
 
     Friction work (J/m, on the chip's nodes) goes to the points that touched the tool, and from each
     to chip and tool by their effusivities; each then exchanges heat with the tool next to it. Heat
-    that finds no point is kept for the next time. `touched` (columns, rows) is overwritten;
-    `entered` (columns, rows, 2) gathers heat that entered the tool (J/m), and contact area times
-    time (m s).
+    that finds no point is kept for the next time. `entered` (columns, rows, 2) gathers heat that
+    entered the tool (J/m), and contact area times time (m s).
     """
-    touched[:] = 0.0
+    touched = np.zeros_like(friction)
     for k in range(count):
         if points[k].contact_time > 0.0:
             _touch(points[k], touched, grid)
@@ -236,7 +226,7 @@ def heat_contact(  # type: ignore[no-untyped-def]
 @njit
 def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
     """Add a point's time in contact, weighted, to its nodes."""
-    i, j, wx, wy = nodes_around(p, grid)
+    i, j, _, _, wx, wy = nodes_around(p, grid)
     for a in range(3):
         for b in range(3):
             touched[i + a, j + b] += wx[a] * wy[b] * p.contact_time
@@ -245,7 +235,7 @@ def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
 @njit
 def _friction_work(p, friction, touched, grid):  # type: ignore[no-untyped-def]
     """Return a point's part of its nodes' friction work in J/m, by weight and time in contact."""
-    i, j, wx, wy = nodes_around(p, grid)
+    i, j, _, _, wx, wy = nodes_around(p, grid)
     work = 0.0
     for a in range(3):
         for b in range(3):
@@ -268,12 +258,23 @@ def _heat_contact_of(  # type: ignore[no-untyped-def]
     """
     distance, nx, ny = surface_distance(p.x, p.y, tool)
     dx, dy = -distance * nx / grid.cell, -distance * ny / grid.cell
+    # The tool's next place is half a cell under its surface.
+    down = distance + 0.5 * grid.cell
+    fx = (p.x - nx * down - grid.left) / grid.cell
+    fy = (p.y - ny * down - grid.bottom) / grid.cell
+    i, j = int(fx), int(fy)
+    ax, ay = fx - i, fy - j
+    total = weight = 0.0
+    for a in range(2):
+        for b in range(2):
+            w = _part_of_tool(fraction, i, j, ax, ay, a, b)
+            total += w * temperature[i + a, j + b]
+            weight += w
     into_tool = tool_heat.friction_fraction * work
     surface = p.temperature + p.rise_x * dx + p.rise_y * dy
     contact = tool_heat.area * p.contact_time
     layer = 0.5 * grid.cell / tool_heat.conductivity
-    inside = _tool_temperature(p.x, p.y, temperature, fraction, tool, grid)
-    inside += layer * into_tool / contact
+    inside = total / weight + layer * into_tool / contact
     chip = heat_mass * property_at(capacity, p.temperature)
     store = tool_heat.capacity * grid.cell**2
     both = chip * store / (chip + store)
@@ -281,7 +282,14 @@ def _heat_contact_of(  # type: ignore[no-untyped-def]
     heat = both * (1.0 - np.exp(-flow / both)) * (surface - inside)
     heat_surface(p, dx, dy, work - into_tool - heat, increment, nodes, grid)
     into_tool += heat
-    _warm(p.x, p.y, into_tool, contact, entered, temperature, fraction, tool, tool_heat, grid)
+    for a in range(2):
+        for b in range(2):
+            w = _part_of_tool(fraction, i, j, ax, ay, a, b)
+            if w > 0.0:
+                filled = max(fraction[i + a, j + b], SMALLEST_FRACTION)
+                temperature[i + a, j + b] += into_tool * w / weight / (store * filled)
+                entered[i + a, j + b, 0] += into_tool * w / weight
+                entered[i + a, j + b, 1] += contact * w / weight
 
 
 @njit
@@ -291,8 +299,7 @@ def heat_surface(p, dx, dy, heat, increment, nodes, grid):  # type: ignore[no-un
     Weights that are extrapolated to the surface keep the heat's first moment, and reach no node
     that the material does not fill.
     """
-    i, j, ax, ay = _place(p, grid)
-    wx, wy = spline_weights(ax), spline_weights(ay)
+    i, j, ax, ay, wx, wy = nodes_around(p, grid)
     sx, sy = _slopes(ax), _slopes(ay)
     for a in range(3):
         for b in range(3):
@@ -302,49 +309,9 @@ def heat_surface(p, dx, dy, heat, increment, nodes, grid):  # type: ignore[no-un
 
 
 @njit
-def _partner(x, y, tool, grid):  # type: ignore[no-untyped-def]
-    """Return nodes and weights of the place half a cell under the tool's surface."""
-    distance, nx, ny = surface_distance(x, y, tool)
-    down = distance + 0.5 * grid.cell
-    fx = (x - nx * down - grid.left) / grid.cell
-    fy = (y - ny * down - grid.bottom) / grid.cell
-    i, j = int(fx), int(fy)
-    return i, j, fx - i, fy - j
-
-
-@njit
-def _tool_temperature(x, y, temperature, fraction, tool, grid):  # type: ignore[no-untyped-def]
-    i, j, ax, ay = _partner(x, y, tool, grid)
-    total = weight = 0.0
-    for a in range(2):
-        for b in range(2):
-            w = (ax if a else 1.0 - ax) * (ay if b else 1.0 - ay) * fraction[i + a, j + b]
-            total += w * temperature[i + a, j + b]
-            weight += w
-    return total / weight
-
-
-@njit
-def _warm(  # type: ignore[no-untyped-def]
-    x, y, heat, contact, entered, temperature, fraction, tool, tool_heat, grid
-):
-    i, j, ax, ay = _partner(x, y, tool, grid)
-    weight = 0.0
-    for a in range(2):
-        for b in range(2):
-            weight += (ax if a else 1.0 - ax) * (ay if b else 1.0 - ay) * fraction[i + a, j + b]
-    for a in range(2):
-        for b in range(2):
-            w = (ax if a else 1.0 - ax) * (ay if b else 1.0 - ay) * fraction[i + a, j + b]
-            if w > 0.0:
-                store = (
-                    tool_heat.capacity
-                    * grid.cell**2
-                    * max(fraction[i + a, j + b], SMALLEST_FRACTION)
-                )
-                temperature[i + a, j + b] += heat * w / weight / store
-                entered[i + a, j + b, 0] += heat * w / weight
-                entered[i + a, j + b, 1] += contact * w / weight
+def _part_of_tool(fraction, i, j, ax, ay, a, b):  # type: ignore[no-untyped-def]
+    """Return the linear weight of node (i + a, j + b), times its fraction that is tool."""
+    return (ax if a else 1.0 - ax) * (ay if b else 1.0 - ay) * fraction[i + a, j + b]
 
 
 @njit(cache=True)
@@ -352,7 +319,7 @@ def return_heat(points, count, increment, grid):  # type: ignore[no-untyped-def]
     """Give the rise of temperature on the grid to the points: increments, so nothing diffuses."""
     for k in range(count):
         p = points[k]
-        i, j, wx, wy = nodes_around(p, grid)
+        i, j, _, _, wx, wy = nodes_around(p, grid)
         rise = 0.0
         for a in range(3):
             for b in range(3):
@@ -381,15 +348,10 @@ class HeatLoss(NamedTuple):
     def of(cls, surroundings: Surroundings, numerics: Numerics) -> "HeatLoss":
         """Return losses in the computed region, whose own border is not a free surface."""
         edge = 2 * numerics.cell
-        return cls(
-            surroundings.convection,
-            surroundings.emissivity,
-            surroundings.temperature,
-            left=-numerics.upstream,
-            right=numerics.downstream - edge,
-            bottom=-numerics.depth,
-            top=numerics.height - edge,
-        )
+        surface = surroundings.convection, surroundings.emissivity, surroundings.temperature
+        left, right = -numerics.upstream, numerics.downstream - edge
+        bottom, top = -numerics.depth, numerics.height - edge
+        return cls(*surface, left, right, bottom, top)
 
 
 @njit

@@ -119,7 +119,7 @@ class MarusichOrtiz(FlowStress):
     yield_stress: Annotated[float, Parameter("σ₀.", STRESS, over=0.0)]
     reference_strain: Annotated[float, Parameter("ε₀.", over=0.0)]
     reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)]
-    reference_temperature: Annotated[float, Parameter("T₀.", KELVINS, over=0.0)]
+    reference_temperature: Annotated[float, Parameter("T₀.", KELVINS)]
     hardening_exponent: Annotated[float, Parameter("n.", over=0.0)]
     rate_exponent: Annotated[float, Parameter("m.", over=0.0)]
     thermal_softening: Annotated[float, Parameter("α.", PER_KELVIN, least=0.0)]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.cutting.damage import BAND_CELLS, BAND_LENGTHS, FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Parameter, Part, zero_to_one
 from chipglow.quantities.units import (
     CONDUCTIVITY,
     DENSITY,
@@ -98,8 +98,8 @@ class NonlocalViscosity(Part):
     thickness of its layer from it as well, 2 ℓ: see `JohnsonCookDamage`.
     """
 
-    viscosity: Annotated[float, Parameter("η, of shear.", VISCOSITY, over=0.0)]
-    length: Annotated[float, Parameter("ℓ.", LENGTH, over=0.0)]
+    viscosity: Annotated[float, Parameter("η, of shear.", VISCOSITY)]
+    length: Annotated[float, Parameter("ℓ.", LENGTH)]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class WorkpieceMaterial(Part):
     """Material of the workpiece; a density over the temperature is thermal expansion."""
 
     name: Annotated[str, Parameter("Name, with the source of the numbers.")]
-    density: Annotated[float | TemperatureTable, Parameter("Density.", DENSITY, over=0.0)]
+    density: Annotated[float | TemperatureTable, Parameter("Density.", DENSITY)]
     young_modulus: Annotated[
         float | TemperatureTable, Parameter("Young's modulus.", STRESS, over=0.0)
     ]
@@ -118,11 +118,11 @@ class WorkpieceMaterial(Part):
     damage: Annotated[
         JohnsonCookDamage | None, Parameter("Damage; none for a material that does not fail.")
     ]
-    conductivity: Annotated[TemperatureTable, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
-    heat_capacity: Annotated[TemperatureTable, Parameter("Heat.", HEAT_CAPACITY, over=0.0)]
-    taylor_quinney: Annotated[
-        float | RateTable, Parameter("Fraction of work that is heat.", least=0.0, most=1.0)
-    ] = 0.9
+    conductivity: Annotated[TemperatureTable, Parameter("Conductivity.", CONDUCTIVITY)]
+    heat_capacity: Annotated[TemperatureTable, Parameter("Heat.", HEAT_CAPACITY)]
+    taylor_quinney: Annotated[float | RateTable, zero_to_one("Fraction of work that is heat.")] = (
+        0.9
+    )
     fitted_damage: Annotated[
         FittedDamage | None, Parameter("Uncertainty of fitted numbers of the damage.")
     ] = None
@@ -224,9 +224,9 @@ class ToolMaterial(Part):
     """Material of the tool: rigid, but it conducts heat."""
 
     name: Annotated[str, Parameter("Name, with the source of the numbers.")]
-    density: Annotated[float, Parameter("Density.", DENSITY, over=0.0)]
-    conductivity: Annotated[float, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
-    heat_capacity: Annotated[float, Parameter("Heat capacity.", HEAT_CAPACITY, over=0.0)]
+    density: Annotated[float, Parameter("Density.", DENSITY)]
+    conductivity: Annotated[float, Parameter("Conductivity.", CONDUCTIVITY)]
+    heat_capacity: Annotated[float, Parameter("Heat capacity.", HEAT_CAPACITY)]
 
     @property
     def effusivity(self) -> float:

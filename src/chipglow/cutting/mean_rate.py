@@ -2,6 +2,7 @@
 
 from math import ceil
 
+import numpy as np
 from numba import njit
 
 from chipglow.cutting.heat import nodes_around
@@ -11,29 +12,28 @@ GRID_VARIANCE = 0.5
 
 
 @njit(cache=True)
-def average_rates(points, count, nodes, spare, grid, duration, length):  # type: ignore[no-untyped-def]
+def average_rates(points, count, grid, duration, length):  # type: ignore[no-untyped-def]
     """Give points the Gaussian mean of the plastic strain rate around them, `mean_rate` in 1/s.
 
     The rate is averaged over the last `duration` (s), weighted by volume: where there is no
     material, nothing counts. The Gaussian of the standard deviation `length` (m) consists of
     three-point weights; its variance is right to rounding on every grid whose cell is less than √2
-    lengths, and that of the grid itself on a coarser one. `nodes` and `spare` (2, columns, rows)
-    are overwritten.
+    lengths, and that of the grid itself on a coarser one.
     """
-    nodes[:] = 0.0
+    nodes = np.zeros((2, grid.columns, grid.rows))
     for k in range(count):
         p = points[k]
-        i, j, wx, wy = nodes_around(p, grid)
+        i, j, _, _, wx, wy = nodes_around(p, grid)
         flow = p.volume * (p.strain - p.averaged_strain) / duration
         p.averaged_strain = p.strain
         for a in range(3):
             for b in range(3):
                 nodes[0, i + a, j + b] += wx[a] * wy[b] * p.volume
                 nodes[1, i + a, j + b] += wx[a] * wy[b] * flow
-    _blur(nodes, spare, max((length / grid.cell) ** 2 - GRID_VARIANCE, 0.0))
+    _blur(nodes, max((length / grid.cell) ** 2 - GRID_VARIANCE, 0.0))
     for k in range(count):
         p = points[k]
-        i, j, wx, wy = nodes_around(p, grid)
+        i, j, _, _, wx, wy = nodes_around(p, grid)
         volume = flow = 0.0
         for a in range(3):
             for b in range(3):
@@ -43,7 +43,7 @@ def average_rates(points, count, nodes, spare, grid, duration, length):  # type:
 
 
 @njit
-def _blur(nodes, spare, variance):  # type: ignore[no-untyped-def]
+def _blur(nodes, variance):  # type: ignore[no-untyped-def]
     """Blur two fields on nodes by a variance in squares of a cell."""
     passes = ceil(2.0 * variance)
     if passes == 0:
@@ -51,7 +51,7 @@ def _blur(nodes, spare, variance):  # type: ignore[no-untyped-def]
     side = 0.5 * variance / passes
     middle = 1.0 - 2.0 * side
     _, columns, rows = nodes.shape
-    spare[:] = 0.0  # its border stays so: no pass writes there
+    spare = np.zeros_like(nodes)  # its border stays so: no pass writes there
     for _ in range(passes):
         for c in range(2):
             for i in range(1, columns - 1):

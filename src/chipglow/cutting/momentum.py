@@ -64,13 +64,12 @@ class Step(NamedTuple):
     """Constants of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume without stress at room temperature
-    (m²), time step (s),
-    fraction of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli at room temperature
-    (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of
-    a point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
-    `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature over
-    `friction_melting` (K): see `friction_coefficient`. `viscosity` (Pa s) is
-    that of `NonlocalViscosity`.
+    (m²), time step (s), fraction of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli
+    at room temperature (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point
+    touches (m), area of a point (m²/m), friction; boundary: nodes under `floor`, and those left of
+    `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature
+    over `friction_melting` (K): see `friction_coefficient`. `viscosity` (Pa s) is that of
+    `NonlocalViscosity`.
     """
 
     mass: float
@@ -152,19 +151,9 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
     txx, tyy = force * (soft * p.dxx + tension), force * (soft * p.dyy + tension)
     txy = force * soft * p.dxy
     mx, my = mass * p.own_vx, mass * p.own_vy
-    hx, hy = step.time_step * fx, step.time_step * fy
-    add_to_nodes(
-        nodes,
-        i,
-        j,
-        wx,
-        wy,
-        _distances(ax),
-        _distances(ay),
-        (mass, mx, my, hx, hy, limit),
-        (0.0, qxx, qyx, -txx, -txy),
-        (0.0, qxy, qyy, -txy, -tyy),
-    )
+    level = (mass, mx, my, step.time_step * fx, step.time_step * fy, limit)
+    by_x, by_y = (0.0, qxx, qyx, -txx, -txy), (0.0, qxy, qyy, -txy, -tyy)
+    add_to_nodes(nodes, i, j, wx, wy, _distances(ax), _distances(ay), level, by_x, by_y)
     return True
 
 

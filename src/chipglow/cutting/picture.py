@@ -34,10 +34,8 @@ class Picture:
         self._grid, self._lattice, self._filled_by_tool = grid, lattice, filled_by_tool
         across = round((lattice.left - grid.left) / grid.cell)
         highest = round((lattice.top - grid.bottom) / grid.cell)
-        self._seen_nodes = (
-            slice(across, across + lattice.columns),
-            slice(highest - lattice.rows + 1, highest + 1),
-        )
+        rows = slice(highest - lattice.rows + 1, highest + 1)
+        self._seen_nodes = slice(across, across + lattice.columns), rows
         margin = 3 * grid.cell
         left, right, bottom, top = lattice.raster.extent
         self._view = (left - margin, right + margin, bottom - margin, top + margin)
@@ -67,12 +65,8 @@ class Picture:
         nodes = np.concatenate([coefficients, filled[..., None], tool], axis=2)
         limits = np.stack([at_points.min(axis=0), at_points.max(axis=0)], axis=1)
         from_the_top = nodes[self._seen_nodes][:, ::-1].transpose(2, 1, 0)
-        return SplineFrame(
-            self._lattice,
-            time,
-            np.ascontiguousarray(from_the_top, np.float32),
-            limits.astype(np.float32),
-        ).frame()
+        from_the_top = np.ascontiguousarray(from_the_top, np.float32)
+        return SplineFrame(self._lattice, time, from_the_top, limits.astype(np.float32)).frame()
 
 
 def lattice_of(grid: Grid, raster: Raster, tool: Tool, ambient: float) -> Lattice:

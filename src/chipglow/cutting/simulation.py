@@ -135,36 +135,25 @@ class CuttingSimulation:
     Material points (MLS-MPM with affine velocities) carry stress, strain, temperature and their
     place before the cut; the tool is rigid and conducts heat. The cut starts at time 0, when the
     workpiece touches the rake face.
-
-    Parameters
-    ----------
-    conditions : CuttingConditions
-        Speed, feed, cutting length.
-    tool : Tool
-        Outline of the tool.
-    workpiece : WorkpieceMaterial
-        The workpiece's material.
-    tool_material : ToolMaterial
-        The tool's material.
-    friction : Friction
-        Friction and heat in the contact.
-    numerics : Numerics
-        Cells, time steps and region.
-    surroundings : Surroundings
-        Surroundings to which free surfaces lose heat.
-    tool_temperature : float or ToolBody, optional
-        Initial temperature of the tool in K. A body: the steady-state temperature of a long cut,
-        by conduction through this body. None: the temperature of the workpiece, as in the paper.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
+    """Speed, feed, cutting length."""
     tool: Tool = field(default_factory=ToolGeometry)
+    """Outline of the tool."""
     workpiece: WorkpieceMaterial = field(default_factory=partial(workpiece, "aisi-1045"))
+    """The workpiece's material."""
     tool_material: ToolMaterial = field(default_factory=partial(tool_material, "carbide"))
+    """The tool's material."""
     friction: Friction = field(default_factory=Friction)
+    """Friction and heat in the contact."""
     numerics: Numerics = field(default_factory=Numerics)
+    """Cells, time steps and region."""
     surroundings: Surroundings = field(default_factory=Surroundings)
+    """Surroundings to which free surfaces lose heat."""
     tool_temperature: float | ToolBody | None = None
+    """Initial temperature of the tool in K. A body: the steady-state temperature of a long cut, by
+    conduction through this body. None: the temperature of the workpiece, as in the paper."""
 
     def run(
         self,
@@ -196,7 +185,6 @@ class CuttingSimulation:
         done = restore(state, resume, records) if resume is not None else 0
         recorder.replay(records[:done, 0])
         for record in range(done + 1, last + 1):
-            state.mark()
             records[record - 1] = state.advance()
             if recorder.wants(record, records[record - 1, 0]):
                 on_frame(state.frame(picture))
@@ -376,17 +364,12 @@ class _State:
             friction_melting=inf if exponent is None else material.melting_temperature,
             viscosity=resists.viscosity if resists is not None else 0.0,
         )
-        law, damage = material.flow_stress.numbers(), material.damage
+        law = material.flow_stress.numbers()
+        damage = Damage.of(material.damage, material.failing_layer(cell))
         self.step_points = advance_with(law)
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.matter = (
-            law,
-            Damage.of(damage, material.failing_layer(cell)),
-            self.elastic,
-            self.capacity,
-            material.heat_fractions(),
-        )
+        self.matter = law, damage, self.elastic, self.capacity, material.heat_fractions()
         self.conductivity = material.conductivity.sampled()
         start, of_tool = conditions.initial_temperature, simulation.tool_material
         conductivity = float(material.conductivity.at(start))
@@ -407,10 +390,7 @@ class _State:
         self.velocity[..., VELOCITY_X] = conditions.speed
         self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat_nodes = np.zeros((*shape, 3))
-        self.rate_nodes = np.zeros((2, *shape))
-        self.rate_spare = np.zeros((2, *shape))
         self.increment = np.zeros(shape)
-        self.touched = np.zeros(shape)
         self.entered = np.zeros((*shape, 2))
         self.contact_area = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
@@ -424,7 +404,6 @@ class _State:
         self.grids = (
             self.starts, self.velocity, self.nodes, self.friction_heat, self.tool, self.grid
         )  # fmt: skip
-        self.right, self.top = numerics.downstream, numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
         self.choose_steps()
@@ -495,8 +474,9 @@ class _State:
         self.count += new.size
 
     def _sort(self) -> None:
+        right, top = self.simulation.numerics.downstream, self.simulation.numerics.height
         count = sort_by_cell(
-            self.points, self.count, self.grid, self.right, self.top, self.spare, self.starts
+            self.points, self.count, self.grid, right, top, self.spare, self.starts
         )
         if count < 0:
             self._fail("a point's position is not finite", -1 - count)
@@ -510,6 +490,9 @@ class _State:
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; return mean forces in N/m, thickness in m, and the energies."""
         sums, threads = np.zeros_like(self.work), get_num_threads()
+        resists = self.simulation.workpiece.nonlocal_viscosity
+        points = self.points[: self.count]
+        points["strain_before"] = points["strain"]
         for _ in range(self.cycles):
             before = self._held().sum()
             self._let_in(self.time)
@@ -522,7 +505,8 @@ class _State:
             if not good:
                 self._stop_at(find_off_grid(self.points[: self.count], self.grid))
             self._conduct()
-            self._average_rates()
+            if resists is not None:
+                average_rates(self.points, self.count, self.grid, self.cycle, resists.length)
         self._stop_at(find_trouble(self.points[: self.count]))
         self.work += sums
         forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
@@ -559,12 +543,6 @@ class _State:
             held_energy(self.points, self.count, self.step, self.elastic, self.grid.cell)
         )
 
-    def _average_rates(self) -> None:
-        resists = self.simulation.workpiece.nonlocal_viscosity
-        if resists is not None:
-            nodes, spare, length = self.rate_nodes, self.rate_spare, resists.length
-            average_rates(self.points, self.count, nodes, spare, self.grid, self.cycle, length)
-
     def _conduct(self) -> None:
         points, count, grid, cycle = self.points, self.count, self.grid, self.cycle
         nodes, rise, mass = self.heat_nodes, self.increment, self.step.heat_mass
@@ -577,8 +555,8 @@ class _State:
         if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
             self.lost_heat += lose_heat(nodes, rise, tool, filled, heat, self.loss, grid, cycle)
         heat_contact(
-            points, count, self.friction_heat, self.touched, self.entered, rise, nodes, tool,
-            filled, self.tool, heat, capacity, mass, grid,
+            points, count, self.friction_heat, self.entered, rise, nodes, tool, filled, self.tool,
+            heat, capacity, mass, grid,
         )  # fmt: skip
         return_heat(points, count, rise, grid)
 
@@ -615,11 +593,6 @@ class _State:
         first, last = np.append(0, ends + 1), np.append(ends, distance.size - 1)
         return float((distance[last] - distance[first]).max() + self.spacing)
 
-    def mark(self) -> None:
-        """Start a new interval of the strain rate."""
-        points = self.points[: self.count]
-        points["strain_before"] = points["strain"]
-
     def _stop_at(self, trouble: Trouble | None) -> None:
         if trouble is not None:
             self._fail(*trouble)
@@ -639,13 +612,9 @@ def _grid(numerics: Numerics) -> Grid:
     margin = _MARGIN * numerics.cell
     width = numerics.upstream + numerics.downstream + 2 * margin
     height = numerics.depth + numerics.height + 2 * margin
-    return Grid(
-        left=-numerics.upstream - margin,
-        bottom=-numerics.depth - margin,
-        cell=numerics.cell,
-        columns=round(width / numerics.cell) + 1,
-        rows=round(height / numerics.cell) + 1,
-    )
+    columns, rows = (round(length / numerics.cell) + 1 for length in (width, height))
+    left, bottom = -numerics.upstream - margin, -numerics.depth - margin
+    return Grid(left, bottom, numerics.cell, columns, rows)
 
 
 def _sound(simulation: CuttingSimulation) -> float:

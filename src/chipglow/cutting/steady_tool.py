@@ -31,7 +31,7 @@ class ToolBody(Part):
     """Body through which the heat of a steady tool flows."""
 
     width: Annotated[
-        float, Parameter("Width of cut; the paper's discs are 3 mm thick.", LENGTH, over=0.0)
+        float, Parameter("Width of cut; the paper's discs are 3 mm thick.", LENGTH)
     ] = 3e-3
     holder_distance: Annotated[
         float,
@@ -43,11 +43,8 @@ class ToolBody(Part):
 
     def fall(self, r: Field) -> Field:
         """Return Φ(r) − Φ(R) at distances r from the edge in m; 0 from the holder on."""
-
-        def potential(distance: Field) -> Field:
-            return np.asarray(np.log1p(self.width / distance))
-
-        return np.maximum(potential(r) - potential(np.asarray(self.holder_distance)), 0.0)
+        here, there = (np.log1p(self.width / at) for at in (r, self.holder_distance))
+        return np.asarray(np.maximum(here - there, 0.0))
 
     def spreading(self, r: Field) -> Field:
         """Return the width that heat flows through at a distance, over that of the cut."""

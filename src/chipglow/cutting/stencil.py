@@ -22,6 +22,7 @@ _DOUBLE: Final = ir.DoubleType()
 _LANE: Final = ir.IntType(32)
 _NODES: Final = types.float64[:, :, ::1]
 _THREE: Final = types.UniTuple(types.float64, 3)
+_AROUND: Final = (_NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE)
 _FUSE: Final = ("contract",)
 _ALIGNED_TO: Final = 8
 
@@ -54,12 +55,6 @@ class _Vectors:
     def add_product(self, c: Any, a: Any, b: Any) -> Any:
         """Return c + a b."""
         return self.builder.fadd(c, self.product(a, b), flags=_FUSE)
-
-    def load(self, place: Any) -> Any:
-        return self.builder.load(place, align=_ALIGNED_TO)
-
-    def store(self, vector: Any, place: Any) -> None:
-        self.builder.store(vector, place, align=_ALIGNED_TO)
 
     def nodes(self, array: Any, i: Any, j: Any) -> list[list[Any]]:
         """Return the addresses of the nodes (i + a, j + b), [a][b]."""
@@ -108,24 +103,20 @@ def sum_nodes(_context, nodes, i, j, wx, wy, dx, dy):  # type: ignore[no-untyped
         for a in range(3):
             column, column_by_y = vectors.zero, vectors.zero
             for b in range(3):
-                value = vectors.load(places[a][b])
+                value = builder.load(places[a][b], align=_ALIGNED_TO)
                 column = vectors.add_product(column, weights[b], value)
                 column_by_y = vectors.add_product(column_by_y, slopes[b], value)
             weight, slope = wx[a], vectors.product(wx[a], dx[a])
             total = vectors.add_product(total, vectors.repeated(weight), column)
             by_x = vectors.add_product(by_x, vectors.repeated(slope), column)
             by_y = vectors.add_product(by_y, vectors.repeated(weight), column_by_y)
-        each = [
-            context.make_tuple(
-                builder,
-                sums.dtype,
-                [builder.extract_element(one, _LANE(lane)) for lane in range(SUMMED)],
-            )
-            for one in (total, by_x, by_y)
-        ]
+        each = []
+        for one in (total, by_x, by_y):
+            values = [builder.extract_element(one, _LANE(lane)) for lane in range(SUMMED)]
+            each.append(context.make_tuple(builder, sums.dtype, values))
         return context.make_tuple(builder, sums, each)
 
-    return sums(_NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE), write
+    return sums(*_AROUND), write
 
 
 @intrinsic
@@ -153,15 +144,10 @@ def add_to_nodes(_context, nodes, i, j, wx, wy, dx, dy, level, by_x, by_y):  # t
             column = vectors.add_product(level, vectors.repeated(dx[a]), by_x)
             column, column_by_y = vectors.product(weight, column), vectors.product(weight, by_y)
             for b in range(3):
-                value = vectors.load(places[a][b])
+                value = builder.load(places[a][b], align=_ALIGNED_TO)
                 value = vectors.add_product(value, weights[b], column)
                 value = vectors.add_product(value, slopes[b], column_by_y)
-                vectors.store(value, places[a][b])
+                builder.store(value, places[a][b], align=_ALIGNED_TO)
         return context.get_dummy_value()
 
-    return (
-        types.void(
-            _NODES, types.int64, types.int64, _THREE, _THREE, _THREE, _THREE, level, by_x, by_y
-        ),
-        write,
-    )
+    return types.void(*_AROUND, level, by_x, by_y), write

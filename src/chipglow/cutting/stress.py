@@ -145,14 +145,9 @@ def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
         b[DXX + k] *= scale
         b[DYY + k] *= scale
         b[DXY + k] *= scale
+        rate, mean = increment * per_step, b[TENSION + k]
         b[DAMAGE + k] += fails * damage_growth(
-            b[DAMAGE + k],
-            increment,
-            increment * per_step,
-            b[TENSION + k],
-            some,
-            b[TEMPERATURE + k],
-            damage,
+            b[DAMAGE + k], increment, rate, mean, some, b[TEMPERATURE + k], damage
         )
         b[STRAIN + k] += increment
         b[WORK + k] = stress * increment * volume

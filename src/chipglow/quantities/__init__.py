@@ -5,7 +5,7 @@ from chipglow.quantities.format import (
     rounded_text as rounded_text,
     uncertain_text as uncertain_text,
 )
-from chipglow.quantities.parameter import Parameter as Parameter
+from chipglow.quantities.parameter import Parameter as Parameter, zero_to_one as zero_to_one
 from chipglow.quantities.part import (
     Family as Family,
     FileBeside as FileBeside,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from types import NoneType, UnionType
 from typing import Any, Final, Literal, Union, get_args, get_origin
@@ -38,7 +39,8 @@ class Parameter:
     quantity : Quantity, optional
         How a description writes it; without one it is a plain number, word or file.
     over, least, under, most : float, optional
-        Limits: `over` and `under` are excluded, `least` and `most` are included.
+        Limits: `over` and `under` are excluded, `least` and `most` are included. A quantity that is
+        positive is `over` 0 by itself.
     allowed : str
         Allowed values that the limits do not state.
     """
@@ -50,6 +52,11 @@ class Parameter:
     under: float | None = None
     most: float | None = None
     allowed: str = ""
+
+    def __post_init__(self) -> None:
+        positive = self.quantity is not None and self.quantity.positive
+        if positive and self.over is None and self.least is None:
+            object.__setattr__(self, "over", 0.0)
 
     @property
     def limits(self) -> str:
@@ -187,6 +194,10 @@ class Parameter:
             "" if self.most is None else f"up to {text(self.most)}",
         )
         return ", ".join(word for word in words if word) or "a finite number"
+
+
+zero_to_one: Final = partial(Parameter, least=0.0, most=1.0)
+"""Declares a fraction: a number from 0 to 1."""
 
 
 def _take_lists(schema: Any) -> None:

@@ -19,12 +19,12 @@ class ObjectParameters(Part):
     """
 
     emissivity: Annotated[float, Parameter("Emissivity ε of the object.", over=0.0, most=1.0)] = 1.0
-    reflected: Annotated[float, Parameter("Reflected temperature.", TEMPERATURE, over=0.0)] = 293.15
+    reflected: Annotated[float, Parameter("Reflected temperature.", TEMPERATURE)] = 293.15
     transmittance: Annotated[
         float, Parameter("Transmittance τ of atmosphere and window.", over=0.0, most=1.0)
     ] = 1.0
     atmosphere: Annotated[
-        float, Parameter("Temperature of atmosphere and window.", TEMPERATURE, over=0.0)
+        float, Parameter("Temperature of atmosphere and window.", TEMPERATURE)
     ] = 293.15
 
     def apparent_radiance(self, temperature: ArrayLike, band: Band) -> Array:

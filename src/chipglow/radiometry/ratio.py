@@ -85,11 +85,9 @@ class RatioThermometer(Part):
     def sensitivity(self, temperature: ArrayLike) -> Array:
         """Return the relative change of the ratio with the temperature, d ln r / dT, in 1/K."""
         kelvins = np.asarray(temperature, np.float64)
-        return np.asarray(
-            self.first.slope(kelvins) / self.first.radiance(kelvins)
-            - self.second.slope(kelvins) / self.second.radiance(kelvins),
-            np.float64,
-        )
+        upper = self.first.slope(kelvins) / self.first.radiance(kelvins)
+        lower = self.second.slope(kelvins) / self.second.radiance(kelvins)
+        return np.asarray(upper - lower, np.float64)
 
     def emissivity_error(self, temperature: ArrayLike, ratio: ArrayLike) -> Array:
         """Return the error in K where the emissivities have another ratio than assumed.

@@ -1,7 +1,7 @@
 """From what a source says to a whole scene: what is missing, and what stands in for it."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
@@ -49,9 +49,7 @@ class Completion(Part):
     surroundings: Annotated[
         float,
         Parameter(
-            "Temperature where there is no material, and of a tool that has none.",
-            TEMPERATURE,
-            over=0.0,
+            "Temperature where there is no material, and of a tool that has none.", TEMPERATURE
         ),
     ] = 293.15
     tool: Tool | None = None
@@ -97,37 +95,36 @@ class Completion(Part):
         """Number of earlier frames on which a frame depends."""
         return max(self.rate_frames, _FLOW_FRAMES)
 
-    def fields(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
+    def fields(self, found: Collection[str], frames: int) -> tuple[str, ...]:
         """Names of the fields of the scene, in their order."""
-        known = set(found)
+        has_coordinates = MATERIAL_COORDINATE_UNITS.keys() <= set(found)
         has = {
             "temperature": True,
-            "plastic_strain": self._has_strain(known),
-            "plastic_strain_rate": self._has_rate(known, frames),
-            "velocity_x": self._has_velocity(known),
-            "velocity_y": self._has_velocity(known),
+            "plastic_strain": self._has_strain(found),
+            "plastic_strain_rate": self._has_rate(found, frames),
+            "velocity_x": self._has_velocity(found),
+            "velocity_y": self._has_velocity(found),
             "material": True,
-            **{name: set(MATERIAL_COORDINATE_UNITS) <= known for name in MATERIAL_COORDINATE_UNITS},
+            **dict.fromkeys(MATERIAL_COORDINATE_UNITS, has_coordinates),
             QUALITY: True,
         }
         return tuple(name for name, there in has.items() if there)
 
-    def assumptions(self, found: Iterable[str], frames: int) -> Iterator[str]:
+    def assumptions(self, found: Collection[str], frames: int) -> Iterator[str]:
         """Yield a sentence for each missing field and its substitute."""
-        known = set(found)
-        if not known & _VELOCITY:
-            yield f"Velocity: {self._velocity_text(known, frames)}"
-        if "plastic_strain" not in known and self.chip is None:
+        if _VELOCITY.isdisjoint(found):
+            yield f"Velocity: {self._velocity_text(found, frames)}"
+        if "plastic_strain" not in found and self.chip is None:
             yield "Plastic strain: none, so no feature of the chip has its own emissivity."
-        elif "plastic_strain" not in known:
+        elif "plastic_strain" not in found:
             yield f"Plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere."
-        if "plastic_strain_rate" not in known and self._has_rate(known, frames):
+        if "plastic_strain_rate" not in found and self._has_rate(found, frames):
             yield "Plastic strain rate: from the change of the strain along the motion."
-        elif "plastic_strain_rate" not in known:
+        elif "plastic_strain_rate" not in found:
             yield "Plastic strain rate: none, so the shear band has the emissivity of the chip."
 
-    def _velocity_text(self, known: set[str], frames: int) -> str:
-        if not self._has_velocity(known):
+    def _velocity_text(self, found: Collection[str], frames: int) -> str:
+        if not self._has_velocity(found):
             return "none; completion.motion: flow derives it from the images."
         if self.cutting_speed is None and frames == 1:
             return "0 everywhere, because the scene has one frame and no cutting speed."
@@ -136,23 +133,22 @@ class Completion(Part):
         chip = "0" if frames == 1 else "that of the optical flow"
         return f"the cutting speed where the strain is small, in the chip {chip}."
 
-    def uses_flow(self, found: Iterable[str], frames: int) -> bool:
+    def uses_flow(self, found: Collection[str], frames: int) -> bool:
         """Return whether the optical flow may be asked for the velocity."""
-        known = set(found)
-        return frames > 1 and not known & _VELOCITY and self._has_velocity(known)
+        return frames > 1 and _VELOCITY.isdisjoint(found) and self._has_velocity(found)
 
-    def _has_strain(self, known: set[str]) -> bool:
-        return "plastic_strain" in known or self.chip is not None
+    def _has_strain(self, found: Collection[str]) -> bool:
+        return "plastic_strain" in found or self.chip is not None
 
-    def _has_rate(self, known: set[str], frames: int) -> bool:
-        taken = "plastic_strain" in known and frames > 1 and self._has_velocity(known)
-        return "plastic_strain_rate" in known or taken
+    def _has_rate(self, found: Collection[str], frames: int) -> bool:
+        taken = "plastic_strain" in found and frames > 1 and self._has_velocity(found)
+        return "plastic_strain_rate" in found or taken
 
-    def _has_velocity(self, known: set[str]) -> bool:
-        if known & _VELOCITY:
+    def _has_velocity(self, found: Collection[str]) -> bool:
+        if not _VELOCITY.isdisjoint(found):
             return True
         if self.motion == "auto":
-            return self.cutting_speed is not None or self._has_strain(known)
+            return self.cutting_speed is not None or self._has_strain(found)
         return self.motion == "flow"
 
 
@@ -234,7 +230,11 @@ def _finished(
         velocity = _velocity(now, others, raster, completion)
         fields |= zip(("velocity_x", "velocity_y"), velocity, strict=True)
         if "plastic_strain_rate" in names and "plastic_strain_rate" not in fields:
-            fields["plastic_strain_rate"] = _rate(now, others, velocity, raster, completion)
+            other = others[max(len(others) - completion.rate_frames, 0)]
+            strain, before = (frame.fields["plastic_strain"] for frame in (now, other))
+            interval, spacing = now.time - other.time, raster.spacing
+            rate = strain_rate_along(strain, before, velocity, interval, spacing)
+            fields["plastic_strain_rate"] = rate
     whole: dict[str, Any] = {name: _elsewhere(values) for name, values in fields.items()}
     for name in ("plastic_strain", "plastic_strain_rate"):
         if name in whole:
@@ -244,19 +244,6 @@ def _finished(
 
 
 _Velocity: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
-
-
-def _rate(
-    now: SampledFrame,
-    others: Sequence[SampledFrame],
-    velocity: _Velocity,
-    raster: Raster,
-    completion: Completion,
-) -> NDArray[np.float32]:
-    """Strain rate from the change of the strain along the motion."""
-    other = others[max(len(others) - completion.rate_frames, 0)]
-    strain, before = (frame.fields["plastic_strain"] for frame in (now, other))
-    return strain_rate_along(strain, before, velocity, now.time - other.time, raster.spacing)
 
 
 def _velocity(
@@ -296,7 +283,7 @@ def _elsewhere(values: NDArray[np.float32], value: float = 0.0) -> NDArray[np.fl
 def strain_rate_along(
     strain: NDArray[np.float32],
     before: NDArray[np.float32],
-    velocity: tuple[NDArray[np.float32], NDArray[np.float32]],
+    velocity: _Velocity,
     interval: float,
     spacing: float,
 ) -> NDArray[np.float32]:
@@ -317,7 +304,7 @@ def strain_rate_along(
 
 def optical_flow(
     before: NDArray[np.float32], after: NDArray[np.float32], interval: float, spacing: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> _Velocity:
     """Return the velocity along x and up in m/s by which a pattern moved, shape (y, x) each.
 
     Total variation with the L1 norm (Zach, Pock and Bischof 2007) by scikit-image, on a picture of

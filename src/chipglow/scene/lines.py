@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
-from chipglow.scene.raster import Raster
+from chipglow.scene.raster import Raster, check_shape
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,7 @@ class Line:
     """x and y in m, shape (n, 2)."""
 
     def __post_init__(self) -> None:
-        if self.points.shape != (self.distance.size, 2):
-            raise ValueError(
-                f"line: points have shape {self.points.shape}, "
-                f"expected ({self.distance.size}, 2) as there are distances"
-            )
+        check_shape("line: points", self.points.shape, (self.distance.size, 2))
         if (np.diff(self.distance) <= 0).any():
             raise ValueError("line: distance must ascend")
 

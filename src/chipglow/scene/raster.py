@@ -7,30 +7,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    """Raise a ValueError with the name of an array if it has another shape than expected."""
+    if found != expected:
+        raise ValueError(f"{name} has shape {found}, expected {expected}")
+
+
 @dataclass(frozen=True)
 class Raster:
     """A regular grid of square samples, row 0 at the top.
 
-    Parameters
-    ----------
-    left, top : float
-        Outer corner of the first sample in m.
-    spacing : float
-        Side of a sample in m.
-    rows, columns : int
-        Number of samples down and across.
-
-    Raises
-    ------
-    ValueError
-        If a number is not finite, or spacing or a count is not positive.
+    A ValueError if a number is not finite, or spacing or a count is not positive.
     """
 
     left: float
     top: float
+    """Outer corner of the first sample in m: `left` and `top`."""
     spacing: float
+    """Side of a sample in m."""
     rows: int
     columns: int
+    """Number of samples down and across: `rows` and `columns`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.left) and isfinite(self.top)):
@@ -63,12 +60,8 @@ class Raster:
     @property
     def extent(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top edge in m."""
-        return (
-            self.left,
-            self.left + self.spacing * self.columns,
-            self.top - self.spacing * self.rows,
-            self.top,
-        )
+        right, bottom = self.left + self.spacing * self.columns, self.top - self.spacing * self.rows
+        return self.left, right, bottom, self.top
 
     @property
     def border(self) -> NDArray[np.float64]:

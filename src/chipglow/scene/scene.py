@@ -111,27 +111,14 @@ class Scene:
         tool: Tool | None = None,
         attributes: Mapping[str, Any] | None = None,
     ) -> "Scene":
-        """Scene from arrays in SI units.
+        """Return a scene from arrays in SI units.
 
-        Parameters
-        ----------
-        raster : Raster
-            The samples.
-        times : array_like
-            Times of the frames in s, shape (time,).
-        fields : mapping
-            Arrays of shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
-            `MATERIAL_COORDINATE_UNITS` and `QUALITY`.
-        tool : Tool, optional
-            The tool's outline, for the analyses that need the rake face.
-        attributes : mapping, optional
-            Further attributes of the dataset, such as provenance.
-
-        Raises
-        ------
-        SceneError
-            If an array is unknown, missing, of another shape or with values that cannot be; the
-            message names the field.
+        `times` of the frames in s have the shape (time,), `fields` on the samples of `raster` the
+        shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
+        `MATERIAL_COORDINATE_UNITS` and `QUALITY`. `tool` is the tool's outline, for the analyses
+        that need the rake face; `attributes` are further ones of the dataset, such as provenance.
+        A SceneError that names the field if an array is unknown, missing, of another shape or with
+        values that cannot be.
         """
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         unknown = sorted(set(fields) - set(units))
@@ -141,19 +128,12 @@ class Scene:
         if times.ndim != 1:
             raise SceneError(f"scene: times have shape {times.shape}, expected (time,)")
         shape = (times.size, *raster.shape)
-        data = xr.Dataset(
-            {
-                name: (
-                    ("time", "y", "x"),
-                    _as_stored(name, np.asarray(values), shape),
-                    {"units": units[name]},
-                )
-                for name, values in fields.items()
-            },
-            coords=raster_coordinates(raster, times),
-            attrs={**(attributes or {}), **(tool_attributes(tool) if tool else {})},
-        )
-        return cls(data)
+        variables: dict[str, Any] = {}
+        for name, values in fields.items():
+            stored = _as_stored(name, np.asarray(values), shape)
+            variables[name] = ("time", "y", "x"), stored, {"units": units[name]}
+        attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
+        return cls(xr.Dataset(variables, raster_coordinates(raster, times), attributes))
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -344,17 +324,12 @@ def check_frame(frame: Frame) -> None:
         )
 
 
-def raster_of(data: xr.Dataset) -> Raster:
-    """Return the grid of the samples of a scene's dataset."""
+def raster_of(data: xr.Dataset, spacing: float | None = None) -> Raster:
+    """Return the grid of the samples of a dataset; from several columns without a spacing in m."""
     x, y = data["x"].values, data["y"].values
-    spacing = float((x[-1] - x[0]) / (len(x) - 1))
-    return Raster(
-        left=float(x[0]) - spacing / 2,
-        top=float(y[0]) + spacing / 2,
-        spacing=spacing,
-        rows=len(y),
-        columns=len(x),
-    )
+    if spacing is None:
+        spacing = float((x[-1] - x[0]) / (len(x) - 1))
+    return Raster(float(x[0]) - spacing / 2, float(y[0]) + spacing / 2, spacing, len(y), len(x))
 
 
 def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.scene.frame import Frame, Material
-from chipglow.scene.raster import Raster
+from chipglow.scene.raster import Raster, check_shape
 
 SPLINE_FIELDS: Final = (
     "temperature",
@@ -24,8 +24,7 @@ SPLINE_FIELDS: Final = (
     "tool_temperature",
 )
 """Quantities of the coefficients: the workpiece's fields, the fraction of the area that chip and
-tool
-fill, and the tool's temperature."""
+tool fill, and the tool's temperature."""
 
 FILLED_SPLINE: Final = SPLINE_FIELDS.index("filled")
 TOOL_SPLINE: Final = SPLINE_FIELDS.index("tool_temperature")
@@ -52,10 +51,7 @@ class Lattice:
     """Temperature in K of samples that show nothing."""
 
     def __post_init__(self) -> None:
-        if self.in_tool.shape != self.raster.shape:
-            raise ValueError(
-                f"lattice: in_tool has shape {self.in_tool.shape}, expected {self.raster.shape}"
-            )
+        check_shape("lattice: in_tool", self.in_tool.shape, self.raster.shape)
         for name, (first, _), nodes in (
             ("rows", self.down, self.rows),
             ("columns", self.across, self.columns),
@@ -78,16 +74,9 @@ class Lattice:
         beyond = np.array((-1.0, 3.0))
         first, last = np.floor((raster.x[[0, -1]] - left) / cell - 0.5) + beyond
         lowest, highest = np.floor((raster.y[[-1, 0]] - bottom) / cell - 0.5) + beyond
-        return cls(
-            raster,
-            float(left + cell * first),
-            float(bottom + cell * highest),
-            cell,
-            int(highest - lowest) + 1,
-            int(last - first) + 1,
-            in_tool,
-            ambient,
-        )
+        node = float(left + cell * first), float(bottom + cell * highest)
+        shape = int(highest - lowest) + 1, int(last - first) + 1
+        return cls(raster, *node, cell, *shape, in_tool, ambient)
 
     def coarser(self, step: int) -> "Lattice":
         """Return the same nodes with samples `step` times as large, each valued at its centre."""

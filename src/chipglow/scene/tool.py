@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import ceil, cos, degrees, isfinite, pi, radians, sin, tan
 from typing import Annotated, Any, Final, Self
 
@@ -122,12 +123,9 @@ class Tool(ABC):
         rake, clearance = np.array(self.rake_direction), np.array(self.clearance_direction)
         pieces = np.concatenate([[-rake], np.diff(self.corners, axis=0), [clearance]])
         heading = np.unwrap(np.arctan2(pieces[:, 1], pieces[:, 0]))
-        round_edge = np.concatenate(
-            [
-                corner + self.corner_radius * _right_of(start, end, self.corner_radius > 0)
-                for corner, start, end in zip(self.corners, heading[:-1], heading[1:], strict=True)
-            ]
-        )
+        radius = self.corner_radius
+        arcs = [radius * _right_of(*turn, radius > 0) for turn in pairwise(heading)]
+        round_edge = np.concatenate([c + arc for c, arc in zip(self.corners, arcs, strict=True)])
         top, right = round_edge[0] + length * rake, round_edge[-1] + length * clearance
         return np.concatenate([top[None], round_edge, right[None]])
 
@@ -146,9 +144,7 @@ class Chamfer(Part):
     The land's rake angle is the rake angle minus the chamfer's angle.
     """
 
-    width: Annotated[
-        float, Parameter("Width of the land, between its sharp corners.", LENGTH, over=0.0)
-    ]
+    width: Annotated[float, Parameter("Width of the land, between its sharp corners.", LENGTH)]
     angle: Annotated[
         float,
         Parameter("Angle between the land and the rake face.", ANGLE, over=0.0, under=_RIGHT_ANGLE),
@@ -166,9 +162,9 @@ class Hone(Part):
     """
 
     rake: Annotated[
-        float, Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH, over=0.0)
+        float, Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH)
     ]
-    clearance: Annotated[float, Parameter("The same on the flank face.", LENGTH, over=0.0)]
+    clearance: Annotated[float, Parameter("The same on the flank face.", LENGTH)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -219,7 +215,7 @@ class ToolGeometry(Tool, Part):
         ),
     ] = radians(7.0)
     edge_radius: Annotated[
-        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH, over=0.0)
+        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH)
     ] = 20e-6
     chamfer: Annotated[
         Chamfer | None,

@@ -51,7 +51,10 @@ class ToolOutline(Tool):
 
     def __post_init__(self) -> None:
         _check_points(self.own_corners)
-        self._check_faces()
+        try:
+            check_angles(self.rake_angle, self.clearance_angle)
+        except ValueError as error:
+            raise ToolOutlineError(f"{error}; {_ORDER}") from None
         lowest = float(self.own_corners[:, 1].min())
         if abs(lowest) > _LEVEL:
             raise ToolOutlineError(f"lowest point at y {lowest * 1e6:g} um, expected 0 um")
@@ -93,22 +96,11 @@ class ToolOutline(Tool):
         """Lower end of the straight rake face in m, shape (2,)."""
         return np.asarray(self.corners[_straight_end(self.corners)])
 
-    def _check_faces(self) -> None:
-        try:
-            check_angles(self.rake_angle, self.clearance_angle)
-        except ValueError as error:
-            raise ToolOutlineError(f"{error}; {_ORDER}") from None
-
     def _check_crossing(self) -> None:
         """No two pieces may cross, those of the straight faces beyond the points included."""
-        line = np.concatenate(
-            [
-                [self.corners[0] + FACE_LENGTH * np.array(self.rake_direction)],
-                self.corners,
-                [self.corners[-1] + FACE_LENGTH * np.array(self.clearance_direction)],
-            ]
-        )
-        side = _sides(line)
+        first = self.corners[0] + FACE_LENGTH * np.array(self.rake_direction)
+        last = self.corners[-1] + FACE_LENGTH * np.array(self.clearance_direction)
+        side = _sides(np.concatenate([[first], self.corners, [last]]))
         # Points on one line are on neither side of it, whatever the rounding.
         side[np.abs(side) < _TOUCHING] = 0.0
         apart = side[:, :-1] * side[:, 1:] < 0

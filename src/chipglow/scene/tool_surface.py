@@ -18,20 +18,16 @@ normal, and (in every `stride`-th row) how far the next `stride` pieces reach fr
 class ToolSurface(NamedTuple):
     """The tool's surface as kernels take it: see `surface_distance`.
 
-    Centre of the edge's arc and its radius (m); normal and direction, away from the edge, of the
-    rake face and of the flank face; how far the chain's corners stand out from the two lines
-    through the centre along the faces (m); the chain and the length of its stretches.
+    Centre of the edge's arc and its radius (m); direction, away from the edge, of the rake face and
+    of the flank face; how far the chain's corners stand out from the two lines through the centre
+    along the faces (m); the chain and the length of its stretches.
     """
 
     x: float
     y: float
     radius: float
-    rake_normal_x: float
-    rake_normal_y: float
     rake_x: float
     rake_y: float
-    clearance_normal_x: float
-    clearance_normal_y: float
     clearance_x: float
     clearance_y: float
     rake_offset: float
@@ -57,23 +53,8 @@ def surface_of(
         first = corners[0] + FACE_LENGTH * np.array(rake)
         last = corners[-1] + FACE_LENGTH * np.array(clearance)
         chain = _chain(np.concatenate([[first], corners, [last]]))
-    return ToolSurface(
-        x=float(corners[-1, 0]),
-        y=float(corners[-1, 1]),
-        radius=radius,
-        rake_normal_x=normals[0][0],
-        rake_normal_y=normals[0][1],
-        rake_x=rake[0],
-        rake_y=rake[1],
-        clearance_normal_x=normals[1][0],
-        clearance_normal_y=normals[1][1],
-        clearance_x=clearance[0],
-        clearance_y=clearance[1],
-        rake_offset=float(offsets[0]),
-        clearance_offset=float(offsets[1]),
-        stride=_stride(len(chain)),
-        chain=chain,
-    )
+    centre, stride = corners[-1].tolist(), _stride(len(chain))
+    return ToolSurface._make((*centre, radius, *rake, *clearance, *offsets.tolist(), stride, chain))
 
 
 def _stride(pieces: int) -> int:
@@ -106,8 +87,8 @@ def surface_distance(x, y, tool):  # type: ignore[no-untyped-def]
 def surface_bound(x, y, tool):  # type: ignore[no-untyped-def]
     """Return a lower bound of the signed distance, cheaper than it."""
     px, py = x - tool.x, y - tool.y
-    rake = tool.rake_normal_x * px + tool.rake_normal_y * py - tool.rake_offset
-    clearance = tool.clearance_normal_x * px + tool.clearance_normal_y * py - tool.clearance_offset
+    rake = tool.rake_x * py - tool.rake_y * px - tool.rake_offset
+    clearance = tool.clearance_y * px - tool.clearance_x * py - tool.clearance_offset
     return max(rake, clearance) - tool.radius
 
 
@@ -120,13 +101,13 @@ def _wedge_distance(x, y, tool):  # type: ignore[no-untyped-def]
     ):
         length = np.sqrt(px * px + py * py)
         if length < 1e-12:
-            return -tool.radius, tool.rake_normal_x, tool.rake_normal_y
+            return -tool.radius, -tool.rake_y, tool.rake_x
         return length - tool.radius, px / length, py / length
-    rake = tool.rake_normal_x * px + tool.rake_normal_y * py
-    clearance = tool.clearance_normal_x * px + tool.clearance_normal_y * py
+    rake = tool.rake_x * py - tool.rake_y * px
+    clearance = tool.clearance_y * px - tool.clearance_x * py
     if rake > clearance:
-        return rake - tool.radius, tool.rake_normal_x, tool.rake_normal_y
-    return clearance - tool.radius, tool.clearance_normal_x, tool.clearance_normal_y
+        return rake - tool.radius, -tool.rake_y, tool.rake_x
+    return clearance - tool.radius, tool.clearance_y, -tool.clearance_x
 
 
 @njit

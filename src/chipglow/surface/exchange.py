@@ -70,10 +70,8 @@ class Exchange:
         radiance in the mirrored direction.
         """
         black = np.asarray(radiance, np.float64)
-        emissivities, mirrors = (
-            np.broadcast_to(np.asarray(values, np.float64), black.shape)
-            for values in (emissivity, mirror)
-        )
+        emissivities = np.broadcast_to(np.asarray(emissivity, np.float64), black.shape)
+        mirrors = np.broadcast_to(np.asarray(mirror, np.float64), black.shape)
         shape, count = black.shape, len(self.lengths)
         own = (emissivities * black).reshape(-1, count)
         reflectance = (1.0 - emissivities).reshape(-1, count)

@@ -13,6 +13,7 @@ from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
+from chipglow.scene.raster import check_shape
 from chipglow.surface.blend import (
     RATE_OF_CHIP,
     RATE_OF_SHEAR_BAND,
@@ -39,11 +40,6 @@ _WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
 class FeatureSurface(Surface, Part):
     """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
 
-    Raises
-    ------
-    ValueError
-        If the grain is not positive, the seed is negative or `follow` is unknown.
-
     Notes
     -----
     "Create emissivity maps for each feature" and what follows in Heigel and Whitenton (2010). The
@@ -59,9 +55,9 @@ class FeatureSurface(Surface, Part):
         Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
     ] = _WORKPIECE
     tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
-    grain: Annotated[
-        float, Parameter("Size of a grain of the emissivity's texture.", LENGTH, over=0.0)
-    ] = 20e-6
+    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
+        20e-6
+    )
     follow: Annotated[
         Literal["material", "mean", "none"],
         Parameter(
@@ -186,18 +182,12 @@ class Features:
 
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
         """Return the emissivity of every sample for every surface, shape (surface, y, x)."""
-        if frame.material.shape != self.raster.shape:
-            raise ValueError(
-                f"frame: has shape {frame.material.shape}, expected {self.raster.shape}"
-            )
-        rate = frame.plastic_strain_rate
+        check_shape("frame", frame.material.shape, self.raster.shape)
+        strain, rate = frame.needed("plastic_strain"), frame.plastic_strain_rate
+        if rate is None:
+            rate = np.zeros(self.raster.shape, np.float32)
         result = np.empty((len(self.surfaces), *self.raster.shape), dtype=np.float32)
-        fields = (
-            frame.material,
-            frame.needed("plastic_strain"),
-            np.zeros(self.raster.shape, np.float32) if rate is None else rate,
-            *self.positions(frame),
-        )
+        fields = frame.material, strain, rate, *self.positions(frame)
         shift, textures = self.shift(frame.time), self.textures
         in_blocks(
             self.raster.rows,

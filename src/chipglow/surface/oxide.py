@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import R
 
-from chipglow.quantities import Family, Parameter
+from chipglow.quantities import Family, Parameter, zero_to_one
 from chipglow.quantities.units import ACTIVATION_ENERGY, LENGTH, OXIDATION_RATE, POSITION
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
@@ -38,14 +38,12 @@ class Oxide(Modifier):
         ),
     ] = 0.0
     emissivity: Annotated[
-        float, Parameter("Emissivity under much oxide: chip 2 of the paper.", least=0.0, most=1.0)
+        float, zero_to_one("Emissivity under much oxide: chip 2 of the paper.")
     ] = 0.77
     opaque: Annotated[
         float,
         Parameter(
-            "Thickness over which a film takes on 63 % of that emissivity; an assumption.",
-            LENGTH,
-            over=0.0,
+            "Thickness over which a film takes on 63 % of that emissivity; an assumption.", LENGTH
         ),
     ] = 0.5e-6
 
@@ -82,9 +80,9 @@ class ParabolicOxide(Oxide):
 
     kind = "parabolic"
     example = "{kind: parabolic, rate: 6.1e-4 m^2/s, activation_energy: 169.5 kJ/mol}"
-    rate: Annotated[float, Parameter("Its factor k₀.", OXIDATION_RATE, over=0.0)] = 6.1e-4
+    rate: Annotated[float, Parameter("Its factor k₀.", OXIDATION_RATE)] = 6.1e-4
     activation_energy: Annotated[
-        float, Parameter("Its activation energy Q.", ACTIVATION_ENERGY, over=0.0)
+        float, Parameter("Its activation energy Q.", ACTIVATION_ENERGY)
     ] = 169_452.0
 
     def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:

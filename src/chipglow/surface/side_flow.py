@@ -9,7 +9,7 @@ from typing import Annotated, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Array, Family, Parameter
+from chipglow.quantities import Array, Family, Parameter, zero_to_one
 from chipglow.quantities.units import ANGLE, LENGTH, POSITION
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
@@ -100,12 +100,9 @@ def _sections(raster: Raster, tool: Tool, elements: SideElements) -> _Sections:
     placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number)
     # So far from the face that a sample is on its element's side of it; the rake face has the
     # temperature of the tool beside it.
-    inside, of_chip = _INSIDE * raster.spacing, np.arange(elements.depths.size)
-    looked_up = np.where(
-        of_chip < elements.chip.start,
-        np.minimum(elements.depths, -inside),
-        np.maximum(elements.depths, inside),
-    )
+    inside, depths = _INSIDE * raster.spacing, elements.depths
+    of_tool = np.arange(depths.size) < elements.chip.start
+    looked_up = np.where(of_tool, np.minimum(depths, -inside), np.maximum(depths, inside))
     rows, columns = _samples_at(raster, tool, foot, looked_up)
     probes = _samples_at(raster, tool, foot, heights)
     return _Sections(rows, columns, probes, np.stack(placed), weight)
@@ -135,18 +132,14 @@ class SideShape(Modifier):
     ] = 0.0
     mirror: Annotated[
         float,
-        Parameter(
-            "Fraction of the reflected light that is reflected as by a mirror; the rest diffusely.",
-            least=0.0,
-            most=1.0,
+        zero_to_one(
+            "Fraction of the reflected light that is reflected as by a mirror; the rest diffusely."
         ),
     ] = 0.0
     rake_emissivity: Annotated[
         float | None,
-        Parameter(
-            "Emissivity of the rake face beside the chip; none: that of the tool's side there.",
-            least=0.0,
-            most=1.0,
+        zero_to_one(
+            "Emissivity of the rake face beside the chip; none: that of the tool's side there."
         ),
     ] = None
 
@@ -218,12 +211,10 @@ class SideShape(Modifier):
             if self.rake_emissivity is not None:
                 values[:, self.elements.face] = self.rake_emissivity
             incident = np.full((len(touching), values.shape[1]), surroundings)
+            light = np.where(void, surroundings, black(frame, rows, columns))
+            values = np.where(void, 1.0, values)
             incident[touching] = self.elements.exchange.incident(
-                np.where(void, surroundings, black(frame, rows, columns)),
-                np.where(void, 1.0, values),
-                surroundings,
-                self.mirror,
-                TOWARD_CAMERA,
+                light, values, surroundings, self.mirror, TOWARD_CAMERA
             )
             rows, columns, section, _ = sections.samples
             visible = touching[section] & (frame.material[rows, columns] != Material.VOID)
@@ -288,7 +279,7 @@ class Wedge(SideShape):
         ),
     ] = radians(45.0)
     bulge_radius: Annotated[
-        float, Parameter("Radius of the bulge's arc; an assumption.", LENGTH, over=0.0)
+        float, Parameter("Radius of the bulge's arc; an assumption.", LENGTH)
     ] = 100e-6
 
     @property

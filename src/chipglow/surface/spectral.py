@@ -128,9 +128,7 @@ class HagenRubens(SpectralSurface):
 
     kind = "hagen-rubens"
     example = "{kind: hagen-rubens, resistivity: 1.7e-7 ohm*m, coefficient: 0.005 K^-1}"
-    resistivity: Annotated[
-        float, Parameter("Electrical resistivity at 20 °C.", RESISTIVITY, over=0.0)
-    ]
+    resistivity: Annotated[float, Parameter("Electrical resistivity at 20 °C.", RESISTIVITY)]
     coefficient: Annotated[
         float,
         Parameter(

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.quantities import Array, Parameter
+from chipglow.quantities import Array, Parameter, zero_to_one
 from chipglow.quantities.units import TEMPERATURE, Temperature
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
@@ -39,7 +39,7 @@ class UniformSurface(HomogeneousSurface):
 
     kind = "uniform"
     example = "{kind: uniform, emissivity: 0.5}  everywhere the same"
-    emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)]
+    emissivity: Annotated[float, zero_to_one("The emissivity.")]
 
     def at(self, temperature: NDArray[Any]) -> ArrayLike:
         return self.emissivity
@@ -91,17 +91,10 @@ class PhaseSurface(HomogeneousSurface):
 
     kind = "phase"
     example = "{kind: phase, solid: 0.4, liquid: 0.25, solidus: 1658 K, liquidus: 1723 K}"
-    solid: Annotated[float, Parameter("Emissivity up to the solidus.", least=0.0, most=1.0)]
-    liquid: Annotated[
-        float,
-        Parameter("Emissivity from the liquidus on; between them linear.", least=0.0, most=1.0),
-    ]
-    solidus: Annotated[
-        float, Parameter("Temperature at which melting begins.", TEMPERATURE, over=0.0)
-    ]
-    liquidus: Annotated[
-        float, Parameter("Temperature at which all is melted.", TEMPERATURE, over=0.0)
-    ]
+    solid: Annotated[float, zero_to_one("Emissivity up to the solidus.")]
+    liquid: Annotated[float, zero_to_one("Emissivity from the liquidus on; between them linear.")]
+    solidus: Annotated[float, Parameter("Temperature at which melting begins.", TEMPERATURE)]
+    liquidus: Annotated[float, Parameter("Temperature at which all is melted.", TEMPERATURE)]
 
     def __post_init__(self) -> None:
         super().__post_init__()

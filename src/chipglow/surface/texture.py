@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import correlate1d
 from scipy.special import betainccinv, betaincinv, ndtr
 
-from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities import Array, Parameter, Part, zero_to_one
 
 REACH: Final = 8.0
 """Normal deviates are limited to −8 to 8."""
@@ -34,7 +34,7 @@ class Emissivity(Part):
     deviation with it: there it is a beta distribution, which stays within 0 to 1 by itself.
     """
 
-    mean: Annotated[float, Parameter("Mean emissivity.", least=0.0, most=1.0)]
+    mean: Annotated[float, zero_to_one("Mean emissivity.")]
     standard_deviation: Annotated[
         float, Parameter("Standard deviation over the surface.", least=0.0)
     ] = 0.0
@@ -133,14 +133,8 @@ class Texture:
         """Return the emissivity of the enlarged map at places in m."""
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
         result = np.empty(x.size, dtype=np.float32)
-        _look_up(
-            padded(self.nodes),
-            self.emissivity.table,
-            1.0 / self.grain,
-            x.ravel(),
-            y.ravel(),
-            result,
-        )
+        nodes, table = padded(self.nodes), self.emissivity.table
+        _look_up(nodes, table, 1.0 / self.grain, x.ravel(), y.ravel(), result)
         return result.reshape(x.shape)
 
 

@@ -33,9 +33,7 @@ class Blackbody(Part):
     emissivity_uncertainty: Annotated[
         float, Parameter("Its standard uncertainty, common to all points.", least=0.0, under=1.0)
     ] = 0.0
-    surroundings: Annotated[float, Parameter("Reflected temperature.", TEMPERATURE, over=0.0)] = (
-        293.15
-    )
+    surroundings: Annotated[float, Parameter("Reflected temperature.", TEMPERATURE)] = 293.15
 
     def radiance_temperatures(self, kelvins: Array, band: Band) -> Array:
         """Return the temperatures in K of the ideal blackbodies that radiate as much."""
@@ -153,14 +151,9 @@ def fit_calibration(
     the parameters is added to their covariance as one more term (JCGM 100, Equation 13).
     """
     kelvins, signal = np.asarray(temperatures, np.float64), np.asarray(counts, np.float64)
-    of_counts, of_kelvins, of_all = (
-        _uncertainty(name, value, signal.shape)
-        for name, value in (
-            ("count_uncertainty", count_uncertainty),
-            ("temperature_uncertainty", temperature_uncertainty),
-            ("common_uncertainty", common_uncertainty),
-        )
-    )
+    of_counts = _uncertainty("count_uncertainty", count_uncertainty, signal.shape)
+    of_kelvins = _uncertainty("temperature_uncertainty", temperature_uncertainty, signal.shape)
+    of_all = _uncertainty("common_uncertainty", common_uncertainty, signal.shape)
     stated = count_uncertainty is not None or temperature_uncertainty is not None
     _check_points(kelvins, signal, len(kind.NAMES), stated)
     common = [of_all]

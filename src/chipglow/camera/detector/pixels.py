@@ -58,11 +58,7 @@ class NonUniformity:
 
     def apply(self, signal: NDArray[Any]) -> Array:
         """Return the corrected signal of frames (time, y, x); NaN where a pixel does not answer."""
-        if signal.shape[1:] != self.gain.shape:
-            raise ValueError(
-                f"non-uniformity: is of {size_text(self.gain.shape)} pixels, the frames of "
-                f"{size_text(signal.shape[1:])}, they must be the same"
-            )
+        _check_size("non-uniformity: frames", signal.shape[1:], self.gain.shape)
         return np.asarray(self.gain * signal + self.offset, np.float64)
 
 
@@ -77,11 +73,7 @@ def mean_frame(frames: NDArray[Any]) -> Array:
 
 def signal_rise(cold: Array, hot: Array) -> Array:
     """Return how much more each pixel gives of the brighter of two flat-field sources, (y, x)."""
-    if cold.shape != hot.shape:
-        raise ValueError(
-            f"uniform frames: are of {size_text(cold.shape)} and {size_text(hot.shape)} pixels, "
-            "they must be the same"
-        )
+    _check_size("uniform frames: the second", hot.shape, cold.shape)
     if not np.median(hot - cold) > 0:
         raise ValueError(
             f"uniform frames: the second have a median of {np.median(hot):g} and the first of "
@@ -90,9 +82,10 @@ def signal_rise(cold: Array, hot: Array) -> Array:
     return hot - cold
 
 
-def size_text(shape: tuple[int, ...]) -> str:
-    """Return columns and rows as text."""
-    return f"{shape[1]} x {shape[0]}"
+def _check_size(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    if found != expected:
+        seen, wanted = (f"{columns} x {rows}" for rows, columns in (found, expected))
+        raise ValueError(f"{name} of {seen} pixels, expected {wanted}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,11 +143,7 @@ def replace_bad_pixels(signal: Array, bad: NDArray[np.bool_]) -> tuple[Array, ND
     Returns the frames and which were replaced; others are NaN: clusters of more than
     `LARGEST_CLUSTER`, and pixels of whose eight neighbours less than three are good.
     """
-    if bad.shape != signal.shape[1:]:
-        raise ValueError(
-            f"bad pixels: are of {size_text(bad.shape)} pixels, the frames of "
-            f"{size_text(signal.shape[1:])}, they must be the same"
-        )
+    _check_size("bad pixels: frames", signal.shape[1:], bad.shape)
     result = np.array(signal, np.float64)
     result[:, bad] = np.nan
     clusters, _ = label(bad, np.ones((3, 3)))

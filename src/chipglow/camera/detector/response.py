@@ -34,8 +34,8 @@ class OperationPoint(Part):
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
     """With the relative spectral response."""
-    integration_time: Annotated[float, Parameter("Exposure.", TIME, over=0.0)] = 10e-6
-    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
+    integration_time: Annotated[float, Parameter("Exposure.", TIME)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY)] = 600.0
     fill_factor: Annotated[
         float, Parameter("Fraction of an element's square that takes light.", over=0.0)
     ] = 1.0
@@ -76,9 +76,7 @@ class PhotonResponse(DetectorResponse):
     quantum_efficiency: Annotated[
         float, Parameter("Electrons for each photon.", over=0.0, most=1.0)
     ]
-    element: Annotated[
-        float, Parameter("Side of an element's square, on the detector.", LENGTH, over=0.0)
-    ]
+    element: Annotated[float, Parameter("Side of an element's square, on the detector.", LENGTH)]
     f_number: Annotated[
         float, Parameter("F-number of the light at the detector, set by the cold stop.", least=0.5)
     ]
@@ -90,7 +88,6 @@ class PhotonResponse(DetectorResponse):
         Parameter(
             "Wavelength of the quantum efficiency; none: the middle of the camera's band.",
             WAVELENGTH,
-            over=0.0,
         ),
     ] = None
 

@@ -275,9 +275,7 @@ class FlickerNoise(DetectorTerm):
     standard_deviation: Annotated[
         float, Parameter("In electrons, of each decade of frequencies.", least=0.0)
     ]
-    since_correction: Annotated[
-        float, Parameter("Time since pixels were corrected.", TIME, over=0.0)
-    ] = 100.0
+    since_correction: Annotated[float, Parameter("Time since pixels were corrected.", TIME)] = 100.0
 
     def apply(self, electrons: Array, readout: Readout) -> Array:
         constants = self.time_constants(readout.point.frame_time)

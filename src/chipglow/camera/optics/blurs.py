@@ -44,9 +44,7 @@ class BlurTerm(Part, ABC):
         """
 
 
-Deviation = Annotated[
-    float, Parameter("Standard deviation along each axis, on the scene.", LENGTH, over=0.0)
-]
+Deviation = Annotated[float, Parameter("Standard deviation along each axis, on the scene.", LENGTH)]
 Direction = Annotated[
     float, Parameter("Direction, counter-clockwise from the right.", ANGLE, least=-pi, most=pi)
 ]
@@ -92,9 +90,7 @@ class LinearMotion(BlurTerm):
 
     kind = "linear-motion"
     example = "{kind: linear-motion, distance: 4 um, direction: 0 deg}"
-    distance: Annotated[
-        float, Parameter("Path during the integration time, on the scene.", LENGTH, over=0.0)
-    ]
+    distance: Annotated[float, Parameter("Path during the integration time, on the scene.", LENGTH)]
     direction: Direction = 0.0
 
     @property
@@ -113,7 +109,7 @@ class Vibration(BlurTerm):
     kind = "vibration"
     example = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
     amplitude: Annotated[
-        float, Parameter("Largest displacement from the centre, on the scene.", LENGTH, over=0.0)
+        float, Parameter("Largest displacement from the centre, on the scene.", LENGTH)
     ]
     direction: Direction = 0.0
 
@@ -135,13 +131,6 @@ def _along(direction: float, across: Array, up: Array) -> Array:
 class BlurredPSF(PointSpreadFunction):
     """A point spread function with further blurs, whose transfer functions are multiplied.
 
-    Parameters
-    ----------
-    psf : PointSpreadFunction
-        Blur of the optics, or a measured one.
-    blurs : tuple of BlurTerm
-        Further blurs; a ValueError if the point spread function includes one already.
-
     Notes
     -----
     `fwhm` is the mean of the widths along the row and the column through the peak. The change due
@@ -152,7 +141,9 @@ class BlurredPSF(PointSpreadFunction):
     """
 
     psf: PointSpreadFunction
+    """Blur of the optics, or a measured one."""
     blurs: tuple[BlurTerm, ...]
+    """Further blurs; a ValueError if the point spread function includes one already."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

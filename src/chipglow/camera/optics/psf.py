@@ -54,7 +54,6 @@ DiffractionWavelength = Annotated[
     Parameter(
         "Wavelength of the diffraction; none: the centre of the camera's band.",
         WAVELENGTH,
-        over=0.0,
         most=0.1,
     ),
 ]
@@ -200,7 +199,7 @@ class GaussianPSF(PointSpreadFunction):
 
     kind = "gaussian"
     example = "{kind: gaussian, fwhm: 12 um}"
-    fwhm: Annotated[float, Parameter("Full width at half maximum.", LENGTH, over=0.0, most=0.1)]
+    fwhm: Annotated[float, Parameter("Full width at half maximum.", LENGTH, most=0.1)]
 
     def __str__(self) -> str:
         return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
@@ -218,20 +217,6 @@ class GaussianPSF(PointSpreadFunction):
 class MeasuredPSF(PointSpreadFunction):
     """A measured kernel, such as from a knife edge.
 
-    Parameters
-    ----------
-    weights : array_like
-        Light of a point on each square of a grid, in any unit: a square array with an odd number
-        of rows, first row on top. The point is at the centre of the central square.
-    spacing : float
-        Side of a square in m, on the scene.
-    components : tuple of Component
-        Uncertainty of the weights as effects of independent errors, in the unit of the weights;
-        ``chipglow psf`` writes them to its files. Unknown by default.
-    includes : tuple of str
-        Effects that the measurement contains in addition to the optics: ``footprint`` for the
-        sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`.
-
     Notes
     -----
     `fwhm` is the mean of the widths along the row and the column through the peak; of several equal
@@ -241,9 +226,16 @@ class MeasuredPSF(PointSpreadFunction):
     """
 
     weights: Array = field(repr=False)
+    """Light of a point on each square of a grid, in any unit: a square array with an odd number of
+    rows, first row on top. The point is at the centre of the central square."""
     spacing: float
+    """Side of a square in m, on the scene."""
     components: tuple[Component, ...] = field(default=(), repr=False)
+    """Uncertainty of the weights as effects of independent errors, in the unit of the weights;
+    ``chipglow psf`` writes them to its files. Unknown by default."""
     includes: tuple[str, ...] = ()
+    """Effects that the measurement contains in addition to the optics: ``footprint`` for the
+    sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`."""
     fwhm: float = field(init=False)
 
     def __str__(self) -> str:
@@ -386,10 +378,7 @@ class MeasuredPSFFile(PSFChoice):
     spacing: Annotated[
         float | None,
         Parameter(
-            "Distance between the samples of the kernel; a .nc file states it.",
-            LENGTH,
-            over=0.0,
-            most=0.1,
+            "Distance between the samples of the kernel; a .nc file states it.", LENGTH, most=0.1
         ),
     ] = None
 

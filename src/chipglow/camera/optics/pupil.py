@@ -325,14 +325,8 @@ class Pupil(ApertureChoice):
     temperature: SourceTemperature = 1000.0
 
     def for_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
-        return PupilPSF(
-            band,
-            self.aperture(magnification),
-            self.obscuration,
-            self.defocus,
-            self.zernike,
-            self.temperature,
-        )
+        lens = self.obscuration, self.defocus, self.zernike, self.temperature
+        return PupilPSF(band, self.aperture(magnification), *lens)
 
 
 def annular_transfer(frequency: Array, obscuration: float) -> Array:

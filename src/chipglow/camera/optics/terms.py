@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import half_size, poisson_squares
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA, GaussianPSF, PointSpreadFunction
-from chipglow.quantities import Array, Family, Parameter, Part
+from chipglow.quantities import Array, Family, Parameter, Part, zero_to_one
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
@@ -92,12 +92,8 @@ class Narcissus(OpticsTerm):
         "{kind: narcissus, reflectance: 0.01, radius: 150 um, housing: 45 degC,\n"
         "    corrected_at: 25 degC}"
     )
-    reflectance: Annotated[
-        float, Parameter("Total reflectance of the lens surfaces.", least=0.0, most=1.0)
-    ]
-    radius: Annotated[
-        float, Parameter("Radius at half of the maximum, on the scene.", LENGTH, over=0.0)
-    ]
+    reflectance: Annotated[float, zero_to_one("Total reflectance of the lens surfaces.")]
+    radius: Annotated[float, Parameter("Radius at half of the maximum, on the scene.", LENGTH)]
     housing: Annotated[float, Parameter("Temperature of the housing.", TEMPERATURE)] = 293.15
     detector: Annotated[float, Parameter("Temperature of the detector.", TEMPERATURE)] = 77.0
     corrected_at: Annotated[
@@ -153,10 +149,7 @@ class Veil(OpticsTerm):
     example = "{kind: veil, fraction: 0.03, radius: 300 um}"
     fraction: Annotated[float, Parameter("Scattered fraction of the light.", least=0.0, under=1.0)]
     radius: Annotated[
-        float,
-        Parameter(
-            "Radius that contains half of the scattered light, on the scene.", LENGTH, over=0.0
-        ),
+        float, Parameter("Radius that contains half of the scattered light, on the scene.", LENGTH)
     ]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
@@ -185,7 +178,7 @@ class Distortion(OpticsTerm):
             most=0.3,
         ),
     ]
-    radius: Annotated[float, Parameter("Radius R, on the scene.", LENGTH, over=0.0)]
+    radius: Annotated[float, Parameter("Radius R, on the scene.", LENGTH)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
@@ -213,9 +206,7 @@ class FieldBlur(OpticsTerm):
     standard_deviation: Annotated[
         float, Parameter("Standard deviation s of the blur, on the scene.", LENGTH, least=0.0)
     ]
-    radius: Annotated[
-        float, Parameter("Radius R at which it holds, on the scene.", LENGTH, over=0.0)
-    ]
+    radius: Annotated[float, Parameter("Radius R at which it holds, on the scene.", LENGTH)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
         x, y = _from_axis(scene, pixels)
