@@ -313,10 +313,22 @@ class Camera(Part):
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | Array
     ) -> Measurement:
-        """Measure a scene, which has the true temperatures, with the emissivity of a surface.
+        """Measure a scene.
 
-        Returns one frame for each `start` of the integration in s (`frame_times` returns a sequence
-        at the frame rate), with the scene's tool and attributes of camera and surface.
+        Parameters
+        ----------
+        scene : Scene
+            The true temperatures.
+        surface : Surface
+            The emissivity.
+        start : float or sequence of float
+            Start of each frame's integration in s; `frame_times` returns a sequence at the frame
+            rate.
+
+        Returns
+        -------
+        Measurement
+            One frame for each start, with the scene's tool and attributes of camera and surface.
         """
         self.pixels(scene.raster)
         field = self.prepare(surface, scene)

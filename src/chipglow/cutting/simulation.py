@@ -135,25 +135,36 @@ class CuttingSimulation:
     Material points (MLS-MPM with affine velocities) carry stress, strain, temperature and their
     place before the cut; the tool is rigid and conducts heat. The cut starts at time 0, when the
     workpiece touches the rake face.
+
+    Parameters
+    ----------
+    conditions : CuttingConditions
+        Speed, feed, cutting length.
+    tool : Tool
+        Outline of the tool.
+    workpiece : WorkpieceMaterial
+        The workpiece's material.
+    tool_material : ToolMaterial
+        The tool's material.
+    friction : Friction
+        Friction and heat in the contact.
+    numerics : Numerics
+        Cells, time steps and region.
+    surroundings : Surroundings
+        Surroundings to which free surfaces lose heat.
+    tool_temperature : float or ToolBody, optional
+        Initial temperature of the tool in K. A body: the steady-state temperature of a long cut,
+        by conduction through this body. None: the temperature of the workpiece, as in the paper.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
-    """Speed, feed, cutting length."""
     tool: Tool = field(default_factory=ToolGeometry)
-    """Outline of the tool."""
     workpiece: WorkpieceMaterial = field(default_factory=partial(workpiece, "aisi-1045"))
-    """The workpiece's material."""
     tool_material: ToolMaterial = field(default_factory=partial(tool_material, "carbide"))
-    """The tool's material."""
     friction: Friction = field(default_factory=Friction)
-    """Friction and heat in the contact."""
     numerics: Numerics = field(default_factory=Numerics)
-    """Cells, time steps and region."""
     surroundings: Surroundings = field(default_factory=Surroundings)
-    """Surroundings to which free surfaces lose heat."""
     tool_temperature: float | ToolBody | None = None
-    """Initial temperature of the tool in K. A body: the steady-state temperature of a long cut, by
-    conduction through this body. None: the temperature of the workpiece, as in the paper."""
 
     def run(
         self,

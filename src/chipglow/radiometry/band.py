@@ -85,6 +85,13 @@ class TabulatedResponse:
 class Band:
     """A spectral band of a camera.
 
+    Parameters
+    ----------
+    lower, upper : float
+        Limits of the band in m.
+    response : callable, optional
+        Relative spectral response R(λ), wavelengths in m to values; 1 inside the band by default.
+
     Raises
     ------
     ValueError
@@ -100,9 +107,7 @@ class Band:
 
     lower: float
     upper: float
-    """Limits of the band in m: `lower` and `upper`."""
     response: Response | None = None
-    """Relative spectral response R(λ), wavelengths in m to values; 1 inside the band by default."""
 
     def __post_init__(self) -> None:
         numbers = isinstance(self.lower, Real) and isinstance(self.upper, Real)

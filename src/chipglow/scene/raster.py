@@ -17,17 +17,26 @@ def check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) ->
 class Raster:
     """A regular grid of square samples, row 0 at the top.
 
-    A ValueError if a number is not finite, or spacing or a count is not positive.
+    Parameters
+    ----------
+    left, top : float
+        Outer corner of the first sample in m.
+    spacing : float
+        Side of a sample in m.
+    rows, columns : int
+        Number of samples down and across.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or spacing or a count is not positive.
     """
 
     left: float
     top: float
-    """Outer corner of the first sample in m: `left` and `top`."""
     spacing: float
-    """Side of a sample in m."""
     rows: int
     columns: int
-    """Number of samples down and across: `rows` and `columns`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.left) and isfinite(self.top)):

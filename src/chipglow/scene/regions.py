@@ -143,11 +143,25 @@ class Area:
 
 
 def areas(regions: Sequence[Region], raster: Raster) -> tuple[Area, ...]:
-    """Return the pixels of regions and of the features that they make up.
+    """Pixels of regions and of the features that they make up.
 
-    One area of each region, then one of each feature that has several regions. A pixel in two
-    regions of one feature counts once in the feature. A ValueError if there is no region, two of
-    one name, or one that is outside the image or empty.
+    Parameters
+    ----------
+    regions : sequence of Region
+        The regions, with different names.
+    raster : Raster
+        The image's pixels.
+
+    Returns
+    -------
+    tuple of Area
+        One of each region, then one of each feature that has several regions. A pixel in two
+        regions of one feature counts once in the feature.
+
+    Raises
+    ------
+    ValueError
+        If there is no region, two of one name, or one that is outside the image or empty.
     """
     if not regions:
         raise ValueError("regions: there are none, expected 1 or more")

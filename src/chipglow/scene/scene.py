@@ -111,14 +111,27 @@ class Scene:
         tool: Tool | None = None,
         attributes: Mapping[str, Any] | None = None,
     ) -> "Scene":
-        """Return a scene from arrays in SI units.
+        """Scene from arrays in SI units.
 
-        `times` of the frames in s have the shape (time,), `fields` on the samples of `raster` the
-        shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
-        `MATERIAL_COORDINATE_UNITS` and `QUALITY`. `tool` is the tool's outline, for the analyses
-        that need the rake face; `attributes` are further ones of the dataset, such as provenance.
-        A SceneError that names the field if an array is unknown, missing, of another shape or with
-        values that cannot be.
+        Parameters
+        ----------
+        raster : Raster
+            The samples.
+        times : array_like
+            Times of the frames in s, shape (time,).
+        fields : mapping
+            Arrays of shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
+            `MATERIAL_COORDINATE_UNITS` and `QUALITY`.
+        tool : Tool, optional
+            The tool's outline, for the analyses that need the rake face.
+        attributes : mapping, optional
+            Further attributes of the dataset, such as provenance.
+
+        Raises
+        ------
+        SceneError
+            If an array is unknown, missing, of another shape or with values that cannot be; the
+            message names the field.
         """
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         unknown = sorted(set(fields) - set(units))

@@ -40,6 +40,11 @@ _WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
 class FeatureSurface(Surface, Part):
     """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
 
+    Raises
+    ------
+    ValueError
+        If the grain is not positive, the seed is negative or `follow` is unknown.
+
     Notes
     -----
     "Create emissivity maps for each feature" and what follows in Heigel and Whitenton (2010). The

@@ -22,6 +22,27 @@ _KNOWN: Final = 1e-9
 class MapSurface(Surface):
     """Emissivity as an image that stays where it is, such as the measured one of a tool.
 
+    Parameters
+    ----------
+    values : ndarray
+        Emissivity, shape `raster.shape`; NaN where it is not known.
+    raster : Raster
+        The image's pixels, in the coordinates of the scene.
+    elsewhere : float
+        Emissivity off the image, and where no pixel around is known; 0 by default, the paper's for
+        what is not defined.
+    slopes : ndarray, optional
+        Change of the emissivity with the true temperature in 1/K; none by default.
+    middle : float
+        True temperature in K at which `values` hold, if there are slopes.
+    uncertainty : ndarray, optional
+        Standard uncertainty of the emissivity, of which other draws (`redrawn`) are made; all of
+        it is taken as one error of all pixels.
+    draw : int
+        Index of the draw; 0: without an error.
+    origin : Origin
+        Band and metal of the measurement.
+
     Raises
     ------
     ValueError
@@ -36,23 +57,13 @@ class MapSurface(Surface):
     """
 
     values: NDArray[np.floating]
-    """Emissivity, shape `raster.shape`; NaN where it is not known."""
     raster: Raster
-    """The image's pixels, in the coordinates of the scene."""
     elsewhere: float = 0.0
-    """Emissivity off the image, and where no pixel around is known; 0 by default, the paper's for
-    what is not defined."""
     slopes: NDArray[np.floating] | None = None
-    """Change of the emissivity with the true temperature in 1/K; none by default."""
     middle: float = 0.0
-    """True temperature in K at which `values` hold, if there are slopes."""
     uncertainty: NDArray[np.floating] | None = None
-    """Standard uncertainty of the emissivity, of which other draws (`redrawn`) are made; all of it
-    is taken as one error of all pixels."""
     draw: int = 0
-    """Index of the draw; 0: without an error."""
     origin: Origin = UNKNOWN  # type: ignore[misc]
-    """Band and metal of the measurement."""
 
     @property
     def effects(self) -> Mapping[str, str]:

@@ -131,6 +131,13 @@ def _along(direction: float, across: Array, up: Array) -> Array:
 class BlurredPSF(PointSpreadFunction):
     """A point spread function with further blurs, whose transfer functions are multiplied.
 
+    Parameters
+    ----------
+    psf : PointSpreadFunction
+        Blur of the optics, or a measured one.
+    blurs : tuple of BlurTerm
+        Further blurs; a ValueError if the point spread function includes one already.
+
     Notes
     -----
     `fwhm` is the mean of the widths along the row and the column through the peak. The change due
@@ -141,9 +148,7 @@ class BlurredPSF(PointSpreadFunction):
     """
 
     psf: PointSpreadFunction
-    """Blur of the optics, or a measured one."""
     blurs: tuple[BlurTerm, ...]
-    """Further blurs; a ValueError if the point spread function includes one already."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -217,6 +217,20 @@ class GaussianPSF(PointSpreadFunction):
 class MeasuredPSF(PointSpreadFunction):
     """A measured kernel, such as from a knife edge.
 
+    Parameters
+    ----------
+    weights : array_like
+        Light of a point on each square of a grid, in any unit: a square array with an odd number
+        of rows, first row on top. The point is at the centre of the central square.
+    spacing : float
+        Side of a square in m, on the scene.
+    components : tuple of Component
+        Uncertainty of the weights as effects of independent errors, in the unit of the weights;
+        ``chipglow psf`` writes them to its files. Unknown by default.
+    includes : tuple of str
+        Effects that the measurement contains in addition to the optics: ``footprint`` for the
+        sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`.
+
     Notes
     -----
     `fwhm` is the mean of the widths along the row and the column through the peak; of several equal
@@ -226,16 +240,9 @@ class MeasuredPSF(PointSpreadFunction):
     """
 
     weights: Array = field(repr=False)
-    """Light of a point on each square of a grid, in any unit: a square array with an odd number of
-    rows, first row on top. The point is at the centre of the central square."""
     spacing: float
-    """Side of a square in m, on the scene."""
     components: tuple[Component, ...] = field(default=(), repr=False)
-    """Uncertainty of the weights as effects of independent errors, in the unit of the weights;
-    ``chipglow psf`` writes them to its files. Unknown by default."""
     includes: tuple[str, ...] = ()
-    """Effects that the measurement contains in addition to the optics: ``footprint`` for the
-    sensitive area of a pixel, and kinds of `chipglow.camera.BLURS`."""
     fwhm: float = field(init=False)
 
     def __str__(self) -> str:
