@@ -186,7 +186,7 @@ def import_scene(
     fields = completion.fields(survey.found, len(survey.times))
     key = _key(wanted, looked)
     done = len(resume.frames()[0]) if resume else 0
-    attributes = _attributes(key, looked)
+    attributes = {_KEY: key, **looked.notes.attrs()}
     with SceneWriter(path, raster, completion.tool, attributes, fields, resume=resume) as writer:
         kept = f"{done} frames are kept" if done else ""
         due = monotonic() + _CHECKPOINT_INTERVAL
@@ -243,13 +243,8 @@ def read_scene(source: Import | Source) -> Scene:
         [frame.time for frame in frames],
         {name: np.stack([getattr(frame, name) for frame in frames]) for name in names},
         wanted.completion.tool,
-        _attributes(_key(wanted, looked), looked),
+        {_KEY: _key(wanted, looked), **looked.notes.attrs()},
     )
-
-
-def _attributes(key: str, looked: Prospect) -> dict[str, str]:
-    """Return what a scene keeps of where it is from."""
-    return {"import": key, **looked.notes.attrs()}
 
 
 def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
@@ -297,9 +292,6 @@ def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
     if highest < COLDEST or (lowest < COLDEST and not beyond.any()):
         worst = highest if highest < COLDEST else lowest
         raise _not_kelvin(wanted, worst, f"in {survey.found['temperature']}")
-
-
-_SMALLEST, _LARGEST = 5e-6, 0.05
 
 
 def _key(wanted: Import, looked: Prospect) -> str:

@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
 from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
-from chipglow.io.sources.overlays import MARK_TOLERANCE, Box, dark_lines, plain_colours
+from chipglow.io.sources.overlays import (
+    MARK_TOLERANCE,
+    Box,
+    box_mask,
+    check_box,
+    dark_lines,
+    plain_colours,
+)
 from chipglow.io.sources.source import SourceError
 
 _SHORTEST: Final = 24
@@ -97,11 +104,7 @@ def _extended(picture: Picture, box: Box) -> Box:
 
 def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
     """Return the fraction of a picture without legend and background in a scale's colours."""
-    left, top, right, bottom = box
-    shown = ~dark_lines(picture)
-    shown[max(top - _AROUND, 0) : bottom + _AROUND, max(left - _AROUND, 0) : right + _AROUND] = (
-        False
-    )
+    shown = ~(dark_lines(picture) | box_mask(picture.shape[:2], [box], _AROUND))
     labs = lab(picture[shown][:: max(1, int(shown.sum()) // _MOST_PIXELS)] / 255.0)
     for colour in plain_colours(picture):
         labs = labs[np.linalg.norm(labs - lab(np.array(colour) / 255.0), axis=1) > MARK_TOLERANCE]
@@ -122,13 +125,7 @@ def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
 
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
     """Return medians of the colours along a legend, from its bottom or left end, shape (n, 3)."""
-    left, top, right, bottom = box
-    rows, columns = picture.shape[:2]
-    if not (0 <= left < right <= columns and 0 <= top < bottom <= rows):
-        raise SourceError(
-            f"legend: box {box} does not lie in the picture of {columns} x {rows} pixels, expected "
-            "left, top, right, bottom"
-        )
+    left, top, right, bottom = check_box("legend", box, *picture.shape[:2])
     bar = picture[top:bottom, left:right]
     bar = bar[::-1] if bottom - top >= right - left else bar.transpose(1, 0, 2)
     if len(bar) < 2:

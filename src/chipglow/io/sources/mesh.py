@@ -326,8 +326,8 @@ class Meshes:
             raster,
             source.placement.place(mesh.points * source.units.length.scale),
             mesh.triangles,
-            _columns([self._values(name, mesh.of_nodes[self.found[name]]) for name in nodes]),
-            _columns([self._values(name, mesh.of_elements[self.found[name]]) for name in elements]),
+            np.transpose([self._values(n, mesh.of_nodes[self.found[n]]) for n in nodes]),
+            np.transpose([self._values(n, mesh.of_elements[self.found[n]]) for n in elements]),
             self._height(mesh) if source.section == "facing" else None,
         )
         fields: dict[str, NDArray[np.float32]] = {}
@@ -373,15 +373,13 @@ def _reader(source: MeshSource) -> MeshReader:
 
 
 def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) -> None:
-    size = sizes.get(theirs, 1)
-    if ours == _VECTOR:
-        if theirs in sizes and size not in _VECTOR_SIZES:
-            raise SourceError(
-                f"{file}: fields: velocity: {theirs!r} has {size} components, expected 2 or 3"
-            )
-    elif size in (*_VECTOR_SIZES, *_TENSOR_SIZES):
+    size = sizes.get(theirs)
+    is_vector = ours == _VECTOR
+    fits = size in _VECTOR_SIZES if is_vector else size not in (*_VECTOR_SIZES, *_TENSOR_SIZES)
+    if size is not None and not fits:
+        expected = "2 or 3" if is_vector else "one value"
         raise SourceError(
-            f"{file}: fields: {ours}: {theirs!r} has {size} components, expected one value"
+            f"{file}: fields: {ours}: {theirs!r} has {size} components, expected {expected}"
         )
 
 
@@ -395,10 +393,6 @@ def _without_value(blocks: Iterable[Block], name: str, of: str) -> tuple[int, in
             lacking += int((~np.isfinite(values)).any(axis=1).sum())
             count += len(values)
     return lacking, count
-
-
-def _columns(columns: Sequence[NDArray[np.float32]]) -> NDArray[np.float64] | None:
-    return np.stack(columns, axis=1).astype(np.float64) if columns else None
 
 
 def _parts(block: Block, part_field: str | None) -> dict[str, NDArray[np.bool_]]:

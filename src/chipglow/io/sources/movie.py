@@ -33,6 +33,7 @@ from chipglow.io.sources.overlays import (
     FieldPicture,
     FieldReader,
     box_mask,
+    check_box,
     find_background,
     place_of,
     polygon_mask,
@@ -290,8 +291,7 @@ class MovieSource(Source, Part):
 
     @property
     def _movies(self) -> dict[str, FieldMovie]:
-        movies = {name: getattr(self, name) for name in _EXAMPLES}
-        return {name: movie for name, movie in movies.items() if movie is not None}
+        return {name: movie for name in _EXAMPLES if (movie := getattr(self, name)) is not None}
 
     def _path(self, name: str) -> Path:
         file = self._movies[name].file or (name == "temperature" and self.files)
@@ -368,13 +368,7 @@ class MovieSource(Source, Part):
 
     def _crop(self, index: MovieIndex) -> Box:
         box = self.crop or (0, 0, index.columns, index.rows)
-        left, top, right, bottom = box
-        if not (0 <= left < right <= index.columns and 0 <= top < bottom <= index.rows):
-            raise SourceError(
-                f"crop: {box} does not lie in pictures of {index.columns} x {index.rows} pixels, "
-                "expected left, top, right, bottom"
-            )
-        return box
+        return check_box("crop", box, index.rows, index.columns)
 
     def _cropped(self, values: NDArray[Any]) -> NDArray[Any]:
         if self.crop is None:

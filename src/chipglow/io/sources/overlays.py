@@ -202,6 +202,17 @@ def _is_plain(pixels: NDArray[np.uint8], colour: Colour) -> bool:
     return bool(np.hypot(*place[1:]) < _GREY or np.sqrt((apart**2).mean()) < _ONE_COLOUR)
 
 
+def check_box(name: str, box: Box, rows: int, columns: int) -> Box:
+    """Return a box, which must lie in a picture."""
+    left, top, right, bottom = box
+    if not (0 <= left < right <= columns and 0 <= top < bottom <= rows):
+        raise SourceError(
+            f"{name}: box {box} does not lie in the picture of {columns} x {rows} pixels, expected "
+            "left, top, right, bottom"
+        )
+    return box
+
+
 def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:
     """Return the pixels within boxes, with a margin around them."""
     mask = np.zeros(shape, np.bool_)
