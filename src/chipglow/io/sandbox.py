@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, Final, TypeAlias
+from typing import IO, Any, Final, TypeAlias, cast
 
 from chipglow.io.sources.source import Source, SourceError, Survey, damaged
 from chipglow.scene import Raster, SampledFrame
@@ -111,8 +111,7 @@ class Isolated(Source):
     patience: float = PATIENCE
 
     def survey(self) -> Survey:
-        survey: Survey = self._sandbox.answer(self.source.survey)
-        return survey
+        return cast(Survey, self._sandbox.answer(self.source.survey))
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
         with self._sandbox.answers(partial(self.source.frames, raster, start)) as answers:

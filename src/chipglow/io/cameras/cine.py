@@ -1,5 +1,6 @@
 """Files of Vision Research's Phantom cameras, CINE."""
 
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -94,11 +95,9 @@ class Cine(CameraFile):
         beyond = np.flatnonzero(self.places + self.size > self.binary.size)
         count = int(beyond[0]) if beyond.size else self.places.size
         while count:
-            try:
+            with suppress(CutShortError):
                 if self._start(count - 1) + self.size <= self.binary.size:
                     break
-            except CutShortError:
-                pass
             count -= 1
         return count
 

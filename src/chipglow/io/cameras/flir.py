@@ -169,9 +169,7 @@ class Flir(CameraFile):
         """Return the time of a frame in s since 1970; NaN if the file does not state it."""
         fields = self.camera_fields(number)
         seconds, milliseconds = fields["seconds"], fields["milliseconds"]
-        if not (seconds > 0 and isfinite(milliseconds)):
-            return nan
-        return float(seconds + (milliseconds & 0xFFFF) / 1000)
+        return float(seconds + (milliseconds & 0xFFFF) / 1000) if seconds else nan
 
     def times(self, chosen: range) -> NDArray[np.float64]:
         if self.complete == 1:

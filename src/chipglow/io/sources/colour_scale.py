@@ -28,15 +28,17 @@ _NARROWEST_BAND: Final = 6
 _BLURRED: Final = 2.0
 _BANDED: Final = 0.5
 # D65, IEC 61966-2-1
-_WHITE: Final = np.array([0.95047, 1.0, 1.08883])
-_XYZ: Final = np.array(
-    [
-        [0.4124564, 0.3575761, 0.1804375],
-        [0.2126729, 0.7151522, 0.0721750],
-        [0.0193339, 0.1191920, 0.9503041],
-    ]
+_WHITE: Final = np.array([[0.95047], [1.0], [1.08883]])
+_TO_XYZ: Final = (
+    np.array(
+        [
+            [0.4124564, 0.3575761, 0.1804375],
+            [0.2126729, 0.7151522, 0.0721750],
+            [0.0193339, 0.1191920, 0.9503041],
+        ]
+    )
+    / _WHITE
 )
-_TO_XYZ: Final = _XYZ / _WHITE[:, None]
 
 
 def lab(colours: ArrayLike) -> NDArray[np.float64]:

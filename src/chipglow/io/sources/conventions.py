@@ -224,13 +224,11 @@ class Placement(Part):
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return positions in the scene in m, shape (n, 2), of points of shape (n, 3) in m."""
-        placed: NDArray[np.float64] = (points[:, self.axes] - self.origin) * self.signs
-        return placed
+        return np.asarray((points[:, self.axes] - self.origin) * self.signs)
 
     def turn(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
-        turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
-        return turned
+        return np.asarray(vectors[:, self.axes] * self.signs)
 
     def grid(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> PlacedGrid:
         """Return columns and rows of the scene for those of a file at x and y in m."""

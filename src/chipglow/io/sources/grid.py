@@ -104,7 +104,6 @@ class GridSource(Source, Part):
     def survey(self) -> Survey:
         with ExitStack() as stack:
             grid = _Grid(self, stack)
-            temperatures = grid.check_ends()
             return Survey(
                 kind=grid.kind,
                 times=grid.times,
@@ -112,7 +111,7 @@ class GridSource(Source, Part):
                 found={name: layer.array.name for name, layer in grid.layers.items()},
                 unused=grid.unused,
                 spacing=min(abs(float(np.ptp(one)) / (one.size - 1)) for one in (grid.x, grid.y)),
-                temperatures=temperatures,
+                temperatures=grid.check_ends(),
                 notes=Notes() + grid.notes,
             )
 
@@ -159,8 +158,7 @@ class _Layer:
             last = min(self._first + self._together, self.shape[0])
             frames = read_frames(self.array, self.axes, slice(self._first, last))
             self._block = np.asarray(frames, np.float32)
-        values: NDArray[np.float32] = self._block[index - self._first]
-        return values
+        return np.asarray(self._block[index - self._first])
 
 
 class _Grid:

@@ -356,8 +356,7 @@ class Meshes:
         placement = self._source.placement
         axes = (*placement.axes, placement.depth)
         sign = np.prod(placement.signs) * float(np.linalg.det(np.eye(3)[list(axes)]))
-        height: NDArray[np.float64] = sign * mesh.points[:, placement.depth]
-        return height
+        return np.asarray(sign * mesh.points[:, placement.depth])
 
 
 def _reader(source: MeshSource) -> MeshReader:

@@ -198,8 +198,7 @@ def _nodes(grid: Any, kind: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     offsets = offsets_of(grid)
     count = int(offsets[cells[0] + 1] - offsets[cells[0]])
     nodes = np.asarray(grid.cell_connectivity)[offsets[cells][:, None] + np.arange(count)]
-    ordered: NDArray[np.int64] = nodes[:, (0, 1, 3, 2)] if kind == _PIXEL else nodes
-    return ordered.astype(np.int64)
+    return np.asarray(nodes[:, (0, 1, 3, 2)] if kind == _PIXEL else nodes, np.int64)
 
 
 def _arrays(data: Any) -> dict[str, NDArray[np.float64]]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
-from mmap import ACCESS_READ, mmap
+from mmap import mmap
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
-from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.source import SourceError, mapped, naming
 from chipglow.io.sources.tecplot_binary import (
     ELEMENTS,
     MAGIC,
@@ -76,8 +76,7 @@ def _zones(file: Path) -> tuple[Zone, ...]:
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
-    with file.open("rb") as stream:
-        content = mmap(stream.fileno(), 0, access=ACCESS_READ)
+    content = mapped(file)
     starts = [match.start() for match in _ZONE.finditer(content)]
     names = _names(_text(content[: starts[0] if starts else 0]))
     zones = []

@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from io import BytesIO
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.source import SourceError, files_of, reading, required
+from chipglow.io.sources.source import SourceError, files_of, mapped, reading, required
 from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
@@ -295,7 +294,7 @@ class _Snapshot:
         import pandas as pd
 
         check_samples(f"{self.path}: a frame", self.count * len(self.labels))
-        with reading(self.path), _mapped(self.path) as content:
+        with reading(self.path), mapped(self.path) as content:
             table = pd.read_csv(BytesIO(content[self.rows]), sep=r"\s+", header=None)
         shape = self.count, len(self.labels)
         if table.shape != shape or table.iloc[:, -1].isna().any():
@@ -330,14 +329,9 @@ def _dumps(paths: Sequence[Path]) -> PointFrames:
     return PointFrames([snapshot.table for snapshot in found], times, unit)
 
 
-def _mapped(path: Path) -> mmap:
-    with path.open("rb") as stream:
-        return mmap(stream.fileno(), 0, access=ACCESS_READ)
-
-
 def _snapshots(path: Path) -> Iterator[_Snapshot]:
     """Yield all frames of a dump, whose atoms are not read yet."""
-    content = _mapped(path)
+    content = mapped(path)
     if content[-1:] != b"\n":
         raise SourceError(f"{path}: its last line has no end, it is truncated")
     begin, units = 0, _units("")

@@ -10,6 +10,7 @@ from glob import glob, has_magic
 from importlib import import_module
 from itertools import pairwise
 from math import isfinite
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -67,6 +68,12 @@ def check_hdf5(file: Path) -> None:
     """Refuse an HDF5 file that is damaged or takes data from other files."""
     with reading(file, "HDF5"), naming(file):
         check_own_data(file)
+
+
+def mapped(file: Path) -> mmap:
+    """Return the bytes of a file, mapped into memory."""
+    with file.open("rb") as stream:
+        return mmap(stream.fileno(), 0, access=ACCESS_READ)
 
 
 def natural(name: str) -> tuple[tuple[int, str], ...]:

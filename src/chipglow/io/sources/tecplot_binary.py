@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite, prod
-from mmap import ACCESS_READ, mmap
+from mmap import mmap
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import simple
 from chipglow.io.sources.mesh_reader import Block
-from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.source import SourceError, mapped, naming
 
 ORDERED: Final = "ORDERED"
 ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
@@ -134,8 +134,7 @@ class _Zone:
 
 def binary_zones(file: Path) -> tuple[Zone, ...]:
     """Return the zones of a binary file, whose numbers are not read yet."""
-    with file.open("rb") as stream:
-        cursor = _Cursor(file, mmap(stream.fileno(), 0, access=ACCESS_READ))
+    cursor = _Cursor(file, mapped(file))
     version = cursor.version()
     names = cursor.variables(version)
     zones = _headers(cursor, version, len(names))
