@@ -50,9 +50,7 @@ class Cine(CameraFile):
 
     def __init__(self, binary: Binary, notes: Notes) -> None:
         super().__init__(binary, notes)
-        header = self.header = binary.record(0, _FILE)
-        if header["mark"] != b"CI":
-            raise SourceError(f"{self.path}: begins with {header['mark']!r}, expected 'CI' (CINE)")
+        header = self.header = binary.marked(0, _FILE, b"CI", "CINE")
         setup = self.setup = binary.record(header["setup"], _SETUP)
         if setup["mark"] != b"ST":
             raise SourceError(

@@ -284,9 +284,7 @@ def _records(binary: Binary) -> Binary:
 
 
 def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
-    entry, header = _ENTRY, binary.record(start, _HEADER)
-    if header["magic"] != _MAGIC.rstrip(b"\0"):
-        raise SourceError(f"{binary.path}: begins with {header['magic']!r}, expected 'FFF' (FLIR)")
+    entry, header = _ENTRY, binary.marked(start, _HEADER, b"FFF", "FLIR")
     if not 100 <= header["version"] < 200:
         entry, header = _ENTRY.newbyteorder(">"), binary.record(start, _HEADER.newbyteorder(">"))
     count, place = header["count"], start + header["place"]

@@ -174,11 +174,8 @@ def read_recording(
             f"{path}: is {one.description}, which states itself what was measured: "
             "expected no quantity, unit, dataset or axes"
         )
-    if not one.in_subprocess(path):
-        return read_here(path, kind, frames, stated)
     read = partial(read_here, path, kind, frames, stated)
-    recording: Recording = Sandbox(str(path)).answer(read)
-    return recording
+    return Sandbox(str(path)).answer(read) if one.in_subprocess(path) else read()
 
 
 def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:

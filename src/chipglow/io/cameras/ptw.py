@@ -65,11 +65,7 @@ class Ptw(CameraFile):
 
     def __init__(self, binary: Binary, notes: Notes) -> None:
         super().__init__(binary, notes)
-        header = self.header = binary.record(0, _HEADER)
-        if header["signature"] != b"CED":
-            raise SourceError(
-                f"{self.path}: begins with {header['signature']!r}, expected 'CED' (PTW)"
-            )
+        header = self.header = binary.marked(0, _HEADER, b"CED", "PTW")
         rows, columns = header["rows"], header["columns"]
         check_picture(self.path, rows, columns)
         self.stride = self._stride()

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, TypeAlias, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,6 +160,7 @@ PlacedGrid: TypeAlias = tuple[
 
 Floats = TypeVar("Floats", np.float32, np.float64)
 
+Axis: TypeAlias = Literal["x", "y", "z", "-x", "-y", "-z"]
 _AXES: Final = ("x", "y", "z")
 
 
@@ -171,14 +172,14 @@ class Placement(Part):
     """
 
     horizontal: Annotated[
-        str,
+        Axis,
         Parameter(
             "The source's axis along the workpiece's motion toward the tool.",
             allowed="x, y, z, -x, -y, -z",
         ),
     ] = "x"
     vertical: Annotated[
-        str,
+        Axis,
         Parameter(
             "The source's axis from the cut surface into the chip.", allowed="x, y, z, -x, -y, -z"
         ),
@@ -194,9 +195,6 @@ class Placement(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("horizontal", "vertical"):
-            if getattr(self, name).removeprefix("-") not in _AXES:
-                raise ValueError(f"{name}: {getattr(self, name)!r}, expected x, y, z, -x, -y or -z")
         if self.axes[0] == self.axes[1]:
             raise ValueError(f"vertical: {self.vertical!r} is the horizontal axis too")
 

@@ -101,8 +101,6 @@ class MeshSource(Source, Part):
             raise ValueError(f"times: expected finite times, got {self.times!r}")
         if self.times and self.interval is not None:
             raise ValueError("interval: times are given too, expected one of them")
-        if isinstance(self.section, str) and self.section != "facing":
-            raise ValueError(f"section: {self.section!r}, expected a position or facing")
 
     def survey(self) -> Survey:
         meshes = Meshes(self)

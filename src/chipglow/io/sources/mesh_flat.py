@@ -91,9 +91,7 @@ def _range(solids: Sequence[Any], placement: Placement, unit: float) -> str:
 
 
 def _is_solid(grid: Any) -> NDArray[np.bool_]:
-    return np.asarray(
-        np.isin(grid.celltypes, (_TRIANGLE, _PIXEL, _QUAD, *_OTHER_FLAT), invert=True)
-    )
+    return np.isin(grid.celltypes, (_TRIANGLE, _PIXEL, _QUAD, *_OTHER_FLAT), invert=True)
 
 
 def _without_boundary(grids: Sequence[Any]) -> Iterator[Any]:

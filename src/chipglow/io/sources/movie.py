@@ -1,6 +1,7 @@
 """Movies of fields with a colour scale: a source of scenes."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot, isfinite, sqrt
@@ -120,15 +121,12 @@ def _number(place: str, name: str, value: str | float) -> float:
     if not isinstance(value, str):
         return float(value)
     number, _, unit = value.strip().partition(" ")
-    if not number or (not unit and name != "plastic_strain"):
-        what = f"{value!r} has no unit" if number else "is missing"
-        raise ValueError(f"{place}: {what}, expected a value such as {_EXAMPLES[name]}")
-    try:
-        return float(parse_unit(unit, SI_UNITS[name], name).to_si(float(number)))
-    except ValueError:
-        raise ValueError(
-            f"{place}: {value!r}, expected a value such as {_EXAMPLES[name]}"
-        ) from None
+    lacks_unit = not unit and name != "plastic_strain"
+    with suppress(ValueError):
+        if not lacks_unit:
+            return float(parse_unit(unit, SI_UNITS[name], name).to_si(float(number)))
+    what = f"{value!r}{' has no unit' if lacks_unit else ''}" if number else "is missing"
+    raise ValueError(f"{place}: {what}, expected a value such as {_EXAMPLES[name]}")
 
 
 @dataclass(frozen=True)
