@@ -96,9 +96,8 @@ class ColourScale:
         count = _equal_bands(colours)
         if count:
             ends = pairwise(np.linspace(0, len(pixels), count + 1))
-            plain = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
-            return cls._linear(plain, values, banded=True)
-        return cls._linear(colours, values, banded=False)
+            colours = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
+        return cls._linear(colours, values, banded=count > 0)
 
     @classmethod
     def _linear(

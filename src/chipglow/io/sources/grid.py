@@ -169,6 +169,7 @@ class _Grid:
         files = source.files
         paths = tuple(files.values()) if isinstance(files, dict) else (str(files),)
         self._files = {path: list(open_arrays(path, stack).values()) for path in paths}
+        self._arrays = [array for arrays in self._files.values() for array in arrays]
         layers = {name: self._layer(name, array) for name, array in self._choose().items()}
         used = {layer.array.name for layer in layers.values()} | set(source.names.values())
         self._first = first = next(iter(layers.values()))
@@ -188,12 +189,8 @@ class _Grid:
         _, rows, columns = first.shape
         self.kind = f"grid of {rows} x {columns} samples, {', '.join(self._files)}"
         axes = {name for axis in COORDINATES for name in OTHER_NAMES[axis]}
-        self.unused = tuple(
-            array.name
-            for arrays in self._files.values()
-            for array in arrays
-            if array.name not in used and simple(array.short) not in axes
-        )
+        others = (one for one in self._arrays if simple(one.short) not in axes)
+        self.unused = tuple(one.name for one in others if one.name not in used)
         """Arrays that are neither field nor coordinate."""
 
     def _layer(self, name: str, array: FileArray) -> _Layer:
@@ -236,9 +233,8 @@ class _Grid:
 
     def _coordinate(self, axis: str) -> FileArray | None:
         count = self._first.shape[AXES.index(axis)]
-        arrays = [array for of_file in self._files.values() for array in of_file]
         given, dim = self._source.names.get(axis), self._first.dim(axis)
-        return coordinate(axis, arrays, given, dim, count)
+        return coordinate(axis, self._arrays, given, dim, count)
 
     def _positions(self, axis: str) -> NDArray[np.float64]:
         """Return the centres of the columns or rows in m, in the order of the file."""
@@ -252,9 +248,7 @@ class _Grid:
             return check_even(str(array), values)
         number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5
         if array is not None:
-            self.notes.remarks.append(
-                f"The coordinate {axis} is not used, as the spacing is given."
-            )
+            self.notes.remarks.append(f"The coordinate {axis} is not used: the spacing is given.")
         if axis == "x":
             return source.left + source.spacing * number
         edge = "upper" if source.top_first else "lower"

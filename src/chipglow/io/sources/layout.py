@@ -43,8 +43,7 @@ def find_fields(
         raise SourceError(
             f"{path}: no array has the name of a field, say which is {known[0]}: it has {listed}"
         )
-    order = dict.fromkeys((*known, *found))
-    return {name: arrays[found[name]] for name in order if name in found}
+    return {name: arrays[found[name]] for name in dict.fromkeys((*known, *found)) if name in found}
 
 
 def _short_names(labels: Collection[str]) -> dict[str, str]:

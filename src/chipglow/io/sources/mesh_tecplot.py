@@ -125,8 +125,7 @@ def _load(
         for key in _NOT_READ:
             if key in keys:
                 raise ValueError(f"{key} is not read")
-        across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
-        counts = (across, down, deep)
+        counts = int(keys.get("I", "1")), int(keys.get("J", "1")), int(keys.get("K", "1"))
         if kind in _ORDERED:
             nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
         else:
