@@ -264,11 +264,9 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
 
 def _not_kelvin(wanted: Import, value: float, place: str) -> SourceError:
     unit = wanted.description.get("units", {}).get("temperature", "K")
-    other = (
-        "if it is in °C, expected units.temperature: degC"
-        if unit == "K"
-        else f"units.temperature is {unit}"
-    )
+    other = f"units.temperature is {unit}"
+    if unit == "K":
+        other = "if it is in °C, expected units.temperature: degC"
     return SourceError(
         f"temperature: {value:.6g} {place}, expected kelvin of {COLDEST:g} or more; {other}"
     )

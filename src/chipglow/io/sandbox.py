@@ -92,12 +92,10 @@ class Sandbox:
             timer.start()
             return pickle.load(process.stdout)
         except (EOFError, pickle.UnpicklingError):
-            if late.is_set():
-                reason = f"had no answer in {self.patience:.0f} s"
-            else:
-                reason = (
-                    f"ended with code {process.wait()}, the file is damaged or too large to be read"
-                )
+            reason = f"had no answer in {self.patience:.0f} s"
+            if not late.is_set():
+                code = process.wait()
+                reason = f"ended with code {code}, the file is damaged or too large to be read"
             raise SourceError(f"{self.name}: its reader {reason}") from None
         finally:
             timer.cancel()

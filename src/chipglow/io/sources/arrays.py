@@ -160,8 +160,7 @@ def _copy_of_mapped(values: NDArray[Any], key: Key) -> NDArray[Any]:
     """Return a part of a file that is mapped into memory, of which no page is kept there."""
     part = np.array(values[key])
     if isinstance(values, np.memmap) and hasattr(mmap, "MADV_DONTNEED"):
-        mapping: Any = values._mmap  # type: ignore[attr-defined]
-        mapping.madvise(mmap.MADV_DONTNEED)
+        values._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
     return part
 
 

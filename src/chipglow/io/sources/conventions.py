@@ -206,13 +206,13 @@ class Placement(Part):
     @property
     def axes(self) -> tuple[int, int]:
         """Indices of the horizontal and the vertical axis."""
-        first, second = (_AXES.index(name.removeprefix("-")) for name in self._names)
-        return first, second
+        return _AXES.index(self.horizontal[-1]), _AXES.index(self.vertical[-1])
 
     @property
     def signs(self) -> tuple[float, float]:
         """1 or -1 for the horizontal and the vertical axis."""
-        first, second = (-1.0 if name.startswith("-") else 1.0 for name in self._names)
+        names = self.horizontal, self.vertical
+        first, second = (-1.0 if name.startswith("-") else 1.0 for name in names)
         return first, second
 
     @property
@@ -257,7 +257,3 @@ class Placement(Part):
         if name.startswith("material"):
             values = values - self.origin[number]
         return values * self.signs[number]
-
-    @property
-    def _names(self) -> tuple[str, str]:
-        return self.horizontal, self.vertical

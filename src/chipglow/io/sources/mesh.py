@@ -44,7 +44,7 @@ MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
 _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
 _VECTOR_SIZES: Final = (2, 3)
-_TENSOR_SIZES: Final = (6, 9)
+_COMPOUND_SIZES: Final = (*_VECTOR_SIZES, 6, 9)
 _MOST_PARTS: Final = 1000
 
 
@@ -172,8 +172,7 @@ class Meshes:
         for ours, theirs in given.items():
             _check_size(file, ours, theirs, sizes)
         vectors = [name for name, size in sizes.items() if size in _VECTOR_SIZES]
-        others = (*_VECTOR_SIZES, *_TENSOR_SIZES)
-        scalars = [name for name, size in sizes.items() if size not in others]
+        scalars = [name for name, size in sizes.items() if size not in _COMPOUND_SIZES]
         by_components = bool(set(_COMPONENTS) & set(given))
         known = [name for name in READABLE if name not in _COMPONENTS]
         if not by_components and _VECTOR not in given and self._source.placement.axes == (0, 1):
@@ -372,7 +371,7 @@ def _reader(source: MeshSource) -> MeshReader:
 def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) -> None:
     size = sizes.get(theirs)
     is_vector = ours == _VECTOR
-    fits = size in _VECTOR_SIZES if is_vector else size not in (*_VECTOR_SIZES, *_TENSOR_SIZES)
+    fits = size in _VECTOR_SIZES if is_vector else size not in _COMPOUND_SIZES
     if size is not None and not fits:
         expected = "2 or 3" if is_vector else "one value"
         raise SourceError(

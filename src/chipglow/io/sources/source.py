@@ -102,11 +102,10 @@ def files_of(pattern: str | Path, *, gaps_allowed: bool = True) -> tuple[Path, .
 
 def _check_gaps(pattern: str | Path, files: Sequence[Path]) -> None:
     numbers = [[int(digits) for digits in re.findall(r"\d+", file.name)] for file in files]
-    columns = [set(column) for column in zip(*numbers, strict=False)]
-    counted = [at for at, column in enumerate(columns) if len(column) == len(files)]
-    if len(files) < 3 or not counted:
+    columns = [column for column in zip(*numbers, strict=False) if len(set(column)) == len(files)]
+    if len(files) < 3 or not columns:
         return
-    counts = [row[counted[-1]] for row in numbers]
+    counts = columns[-1]
     steps = [after - before for before, after in pairwise(counts)]
     usual = max(sorted(set(steps)), key=steps.count)
     for file, count, step in zip(files, counts, steps, strict=False):
