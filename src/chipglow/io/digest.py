@@ -74,8 +74,7 @@ def write_hdf5(path: Path, write: Callable[[HDF5Sink], object]) -> None:
         try:
             write(sink)
             sink.seek(0)
-            digest = file_digest(sink, "sha256").digest()
-            sink.write(_MARK + digest)
+            sink.write(_MARK + file_digest(sink, "sha256").digest())
         finally:
             sink.check()  # the cause of what HDF5 says
 

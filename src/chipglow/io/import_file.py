@@ -31,8 +31,7 @@ def _has_header(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         first = file.readline(10_000).decode("utf-8", "replace").lower()
-    words = re.findall(r"[a-z_]+", first)
-    return any(word not in ("e", "nan", "inf") for word in words)
+    return any(word not in ("e", "nan", "inf") for word in re.findall(r"[a-z_]+", first))
 
 
 IMPORT_SOURCES.add("movie", MovieSource)

@@ -125,10 +125,9 @@ def prospect(wanted: Import) -> Prospect:
         raise SourceError(f"{survey.kind}: its times are not finite")
     check_times(survey.kind, survey.times)
     if "temperature" not in survey.found:
-        listed = ", ".join(survey.unused) or "none"
         raise SourceError(
             f"{survey.kind}: no field is known as temperature, expected fields: "
-            f"temperature: NAME with one of {listed}"
+            f"temperature: NAME with one of {', '.join(survey.unused) or 'none'}"
         )
     raster = wanted.view.raster(survey)
     _check_temperatures(wanted, survey, raster)

@@ -67,8 +67,7 @@ def _mp4(part: Path, shape: tuple[int, int]) -> Iterator[Callable[[NDArray[np.ui
         stream.pix_fmt = "yuv420p"  # the one that every player knows
 
         def append(picture: NDArray[np.uint8]) -> None:
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            container.mux(stream.encode(frame))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
 
         yield append
         container.mux(stream.encode(None))

@@ -118,8 +118,7 @@ class ColourScale:
     def widths(self) -> NDArray[np.float64]:
         """Range of values for which each colour of the knots stands, shape (m,)."""
         first, last = self._runs
-        count = len(self.values)
-        step = (self.values[-1] - self.values[0]) / max(count - 1, 1)
+        step = (self.values[-1] - self.values[0]) / max(len(self.values) - 1, 1)
         return np.asarray(self.values[last] - self.values[first] + step)
 
     @cached_property
@@ -247,8 +246,7 @@ def _equal_bands(colours: NDArray[np.float64]) -> int:
     apart = np.array([_misfits(labs, count) for count in tried]).reshape(-1, 2)
     if not len(apart):
         return 0
-    least = apart[:, 0].min()
-    best = int(np.flatnonzero(apart[:, 0] <= 1.3 * least + 0.2)[0])
+    best = int(np.argmax(apart[:, 0] <= 1.3 * apart[:, 0].min() + 0.2))
     of_bands, of_lines = apart[best]
     return tried[best] if of_bands < _BANDED * of_lines else 0
 

@@ -70,8 +70,7 @@ OTHER_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
 def simple(name: str) -> str:
     """Return a name in lower case with words joined by underscores, without a unit in brackets."""
     text = name.split("(")[0].split("[")[0].strip().lower()
-    words = "".join(letter if letter.isalnum() else " " for letter in text).split()
-    return "_".join(words)
+    return "_".join("".join(letter if letter.isalnum() else " " for letter in text).split())
 
 
 def match_names(

@@ -197,8 +197,7 @@ class _Grid:
         axes = axes_of(array, self._source.axes, self.notes)
         unit = SI
         if name != "material":
-            own = self._source.units.of(name)
-            unit = unit_of(name, str(array), array.unit, own, self.notes)
+            unit = unit_of(name, str(array), array.unit, self._source.units.of(name), self.notes)
         return _Layer(array, axes, unit)
 
     def _choose(self) -> dict[str, FileArray]:
@@ -244,8 +243,7 @@ class _Grid:
                 raise SourceError(
                     f"{self._first.array.path}: has no coordinate {axis!r}, expected grid.spacing"
                 )
-            values = read_list(axis, array, source.units.length, self.notes)
-            return check_even(str(array), values)
+            return check_even(str(array), read_list(axis, array, source.units.length, self.notes))
         number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5
         if array is not None:
             self.notes.remarks.append(f"The coordinate {axis} is not used: the spacing is given.")

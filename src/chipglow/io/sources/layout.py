@@ -103,8 +103,7 @@ def coordinate(
         if not match:
             raise SourceError(f"{every[0].path}: there is no list {given!r} for {axis}")
     else:
-        names = OTHER_NAMES[axis]
-        match = [one for one in lists if one.short == dim or simple(one.short) in names]
+        match = [one for one in lists if one.short == dim or simple(one.short) in OTHER_NAMES[axis]]
         # The most specific of several names: t may be another number.
         match.sort(key=lambda one: simple(one.short) == "t")
     if not match:

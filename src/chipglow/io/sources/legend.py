@@ -1,6 +1,7 @@
 """Legends in a picture: a bar whose colours run along one axis."""
 
 from collections.abc import Iterator
+from itertools import compress
 from typing import Any, Final
 
 import numpy as np
@@ -50,11 +51,8 @@ def find_legend(picture: Picture) -> Box | None:
     if best is None:
         return None
     # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
-    within = []
-    for box in boxes:
-        inward = np.subtract(box, best) * (1, 1, -1, -1)
-        if ((inward >= 0) & (inward <= _BLUR)).all():
-            within.append(box)
+    inward = np.subtract(boxes, best) * (1, 1, -1, -1)
+    within = compress(boxes, np.all((inward >= 0) & (inward <= _BLUR), axis=1))
     return _extended(picture, min(within, key=lambda box: (box[2] - box[0]) * (box[3] - box[1])))
 
 
@@ -160,8 +158,7 @@ def _edges(labs: NDArray[np.float64]) -> list[tuple[int, int, int]]:
     shortest = _shortest(labs)
     result = []
     for column in np.flatnonzero(edge.sum(axis=0) >= shortest)[:_MOST_EDGES]:
-        padded = np.concatenate([[False], edge[:, column], [False]])
-        changes = np.flatnonzero(padded[1:] != padded[:-1])
+        changes = np.flatnonzero(np.diff(edge[:, column], prepend=False, append=False))
         for first, last in changes.reshape(-1, 2):
             if last - first >= shortest:
                 result.append((int(column) + 1, int(first), int(last)))

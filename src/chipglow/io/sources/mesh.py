@@ -106,10 +106,9 @@ class MeshSource(Source, Part):
         meshes = Meshes(self)
         flat = [meshes.flat(number, blocks) for number, blocks in meshes.ends.items()]
         found, notes = meshes.found, Notes(meshes.assumptions(), remarks=meshes.remarks())
-        times = meshes.times(notes)
         return Survey(
             meshes.reader.kind,
-            times,
+            meshes.times(notes),
             meshes.extent(flat),
             {ours: found[ours] for ours in READABLE if ours in found},
             tuple(sorted(set(fields_of(meshes.ends[0])) - set(found.values()))),

@@ -1,6 +1,6 @@
 """A mesh as triangles: flat elements, a cut through solid ones, or their visible surface."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, TypeAlias
 
@@ -46,7 +46,7 @@ class FlatMesh:
 
 def flatten(
     blocks: Sequence[Block],
-    fields: Iterable[str],
+    fields: Collection[str],
     tool: Sequence[NDArray[np.bool_]],
     placement: Placement,
     section: Section,
@@ -57,8 +57,7 @@ def flatten(
     In a mesh with solid elements flat ones are not seen in a cut, and those on the nodes of solid
     ones are their boundary and left out.
     """
-    wanted = set(fields)
-    parts = [_with_only(block.grid, wanted, of) for block, of in zip(blocks, tool, strict=True)]
+    parts = [_with_only(block.grid, fields, of) for block, of in zip(blocks, tool, strict=True)]
     grids = [grid for grid in parts if grid.n_cells]
     solids = [grid for grid in grids if _is_solid(grid).any()]
     if not solids:
@@ -120,7 +119,7 @@ def _keys(points: Any) -> NDArray[Any]:
     return rows.view(np.dtype((np.void, 24))).ravel()
 
 
-def _with_only(grid: Any, wanted: set[str], is_tool: NDArray[np.bool_]) -> Any:
+def _with_only(grid: Any, wanted: Collection[str], is_tool: NDArray[np.bool_]) -> Any:
     """Return the grid without lines, points, deleted elements and fields that are not wanted."""
     kept = grid.copy(deep=False)
     keep = ~np.isin(grid.celltypes, _LINES_AND_POINTS)
@@ -129,7 +128,7 @@ def _with_only(grid: Any, wanted: set[str], is_tool: NDArray[np.bool_]) -> Any:
     if "STATUS" in grid.cell_data:
         keep &= np.asarray(grid.cell_data["STATUS"]) != 0
     for data in (kept.point_data, kept.cell_data):
-        for name in set(data.keys()) - wanted:
+        for name in set(data.keys()).difference(wanted):
             del data[name]
     kept.cell_data[_TOOL] = is_tool.astype(np.uint8)
     return kept if keep.all() else kept.extract_cells(np.flatnonzero(keep))

@@ -47,8 +47,7 @@ class TecplotReader(MeshReader):
     def read(self, number: int) -> Sequence[Block]:
         zones = self._zones or _zones(self.file(number))
         if self.times:
-            wanted = self.times[number]
-            zones = tuple(zone for zone in zones if zone.time in (None, wanted))
+            zones = tuple(zone for zone in zones if zone.time in (None, self.times[number]))
         return tuple(zone.load() for zone in zones)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import hypot, isfinite, sqrt
+from math import dist, isfinite, sqrt
 from pathlib import Path
 from statistics import fmean
 from typing import Annotated, Any, ClassVar, Final
@@ -307,8 +307,7 @@ class MovieSource(Source, Part):
                 "movie.pixel: is missing, expected the side of a pixel such as 1 um, "
                 "or scale_from, scale_to and scale_length"
             )
-        (left, top), (right, bottom) = self.scale_from, self.scale_to
-        pixels = hypot(right - left, bottom - top)
+        pixels = dist(self.scale_from, self.scale_to)
         if not pixels:
             raise ValueError(f"movie.scale_to: {self.scale_to}, expected another point")
         return self.scale_length / pixels, self.scale_length / pixels

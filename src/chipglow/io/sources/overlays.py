@@ -84,8 +84,7 @@ class FieldReader:
         """Return a picture's contents; pixels of lines and text take those of the nearest pixel."""
         values, distance = self.scale.invert(picture)
         void, tool = self._marked(picture, distance)
-        off_scale = (distance > self.limit) & ~void & ~tool
-        lines = off_scale | (dark_lines(picture) & ~void & ~tool)
+        lines = ((distance > self.limit) | dark_lines(picture)) & ~void & ~tool
         # Drawings over a field shade into the pixels around.
         drawn = maximum_filter(lines.view(np.uint8), 3).view(np.bool_) | self.covered
         seen = ~(drawn | void | tool)

@@ -177,8 +177,7 @@ def _split(table: PointTable, time: str | None) -> PointFrames:
 
 
 def _rows(table: PointTable, rows: slice) -> PointTable:
-    columns = {label: values[rows] for label, values in table.columns.items()}
-    return replace(table, columns=columns)
+    return replace(table, columns={label: values[rows] for label, values in table.columns.items()})
 
 
 def _time_in(labels: Iterable[str]) -> str:
