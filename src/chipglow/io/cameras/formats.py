@@ -14,7 +14,7 @@ from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sandbox import Sandbox
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.source import files_of, reading
+from chipglow.io.sources.source import files_of, head_of, reading
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
@@ -103,9 +103,7 @@ def find_format(path: Path) -> str:
     first = files_of(path)[0]
     if first.is_dir():
         return "zarr"
-    with first.open("rb") as stream:
-        head = stream.read(_HEAD)
-    if not head:
+    if not (head := head_of(first, _HEAD)):
         raise SourceError(f"{first}: is empty")
     formats = camera_formats()
     suffix = first.suffix.lower()

@@ -15,7 +15,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.source import SourceError, check_hdf5, files_of, reading, required
+from chipglow.io.sources.source import SourceError, check_hdf5, files_of, head_of, reading, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -278,9 +278,7 @@ def _plain(value: Any) -> Any:
 
 
 def _netcdf(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    with path.open("rb") as stream:
-        classic = stream.read(3) == b"CDF"
-    yield from (_netcdf3 if classic else _hdf5)(path, stack)
+    yield from (_netcdf3 if head_of(path, 3) == b"CDF" else _hdf5)(path, stack)
 
 
 def _netcdf3(path: Path, stack: ExitStack) -> Iterator[FileArray]:

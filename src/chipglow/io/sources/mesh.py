@@ -318,7 +318,7 @@ class Meshes:
         names = [name for name in READABLE if name in self.found]
         nodes = [name for name in names if self.found[name] in mesh.of_nodes]
         elements = [name for name in names if self.found[name] in mesh.of_elements]
-        sampled = rasterise(
+        sampled, element = rasterise(
             raster,
             source.placement.place(mesh.points * source.units.length.scale),
             mesh.triangles,
@@ -327,12 +327,12 @@ class Meshes:
             self._height(mesh) if source.section == "facing" else None,
         )
         fields: dict[str, NDArray[np.float32]] = {}
-        for name, values in zip((*nodes, *elements), sampled.fields, strict=True):
+        for name, values in zip((*nodes, *elements), sampled, strict=True):
             before = fields.get(name, values)
             fields[name] = np.where(np.isfinite(before), before, values)
-        tool = np.append(mesh.tool, False)[sampled.element]
+        tool = np.append(mesh.tool, False)[element]
         material = np.where(tool, Material.TOOL, Material.WORKPIECE)
-        material[sampled.element == NOTHING] = Material.VOID
+        material[element == NOTHING] = Material.VOID
         return SampledFrame(time, fields, material.astype(np.uint8))
 
     def _values(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float32]:

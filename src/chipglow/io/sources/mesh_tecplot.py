@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
-from chipglow.io.sources.source import SourceError, mapped, naming
+from chipglow.io.sources.source import SourceError, head_of, mapped, naming
 from chipglow.io.sources.tecplot_binary import (
     ELEMENTS,
     MAGIC,
@@ -52,8 +52,7 @@ class TecplotReader(MeshReader):
 
 
 def _is_binary(file: Path) -> bool:
-    with file.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC
+    return head_of(file, len(MAGIC)) == MAGIC
 
 
 def _times(zones: Sequence[Zone]) -> tuple[float, ...] | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
-from chipglow.io.sources.source import SourceError, check_hdf5, reading
+from chipglow.io.sources.source import SourceError, check_hdf5, head_of, reading
 
 OTHER_HDF: Final = (".hdf", ".h5", ".hdf5")
 """Endings of HDF5 files, which are VTK's only if they have its group."""
@@ -56,7 +56,7 @@ class VtkReader(MeshReader):
             if self.times:
                 self._opened, self.count = opened, len(self.times)
         if self.times is None:
-            heads = [re.search(_TIME, _head(file, _HEAD)) for file in files]
+            heads = [re.search(_TIME, head_of(file, _HEAD)) for file in files]
             found = tuple(float(head[1]) for head in heads if head)
             self.times = found if len(found) == len(files) else None
 
@@ -132,7 +132,8 @@ def _open_xdmf(file: Path) -> Any:
     from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
     # VTK crashes where the HDF5 file is missing.
-    for name in sorted(set(re.findall(rb">\s*([^<>:\"]+\.(?:h5|hdf5)):", _head(file)))):
+    named = re.findall(rb">\s*([^<>:\"]+\.(?:h5|hdf5)):", head_of(file, _MOST_XDMF))
+    for name in sorted(set(named)):
         heavy = file.parent / name.decode(errors="replace").strip()
         if not heavy.is_file():
             raise SourceError(f"{file}: its data should be in {heavy.name}, which is not there")
@@ -144,17 +145,12 @@ def _open_xdmf(file: Path) -> Any:
     return reader
 
 
-def _head(file: Path, size: int = _MOST_XDMF) -> bytes:
-    with file.open("rb") as stream:
-        return stream.read(size)
-
-
 def _of_time_series(file: Path, blocks: tuple[Block, ...]) -> tuple[Block, ...]:
     """Leave out the grid that only lends its nodes to a time series beside it.
 
     VTK gives it the fields of some time.
     """
-    grids = re.findall(rb"<Grid\b[^>]*>", _head(file))
+    grids = re.findall(rb"<Grid\b[^>]*>", head_of(file, _MOST_XDMF))
     series = [grid for grid in grids if b'CollectionType="Temporal"' in grid]
     names = [re.search(rb'Name="([^"]*)"', grid) for grid in series]
     wanted = {name.group(1).decode(errors="replace") for name in names if name}

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.source import SourceError, files_of, mapped, reading, required
+from chipglow.io.sources.source import SourceError, files_of, head_of, mapped, reading, required
 from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
@@ -94,10 +94,8 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     paths = files_of(pattern)
     path, suffix = paths[0], paths[0].suffix.lower()
     _check_empty(path)
-    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES):
-        with path.open("rb") as stream:
-            if stream.read(len(_ITEM)) == _ITEM:
-                return _dumps(paths)
+    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES) and head_of(path, len(_ITEM)) == _ITEM:
+        return _dumps(paths)
     if len(paths) == 1 and suffix in TEXT_SUFFIXES:
         return _split(_read_text(path), time)
     if len(paths) == 1 and suffix not in VTK_SUFFIXES:

@@ -70,6 +70,12 @@ def check_hdf5(file: Path) -> None:
         check_own_data(file)
 
 
+def head_of(file: Path, size: int) -> bytes:
+    """Return the first bytes of a file, as many as there are."""
+    with file.open("rb") as stream:
+        return stream.read(size)
+
+
 def mapped(file: Path) -> mmap:
     """Return the bytes of a file, mapped into memory."""
     with file.open("rb") as stream:
