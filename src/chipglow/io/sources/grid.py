@@ -133,6 +133,8 @@ class _Layer:
         self.array, self.axes, self.unit = array, axes, unit
         self.shape = tuple(array.shape[axes.index(axis)] if axis in axes else 1 for axis in AXES)
         """Number of samples along `AXES`."""
+        self.dims = dict(zip(axes, array.dims, strict=False))
+        """Names of the axes in the file, if it states them."""
         samples = self.shape[1] * self.shape[2]
         for axis, length in zip(AXES[1:], self.shape[1:], strict=True):
             if not 2 <= length <= MOST_ON_A_SIDE:
@@ -144,12 +146,6 @@ class _Layer:
         self._first, self._block = 0, np.empty((0, 0, 0), np.float32)
         together = array.chunks[axes.index("time")] if array.chunks and "time" in axes else 1
         self._together = max(1, min(together, _LARGEST_BLOCK // samples))
-
-    def dim(self, axis: str) -> str:
-        """Return the name of an axis in the file; empty if it states none."""
-        if axis not in self.axes or not self.array.dims:
-            return ""
-        return self.array.dims[self.axes.index(axis)]
 
     def read(self, index: int) -> NDArray[np.float32]:
         """Return numbers of a frame as they are in the file, shape (y, x), NaN if missing."""
@@ -232,7 +228,7 @@ class _Grid:
 
     def _coordinate(self, axis: str) -> FileArray | None:
         count = self._first.shape[AXES.index(axis)]
-        given, dim = self._source.names.get(axis), self._first.dim(axis)
+        given, dim = self._source.names.get(axis), self._first.dims.get(axis, "")
         return coordinate(axis, self._arrays, given, dim, count)
 
     def _positions(self, axis: str) -> NDArray[np.float64]:
