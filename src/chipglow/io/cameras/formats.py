@@ -21,7 +21,6 @@ _HEAD: Final = 520
 """Bytes by which a kind of file is recognised: those of HDF5 may follow 512 of the user's."""
 
 Begins = Callable[[bytes], bool]
-Read = Callable[[Path, slice | None, float | None], Recording]
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class CameraFormat:
     """Endings of such files' names."""
     begins: Begins | None = None
     """Whether a file is of this format, by its first bytes."""
-    read: Read | None = None
+    read: Callable[[Path, slice | None, float | None], Recording] | None = None
     """Reads frames of a file that says what was measured: its path, which frames, and the time
     between frames in s, instead of the file's own, or None. Without it the file holds an array,
     and the user says."""

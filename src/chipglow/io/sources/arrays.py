@@ -225,18 +225,15 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[FileArray]:
 
     check_hdf5(path)
     file = stack.enter_context(h5py.File(path, "r"))
-    found: list[FileArray] = []
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
+    names: list[str] = []
+    file.visit(names.append)
+    for name in names:
+        if isinstance(item := file[name], h5py.Dataset):
             settings = item.id.get_create_plist()
             filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
             if not all(map(h5py.h5z.filter_avail, filters)):
                 required("hdf5plugin", path, "grid")
-            found.extend(_hdf5_arrays(name, item))
-
-    file.visititems(visit)
-    yield from found
+            yield from _hdf5_arrays(name, item)
 
 
 def _hdf5_arrays(name: str, item: Any) -> Iterator[FileArray]:

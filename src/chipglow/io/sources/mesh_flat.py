@@ -13,7 +13,6 @@ from chipglow.io.sources.source import SourceError
 from chipglow.io.sources.triangles import split_quads
 
 Arrays: TypeAlias = Mapping[str, NDArray[np.float64]]
-Section: TypeAlias = float | Literal["facing"] | None
 
 _TRIANGLE, _PIXEL, _QUAD = 5, 8, 9
 _OTHER_FLAT: Final = (6, 7, 22, 23, 28, 34, 35, 63, 69, 70, 76, 77)
@@ -49,7 +48,7 @@ def flatten(
     fields: Collection[str],
     tool: Sequence[NDArray[np.bool_]],
     placement: Placement,
-    section: Section,
+    section: float | Literal["facing"] | None,
     unit: float,
 ) -> FlatMesh:
     """Return the triangles of all blocks, with some fields; `unit` is the file's unit of length.

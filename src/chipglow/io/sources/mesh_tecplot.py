@@ -120,9 +120,8 @@ def _load(
     words = re.sub(rb"(?m)^\s*#.*$", b"", content[begin:end]).split()
     kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", ORDERED))).upper().removeprefix("FE")
     with naming(f"{file}: zone {number}"):
-        for key in _NOT_READ:
-            if key in keys:
-                raise ValueError(f"{key} is not read")
+        if unread := [key for key in _NOT_READ if key in keys]:
+            raise ValueError(f"{unread[0]} is not read")
         counts = int(keys.get("I", "1")), int(keys.get("J", "1")), int(keys.get("K", "1"))
         if kind in _ORDERED:
             nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))

@@ -30,9 +30,6 @@ KINDS: Final[Mapping[str, str]] = {
 }
 """Formats by the ending of a file's name."""
 
-_NAMES: Final[Mapping[str, Mapping[str, str]]] = {"OpenFOAM": {"velocity": "U"}}
-"""Names of fields in one format, which mean another thing in others."""
-
 _AS: Final[Mapping[str, str]] = {
     ".xmf": ".xdmf", ".encas": ".case", **dict.fromkeys(OTHER_HDF, ".vtkhdf"),
 }  # fmt: skip
@@ -48,7 +45,8 @@ class VtkReader(MeshReader):
 
     def __init__(self, files: Sequence[Path]) -> None:
         super().__init__(files, kind_of(files[0]))
-        self.known = _NAMES.get(kind_of(files[0]), {})
+        if kind_of(files[0]) == "OpenFOAM":
+            self.known = {"velocity": "U"}  # which means another thing in other formats
         self._opened: Any = None
         if len(files) == 1:
             opened = _open(files[0])
@@ -62,10 +60,9 @@ class VtkReader(MeshReader):
 
     def read(self, number: int) -> Sequence[Block]:
         file = self.file(number)
-        if self._opened is None:
+        if self._opened is None or self.times is None:
             data = read_data(file)
         else:
-            assert self.times is not None
             with reading_vtk(file):
                 data = _at_time(self._opened, number, self.times[number])
         # The state of an unfinished reader may crash the next one.

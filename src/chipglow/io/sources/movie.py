@@ -58,7 +58,6 @@ Pixel = tuple[float, float]
 """Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
-_HALF: Final = 0.5
 _ROUNDING: Final = 0.29
 _LOWEST: Final = 0.02
 """Fraction of a scale up to which a colour at the border is taken for its lowest value."""
@@ -261,7 +260,7 @@ class MovieSource(Source, Part):
             values, material = regrid(turned(_values(read)), turned(material), across, down)
             *means, distance, filled = values
             quality = np.round(np.nan_to_num(distance)).astype(np.uint8)
-            quality[filled > _HALF] = FILLED
+            quality[filled > 0.5] = FILLED
             fields = dict(zip(readers, means, strict=True))
             yield SampledFrame(float(times[number // self.every]), fields, material, quality)
 
