@@ -121,9 +121,7 @@ class CameraFile(ABC):
         """Return the other fields of the `Recording` of some frames."""
 
     @classmethod
-    def recording(
-        cls, path: Path, frames: slice | None = None, interval: float | None = None
-    ) -> Recording:
+    def recording(cls, path: Path, frames: slice | None, interval: float | None) -> Recording:
         """Read frames; see `CameraFormat`."""
         with opened(path) as binary:
             file = cls(binary, notes := Notes())
