@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,6 @@ def movie_writer(
 def _mp4(part: Path, shape: tuple[int, int]) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
     import av
 
-    container: Any
     with av.open(str(part), "w", format="mp4") as container:
         stream = container.add_stream("h264", rate=_RATE)
         stream.options = {"preset": "veryfast"}

@@ -115,8 +115,7 @@ def _open(file: Path) -> Any:
     if kind == "XDMF":
         return _open_xdmf(file)
     with reading_vtk(file):
-        reader_for: Any = pyvista.get_reader
-        reader = reader_for(str(file), force_ext=_AS.get(suffix, suffix))
+        reader = pyvista.get_reader(str(file), force_ext=_AS.get(suffix, suffix))
         if kind == "OpenFOAM":
             reader.cell_to_point_creation = False  # the case has values of cells alone
         if kind == "Exodus II":
