@@ -57,8 +57,8 @@ def compare(points, triangles, peer):
     fields = np.stack([values] * 5, axis=1)
     print(f"\n{len(triangles)} triangles on {RASTER.columns} x {RASTER.rows} samples\n")
     print_head("", "least / ms", "median / ms", "largest error / K", "void")
-    row("rasterise, 1 field", lambda: rasterise(RASTER, points, triangles, values).fields[0])
-    row("rasterise, 5 fields", lambda: rasterise(RASTER, points, triangles, fields).fields[0])
+    row("rasterise, 1 field", lambda: rasterise(RASTER, points, triangles, values)[0][0])
+    row("rasterise, 5 fields", lambda: rasterise(RASTER, points, triangles, fields)[0][0])
     if peer:
         row("VTK's probe, 1 field", lambda: probe(points, triangles, values), 2)
 

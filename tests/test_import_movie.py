@@ -417,7 +417,7 @@ GREY = NamedMap("gray")
 @pytest.mark.parametrize(
     ("drawn_as", "colours", "more", "said"),
     [
-        (RAINBOW, RAINBOW, {"crop": (0, 0, 121, 90)}, "crop: .* does not lie in pictures of 120 x"),
+        (RAINBOW, RAINBOW, {"crop": (0, 0, 121, 90)}, "crop: .* not lie in the picture of 120 x"),
         (RAINBOW, None, {}, r"a\.avi: no legend was found"),
         (RAINBOW, (100, 10, 208, 80), {}, r"a\.avi: legend: box .* does not lie in the picture"),
         (GREY, GREY, {"background": ((255, 255, 255),)}, r"a\.avi: background: .* colour of 139"),

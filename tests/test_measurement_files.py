@@ -27,7 +27,7 @@ from chipglow.camera import (
 )
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
 from chipglow.io.cameras import write_hcc
-from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
+from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_response, read_table
 from chipglow.laboratory.measurement import (
     CalibrationDescription,
     MeasurementDescription,
@@ -93,7 +93,7 @@ def fill(folder, seed=1):
 
 
 def calibrate_points(folder):
-    table = read_columns(folder / "points.csv", POINT_COLUMNS)
+    table, _ = read_table(folder / "points.csv", POINT_COLUMNS)
     fit = fit_calibration(
         LinearCalibration,
         table["temperature"], table["counts"], BAND,
@@ -175,7 +175,7 @@ def test_tables_are_read_with_their_units(tmp_path):
     table.write_text(
         "counts,temperature_degF,temperature_uncertainty_degF\n10,1112,1.8\n\n20,212,9\n"
     )
-    read = read_columns(table, POINT_COLUMNS)
+    read, _ = read_table(table, POINT_COLUMNS)
     assert read["temperature"] == pytest.approx([873.15, 373.15])
     assert read["temperature_uncertainty"] == pytest.approx([1.0, 5.0])
     assert read["counts"].tolist() == [10.0, 20.0]
@@ -207,7 +207,7 @@ def test_a_table_that_is_none_is_one_clear_error(tmp_path, text, message):
     table = tmp_path / "table.csv"
     table.write_text(text)
     with pytest.raises(ValueError, match=message) as caught:
-        read_columns(table, POINT_COLUMNS)
+        read_table(table, POINT_COLUMNS)
     assert str(caught.value).startswith(str(table))
 
 

@@ -43,23 +43,15 @@ _POINT_UNCERTAINTIES: Final = (
 POINT_COLUMNS: Final = (TEMPERATURE, Column("counts"), *_POINT_UNCERTAINTIES)
 """Points of a calibration."""
 
-_RESPONSE_COLUMNS: Final = (Column("wavelength", "um", "m"), Column("response"))
-_CORNER_COLUMNS: Final = (Column("x", "um", "m"), Column("y", "um", "m"))
-_PIXEL_COLUMNS: Final = (Column("column"), Column("row"))
-
-
-def read_columns(path: str | os.PathLike[str], columns: Sequence[Column]) -> dict[str, Array]:
-    """Read a table of numbers from a CSV file: columns in SI by name, each of shape (rows,).
-
-    In the first line the unit follows the name: ``temperature_degC,counts``.
-    """
-    return read_table(path, columns)[0]
-
 
 def read_table(
     path: str | os.PathLike[str], columns: Sequence[Column]
 ) -> tuple[dict[str, Array], list[int]]:
-    """Return the columns by name as `read_columns`, and which line of the file each row is."""
+    """Read a table of numbers from a CSV file, and which line of the file each row is.
+
+    The columns are in SI by name, each of shape (rows,). In the first line the unit follows the
+    name: ``temperature_degC,counts``.
+    """
     path = Path(path)
     lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
@@ -95,9 +87,8 @@ def read_calibration_points(
     `counts_of` gives the counts of that recording.
     """
     first = read_small_text(Path(path)).partition("\n")[0]
-    names = {cell.strip() for cell in first.split(",")}
-    if "file" not in names:
-        return read_columns(path, POINT_COLUMNS)
+    if "file" not in map(str.strip, first.split(",")):
+        return read_table(path, POINT_COLUMNS)[0]
     counts = Column("counts", required=False, blank=True)
     file = Column("file", number_of=counts_of, blank=True)
     table, lines = read_table(path, (TEMPERATURE, counts, file, *_POINT_UNCERTAINTIES))
@@ -152,13 +143,13 @@ def _fits(cell: str, column: Column) -> bool:
 
 def read_polyline(path: Path) -> tuple[Array, list[int]]:
     """Read corners in m, shape (n, 2), and the line of the file of each: ``x_um,y_um``."""
-    table, lines = read_table(path, _CORNER_COLUMNS)
+    table, lines = read_table(path, (Column("x", "um", "m"), Column("y", "um", "m")))
     return np.stack([table["x"], table["y"]], axis=1), lines
 
 
 def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:
     """Read a camera's spectral response from a CSV file: ``wavelength_um,response``."""
-    table = read_columns(path, _RESPONSE_COLUMNS)
+    table, _ = read_table(path, (Column("wavelength", "um", "m"), Column("response")))
     order = np.argsort(table["wavelength"])
     try:
         return TabulatedResponse(
@@ -170,7 +161,7 @@ def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:
 
 def read_bad_pixels(path: str | os.PathLike[str], shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Read which pixels of an image are bad: ``column,row``, counted from 0 at the upper left."""
-    table = read_columns(path, _PIXEL_COLUMNS)
+    table, _ = read_table(path, (Column("column"), Column("row")))
     mask = np.zeros(shape, np.bool_)
     for column, row in zip(table["column"], table["row"], strict=True):
         if not (column in range(shape[1]) and row in range(shape[0])):

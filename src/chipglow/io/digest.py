@@ -74,8 +74,7 @@ def write_hdf5(path: Path, write: Callable[[HDF5Sink], object]) -> None:
         try:
             write(sink)
             sink.seek(0)
-            digest = file_digest(sink, "sha256").digest()
-            sink.write(_MARK + digest)
+            sink.write(_MARK + file_digest(sink, "sha256").digest())
         finally:
             sink.check()  # the cause of what HDF5 says
 
@@ -121,10 +120,9 @@ def _read_all(path: str, whole: bool) -> None:
 
 def _read(item: Any, whole: bool) -> None:
     dict(item.attrs)
-    if not isinstance(item, h5py.Dataset):
-        return
-    if item.chunks is not None:
-        item.id.get_num_chunks()
-    if whole:
-        for part in range(item.shape[0]) if item.ndim else ((),):
-            item[part]
+    if isinstance(item, h5py.Dataset):
+        if item.chunks is not None:
+            item.id.get_num_chunks()
+        if whole:
+            for part in range(item.shape[0]) if item.ndim else ((),):
+                item[part]

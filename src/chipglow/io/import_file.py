@@ -31,17 +31,13 @@ def _has_header(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         first = file.readline(10_000).decode("utf-8", "replace").lower()
-    words = re.findall(r"[a-z_]+", first)
-    return any(word not in ("e", "nan", "inf") for word in words)
+    return any(word not in ("e", "nan", "inf") for word in re.findall(r"[a-z_]+", first))
 
 
-for _kind, _source in (
-    ("movie", MovieSource),
-    ("mesh", MeshSource),
-    ("points", CloudSource),
-    ("grid", GridSource),
-):
-    IMPORT_SOURCES.add(_kind, _source)
+IMPORT_SOURCES.add("movie", MovieSource)
+IMPORT_SOURCES.add("mesh", MeshSource)
+IMPORT_SOURCES.add("points", CloudSource)
+IMPORT_SOURCES.add("grid", GridSource)
 
 
 @dataclass(frozen=True)
@@ -118,13 +114,8 @@ class ImportDescription(Part):
         files = section.own_files or self.source
         if files is None:
             raise ValueError("source: is missing, expected a file")
-        stated = {
-            "files": files,
-            "names": self.fields,
-            "interval": self.interval,
-            "units": self.units,
-            "placement": self.placement,
-        }
+        stated = {name: getattr(self, name) for name in ("interval", "units", "placement")}
+        stated |= {"files": files, "names": self.fields}
         known = {one.name for one in fields(section)}
         source = replace(section, **{name: stated[name] for name in stated.keys() & known})
         return Import(

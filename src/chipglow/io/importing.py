@@ -125,10 +125,9 @@ def prospect(wanted: Import) -> Prospect:
         raise SourceError(f"{survey.kind}: its times are not finite")
     check_times(survey.kind, survey.times)
     if "temperature" not in survey.found:
-        listed = ", ".join(survey.unused) or "none"
         raise SourceError(
             f"{survey.kind}: no field is known as temperature, expected fields: "
-            f"temperature: NAME with one of {listed}"
+            f"temperature: NAME with one of {', '.join(survey.unused) or 'none'}"
         )
     raster = wanted.view.raster(survey)
     _check_temperatures(wanted, survey, raster)
@@ -186,7 +185,7 @@ def import_scene(
     fields = completion.fields(survey.found, len(survey.times))
     key = _key(wanted, looked)
     done = len(resume.frames()[0]) if resume else 0
-    attributes = _attributes(key, looked)
+    attributes = {_KEY: key, **looked.notes.attrs()}
     with SceneWriter(path, raster, completion.tool, attributes, fields, resume=resume) as writer:
         kept = f"{done} frames are kept" if done else ""
         due = monotonic() + _CHECKPOINT_INTERVAL
@@ -243,13 +242,8 @@ def read_scene(source: Import | Source) -> Scene:
         [frame.time for frame in frames],
         {name: np.stack([getattr(frame, name) for frame in frames]) for name in names},
         wanted.completion.tool,
-        _attributes(_key(wanted, looked), looked),
+        {_KEY: _key(wanted, looked), **looked.notes.attrs()},
     )
-
-
-def _attributes(key: str, looked: Prospect) -> dict[str, str]:
-    """Return what a scene keeps of where it is from."""
-    return {"import": key, **looked.notes.attrs()}
 
 
 def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
@@ -269,11 +263,9 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
 
 def _not_kelvin(wanted: Import, value: float, place: str) -> SourceError:
     unit = wanted.description.get("units", {}).get("temperature", "K")
-    other = (
-        "if it is in °C, expected units.temperature: degC"
-        if unit == "K"
-        else f"units.temperature is {unit}"
-    )
+    other = f"units.temperature is {unit}"
+    if unit == "K":
+        other = "if it is in °C, expected units.temperature: degC"
     return SourceError(
         f"temperature: {value:.6g} {place}, expected kelvin of {COLDEST:g} or more; {other}"
     )
@@ -297,9 +289,6 @@ def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
     if highest < COLDEST or (lowest < COLDEST and not beyond.any()):
         worst = highest if highest < COLDEST else lowest
         raise _not_kelvin(wanted, worst, f"in {survey.found['temperature']}")
-
-
-_SMALLEST, _LARGEST = 5e-6, 0.05
 
 
 def _key(wanted: Import, looked: Prospect) -> str:

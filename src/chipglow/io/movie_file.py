@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,6 @@ def movie_writer(
 def _mp4(part: Path, shape: tuple[int, int]) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
     import av
 
-    container: Any
     with av.open(str(part), "w", format="mp4") as container:
         stream = container.add_stream("h264", rate=_RATE)
         stream.options = {"preset": "veryfast"}
@@ -67,8 +66,7 @@ def _mp4(part: Path, shape: tuple[int, int]) -> Iterator[Callable[[NDArray[np.ui
         stream.pix_fmt = "yuv420p"  # the one that every player knows
 
         def append(picture: NDArray[np.uint8]) -> None:
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            container.mux(stream.encode(frame))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
 
         yield append
         container.mux(stream.encode(None))

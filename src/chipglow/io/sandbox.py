@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, Final, TypeAlias
+from typing import IO, Any, Final, TypeAlias, TypeVar
 
 from chipglow.io.sources.source import Source, SourceError, Survey, damaged
 from chipglow.scene import Raster, SampledFrame
@@ -27,9 +27,10 @@ The slowest reader, that of Abaqus' text, takes 0.4 us a byte: 1.5 GB in this ti
 # -P: nothing beside the data is taken for a module.
 _CHILD: Final = ("-P", "-c", "from chipglow.io.sandbox import main; main()")
 
-
 Job: TypeAlias = Callable[[], Iterator[Any]]
 """A function that can be pickled, or a partial one; so can its answers."""
+
+Answer = TypeVar("Answer")
 
 _END: Final = "end of the answers"
 
@@ -65,10 +66,11 @@ class Sandbox:
             finally:
                 process.kill()
 
-    def answer(self, function: Callable[[], Any]) -> Any:
+    def answer(self, function: Callable[[], Answer]) -> Answer:
         """Return what a function returns; it can be pickled. For errors see `answers`."""
         with self.answers(partial(_once, function)) as answers:
-            return next(answers)
+            answer: Answer = next(answers)
+        return answer
 
     def _answers(self, process: "subprocess.Popen[bytes]") -> Iterator[Any]:
         while not isinstance(answer := self._in_time(process), str) or answer != _END:
@@ -90,12 +92,10 @@ class Sandbox:
             timer.start()
             return pickle.load(process.stdout)
         except (EOFError, pickle.UnpicklingError):
-            if late.is_set():
-                reason = f"had no answer in {self.patience:.0f} s"
-            else:
-                reason = (
-                    f"ended with code {process.wait()}, the file is damaged or too large to be read"
-                )
+            reason = f"had no answer in {self.patience:.0f} s"
+            if not late.is_set():
+                code = process.wait()
+                reason = f"ended with code {code}, the file is damaged or too large to be read"
             raise SourceError(f"{self.name}: its reader {reason}") from None
         finally:
             timer.cancel()
@@ -111,8 +111,7 @@ class Isolated(Source):
     patience: float = PATIENCE
 
     def survey(self) -> Survey:
-        survey: Survey = self._sandbox.answer(self.source.survey)
-        return survey
+        return self._sandbox.answer(self.source.survey)
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
         with self._sandbox.answers(partial(self.source.frames, raster, start)) as answers:

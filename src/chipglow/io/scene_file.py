@@ -309,8 +309,7 @@ class StoredScene(Scene):
         """Return the splines of one frame; None if the file has samples."""
         if self.lattice is None:
             return None
-        stored = self._kept[index]
-        nodes, limits = (self._chunk(name, stored) for name in spline_file.CHUNKED)
+        nodes, limits = (self._chunk(name, self._kept[index]) for name in spline_file.CHUNKED)
         frame = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
         spline_file.check(frame)
         return frame

@@ -44,8 +44,6 @@ _STEP: Final = np.array([STEPS[name] for name in SPLINE_FIELDS], np.float32)[:, 
 Read: TypeAlias = Callable[[str, int], NDArray[Any]]
 """Reads one field of one frame."""
 
-UNITS: Final[Mapping[str, str]] = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS}
-
 
 def create(file: h5netcdf.File, lattice: Lattice) -> None:
     """Create the variables that hold splines, and those that state where their nodes are."""
@@ -138,6 +136,6 @@ def with_samples(data: xr.Dataset, read: Read, long_names: Mapping[str, str]) ->
             indexing.LazilyIndexedArray(SampledVariable(read, name, shape)),
             {"units": unit, "long_name": long_names[name]},
         )
-        for name, unit in UNITS.items()
+        for name, unit in (*FIELD_UNITS.items(), *MATERIAL_COORDINATE_UNITS.items())
     }
     return data.drop_vars(list(OWN), errors="ignore").assign(fields)

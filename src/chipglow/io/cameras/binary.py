@@ -53,6 +53,16 @@ class Binary:
         values = self.numbers(start, 1, dtype)[0].item()
         return dict(zip(dtype.names or (), values, strict=True))
 
+    def marked(self, start: int, dtype: np.dtype[Any], mark: bytes, kind: str) -> dict[str, Any]:
+        """Return the fields of a record whose first one has to be the mark of a kind of files."""
+        record = self.record(start, dtype)
+        found = next(iter(record.values()))
+        if found != mark:
+            raise SourceError(
+                f"{self.path}: begins with {found!r}, expected {mark.decode()!r} ({kind})"
+            )
+        return record
+
 
 def layout(length: int, /, **fields: tuple[str, int]) -> np.dtype[Any]:
     """Return the type of a header of `length` bytes: kind and first byte of each field."""
@@ -111,9 +121,7 @@ class CameraFile(ABC):
         """Return the other fields of the `Recording` of some frames."""
 
     @classmethod
-    def recording(
-        cls, path: Path, frames: slice | None = None, interval: float | None = None
-    ) -> Recording:
+    def recording(cls, path: Path, frames: slice | None, interval: float | None) -> Recording:
         """Read frames; see `CameraFormat`."""
         with opened(path) as binary:
             file = cls(binary, notes := Notes())

@@ -1,5 +1,6 @@
 """Files of Vision Research's Phantom cameras, CINE."""
 
+from contextlib import suppress
 from typing import Any, Final
 
 import numpy as np
@@ -49,9 +50,7 @@ class Cine(CameraFile):
 
     def __init__(self, binary: Binary, notes: Notes) -> None:
         super().__init__(binary, notes)
-        header = self.header = binary.record(0, _FILE)
-        if header["mark"] != b"CI":
-            raise SourceError(f"{self.path}: begins with {header['mark']!r}, expected 'CI' (CINE)")
+        header = self.header = binary.marked(0, _FILE, b"CI", "CINE")
         setup = self.setup = binary.record(header["setup"], _SETUP)
         if setup["mark"] != b"ST":
             raise SourceError(
@@ -94,11 +93,9 @@ class Cine(CameraFile):
         beyond = np.flatnonzero(self.places + self.size > self.binary.size)
         count = int(beyond[0]) if beyond.size else self.places.size
         while count:
-            try:
+            with suppress(CutShortError):
                 if self._start(count - 1) + self.size <= self.binary.size:
                     break
-            except CutShortError:
-                pass
             count -= 1
         return count
 

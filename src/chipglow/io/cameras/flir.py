@@ -169,9 +169,7 @@ class Flir(CameraFile):
         """Return the time of a frame in s since 1970; NaN if the file does not state it."""
         fields = self.camera_fields(number)
         seconds, milliseconds = fields["seconds"], fields["milliseconds"]
-        if not (seconds > 0 and isfinite(milliseconds)):
-            return nan
-        return float(seconds + (milliseconds & 0xFFFF) / 1000)
+        return float(seconds + (milliseconds & 0xFFFF) / 1000) if seconds else nan
 
     def times(self, chosen: range) -> NDArray[np.float64]:
         if self.complete == 1:
@@ -286,9 +284,7 @@ def _records(binary: Binary) -> Binary:
 
 
 def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
-    entry, header = _ENTRY, binary.record(start, _HEADER)
-    if header["magic"] != _MAGIC.rstrip(b"\0"):
-        raise SourceError(f"{binary.path}: begins with {header['magic']!r}, expected 'FFF' (FLIR)")
+    entry, header = _ENTRY, binary.marked(start, _HEADER, b"FFF", "FLIR")
     if not 100 <= header["version"] < 200:
         entry, header = _ENTRY.newbyteorder(">"), binary.record(start, _HEADER.newbyteorder(">"))
     count, place = header["count"], start + header["place"]

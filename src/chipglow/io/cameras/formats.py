@@ -14,14 +14,13 @@ from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sandbox import Sandbox
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.source import files_of, reading
+from chipglow.io.sources.source import files_of, head_of, reading
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
 """Bytes by which a kind of file is recognised: those of HDF5 may follow 512 of the user's."""
 
 Begins = Callable[[bytes], bool]
-Read = Callable[[Path, slice | None, float | None], Recording]
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class CameraFormat:
     """Endings of such files' names."""
     begins: Begins | None = None
     """Whether a file is of this format, by its first bytes."""
-    read: Read | None = None
+    read: Callable[[Path, slice | None, float | None], Recording] | None = None
     """Reads frames of a file that says what was measured: its path, which frames, and the time
     between frames in s, instead of the file's own, or None. Without it the file holds an array,
     and the user says."""
@@ -103,9 +102,7 @@ def find_format(path: Path) -> str:
     first = files_of(path)[0]
     if first.is_dir():
         return "zarr"
-    with first.open("rb") as stream:
-        head = stream.read(_HEAD)
-    if not head:
+    if not (head := head_of(first, _HEAD)):
         raise SourceError(f"{first}: is empty")
     formats = camera_formats()
     suffix = first.suffix.lower()
@@ -174,11 +171,8 @@ def read_recording(
             f"{path}: is {one.description}, which states itself what was measured: "
             "expected no quantity, unit, dataset or axes"
         )
-    if not one.in_subprocess(path):
-        return read_here(path, kind, frames, stated)
     read = partial(read_here, path, kind, frames, stated)
-    recording: Recording = Sandbox(str(path)).answer(read)
-    return recording
+    return Sandbox(str(path)).answer(read) if one.in_subprocess(path) else read()
 
 
 def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:

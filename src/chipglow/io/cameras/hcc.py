@@ -62,11 +62,7 @@ class Hcc(CameraFile):
 
     def __init__(self, binary: Binary, notes: Notes) -> None:
         super().__init__(binary, notes)
-        first = self.first = binary.record(0, _HEADER)
-        if first["signature"] != b"TC":
-            raise SourceError(
-                f"{self.path}: begins with {first['signature']!r}, expected 'TC' (Telops)"
-            )
+        first = self.first = binary.marked(0, _HEADER, b"TC", "Telops")
         self.shape = first["height"], first["width"]
         check_picture(self.path, *self.shape)
         label, quantity = _MODES.get(first["mode"], (f"mode {first['mode']}", None))

@@ -54,7 +54,6 @@ _STAMP: Final = layout(
 )
 _LOCK_IN: Final = (1220, 3907, 1204, 2382)
 _DAY: Final = 86_400.0
-_LONGEST_PERIOD: Final = 86_400.0
 _STAMPED: Final = 0.002
 """Two stamps of whole milliseconds may be off by that much in s."""
 _CLOCK: Final = 2e-4
@@ -66,11 +65,7 @@ class Ptw(CameraFile):
 
     def __init__(self, binary: Binary, notes: Notes) -> None:
         super().__init__(binary, notes)
-        header = self.header = binary.record(0, _HEADER)
-        if header["signature"] != b"CED":
-            raise SourceError(
-                f"{self.path}: begins with {header['signature']!r}, expected 'CED' (PTW)"
-            )
+        header = self.header = binary.marked(0, _HEADER, b"CED", "PTW")
         rows, columns = header["rows"], header["columns"]
         check_picture(self.path, rows, columns)
         self.stride = self._stride()
@@ -106,7 +101,7 @@ class Ptw(CameraFile):
 
     def times(self, chosen: range) -> Array:
         header = self.header
-        period = header["period"] if 0 < header["period"] < _LONGEST_PERIOD else None
+        period = header["period"] if 0 < header["period"] < _DAY else None
         rate = 1 / period if period else 0.0
         if header["frame_header_size"] < _STAMP.itemsize:
             return self.stamped(chosen, None, rate)

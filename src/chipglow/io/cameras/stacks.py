@@ -58,14 +58,10 @@ class Stated:
     axes: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity is not None and self.quantity not in QUANTITIES:
-            raise ValueError(
-                f"quantity: is {self.quantity!r}, expected one of {', '.join(QUANTITIES)}"
-            )
-        if self.unit is not None and self.unit not in RECORDING_UNITS:
-            raise ValueError(
-                f"unit: is {self.unit!r}, expected one of {', '.join(RECORDING_UNITS)}"
-            )
+        for name, known in (("quantity", QUANTITIES), ("unit", RECORDING_UNITS)):
+            value = getattr(self, name)
+            if value is not None and value not in known:
+                raise ValueError(f"{name}: is {value!r}, expected one of {', '.join(known)}")
         if self.interval is not None and not 0 < self.interval < float("inf"):
             raise ValueError(f"interval: is {self.interval!r} s, expected more than 0")
         if self.quantity and self.unit and RECORDING_UNITS[self.unit][0] != self.quantity:
@@ -172,8 +168,7 @@ def _times(
     times = check_times(str(found), read_list("time", found, SI, notes))
     if not isfinite(times[-1] - times[0]):
         raise SourceError(f"{found}: is not finite")
-    since: NDArray[np.float64] = (times - times[0])[list(chosen)]
-    return since
+    return np.asarray((times - times[0])[list(chosen)])
 
 
 def _signal(one: FileArray, axes: tuple[str, ...], chosen: range) -> NDArray[Any]:

@@ -15,7 +15,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.source import SourceError, check_hdf5, files_of, reading, required
+from chipglow.io.sources.source import SourceError, check_hdf5, files_of, head_of, reading, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -160,8 +160,7 @@ def _copy_of_mapped(values: NDArray[Any], key: Key) -> NDArray[Any]:
     """Return a part of a file that is mapped into memory, of which no page is kept there."""
     part = np.array(values[key])
     if isinstance(values, np.memmap) and hasattr(mmap, "MADV_DONTNEED"):
-        mapping: Any = values._mmap  # type: ignore[attr-defined]
-        mapping.madvise(mmap.MADV_DONTNEED)
+        values._mmap.madvise(mmap.MADV_DONTNEED)  # type: ignore[attr-defined]
     return part
 
 
@@ -226,18 +225,15 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[FileArray]:
 
     check_hdf5(path)
     file = stack.enter_context(h5py.File(path, "r"))
-    found: list[FileArray] = []
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset):
+    names: list[str] = []
+    file.visit(names.append)
+    for name in names:
+        if isinstance(item := file[name], h5py.Dataset):
             settings = item.id.get_create_plist()
             filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
             if not all(map(h5py.h5z.filter_avail, filters)):
                 required("hdf5plugin", path, "grid")
-            found.extend(_hdf5_arrays(name, item))
-
-    file.visititems(visit)
-    yield from found
+            yield from _hdf5_arrays(name, item)
 
 
 def _hdf5_arrays(name: str, item: Any) -> Iterator[FileArray]:
@@ -279,9 +275,7 @@ def _plain(value: Any) -> Any:
 
 
 def _netcdf(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    with path.open("rb") as stream:
-        classic = stream.read(3) == b"CDF"
-    yield from (_netcdf3 if classic else _hdf5)(path, stack)
+    yield from (_netcdf3 if head_of(path, 3) == b"CDF" else _hdf5)(path, stack)
 
 
 def _netcdf3(path: Path, stack: ExitStack) -> Iterator[FileArray]:

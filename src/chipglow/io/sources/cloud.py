@@ -103,8 +103,7 @@ def _temperatures(clouds: Sequence[Cloud], found: Sequence[str]) -> tuple[float,
     """Return the largest temperature twice: samples are means, the smallest need not be seen."""
     if "temperature" not in found:
         return None
-    number = found.index("temperature")
-    highest = max(span_of(cloud.values[:, number])[1] for cloud in clouds)
+    highest = max(span_of(cloud.values[:, found.index("temperature")])[1] for cloud in clouds)
     return highest, highest
 
 
@@ -112,8 +111,7 @@ class _Points:
     """Open source of points."""
 
     def __init__(self, source: CloudSource, stack: ExitStack) -> None:
-        self._source = source
-        self.notes = Notes()
+        self._source, self.notes = source, Notes()
         files = open_points(source.files, source.names.get("time"), stack)
         self.tables = files.tables
         """Each reads the points of a frame."""
@@ -229,8 +227,7 @@ class _Points:
 
     def _find_spacing(self, table: PointTable) -> float | None:
         """Return the distance of neighbours in m; None if every point has its volume."""
-        source = self._source
-        spacing = source.spacing
+        source, spacing = self._source, self._source.spacing
         if spacing is None and "volume" in self._extra:
             return None
         if spacing is None:

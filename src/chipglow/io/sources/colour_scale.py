@@ -28,15 +28,17 @@ _NARROWEST_BAND: Final = 6
 _BLURRED: Final = 2.0
 _BANDED: Final = 0.5
 # D65, IEC 61966-2-1
-_WHITE: Final = np.array([0.95047, 1.0, 1.08883])
-_XYZ: Final = np.array(
-    [
-        [0.4124564, 0.3575761, 0.1804375],
-        [0.2126729, 0.7151522, 0.0721750],
-        [0.0193339, 0.1191920, 0.9503041],
-    ]
+_WHITE: Final = np.array([[0.95047], [1.0], [1.08883]])
+_TO_XYZ: Final = (
+    np.array(
+        [
+            [0.4124564, 0.3575761, 0.1804375],
+            [0.2126729, 0.7151522, 0.0721750],
+            [0.0193339, 0.1191920, 0.9503041],
+        ]
+    )
+    / _WHITE
 )
-_TO_XYZ: Final = _XYZ / _WHITE[:, None]
 
 
 def lab(colours: ArrayLike) -> NDArray[np.float64]:
@@ -94,9 +96,8 @@ class ColourScale:
         count = _equal_bands(colours)
         if count:
             ends = pairwise(np.linspace(0, len(pixels), count + 1))
-            plain = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
-            return cls._linear(plain, values, banded=True)
-        return cls._linear(colours, values, banded=False)
+            colours = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
+        return cls._linear(colours, values, banded=count > 0)
 
     @classmethod
     def _linear(
@@ -117,8 +118,7 @@ class ColourScale:
     def widths(self) -> NDArray[np.float64]:
         """Range of values for which each colour of the knots stands, shape (m,)."""
         first, last = self._runs
-        count = len(self.values)
-        step = (self.values[-1] - self.values[0]) / max(count - 1, 1)
+        step = (self.values[-1] - self.values[0]) / max(len(self.values) - 1, 1)
         return np.asarray(self.values[last] - self.values[first] + step)
 
     @cached_property
@@ -246,8 +246,7 @@ def _equal_bands(colours: NDArray[np.float64]) -> int:
     apart = np.array([_misfits(labs, count) for count in tried]).reshape(-1, 2)
     if not len(apart):
         return 0
-    least = apart[:, 0].min()
-    best = int(np.flatnonzero(apart[:, 0] <= 1.3 * least + 0.2)[0])
+    best = int(np.argmax(apart[:, 0] <= 1.3 * apart[:, 0].min() + 0.2))
     of_bands, of_lines = apart[best]
     return tried[best] if of_bands < _BANDED * of_lines else 0
 

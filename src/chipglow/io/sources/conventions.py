@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Final, TypeAlias, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +70,7 @@ OTHER_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
 def simple(name: str) -> str:
     """Return a name in lower case with words joined by underscores, without a unit in brackets."""
     text = name.split("(")[0].split("[")[0].strip().lower()
-    words = "".join(letter if letter.isalnum() else " " for letter in text).split()
-    return "_".join(words)
+    return "_".join("".join(letter if letter.isalnum() else " " for letter in text).split())
 
 
 def match_names(
@@ -160,6 +159,7 @@ PlacedGrid: TypeAlias = tuple[
 
 Floats = TypeVar("Floats", np.float32, np.float64)
 
+Axis: TypeAlias = Literal["x", "y", "z", "-x", "-y", "-z"]
 _AXES: Final = ("x", "y", "z")
 
 
@@ -171,14 +171,14 @@ class Placement(Part):
     """
 
     horizontal: Annotated[
-        str,
+        Axis,
         Parameter(
             "The source's axis along the workpiece's motion toward the tool.",
             allowed="x, y, z, -x, -y, -z",
         ),
     ] = "x"
     vertical: Annotated[
-        str,
+        Axis,
         Parameter(
             "The source's axis from the cut surface into the chip.", allowed="x, y, z, -x, -y, -z"
         ),
@@ -194,9 +194,6 @@ class Placement(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("horizontal", "vertical"):
-            if getattr(self, name).removeprefix("-") not in _AXES:
-                raise ValueError(f"{name}: {getattr(self, name)!r}, expected x, y, z, -x, -y or -z")
         if self.axes[0] == self.axes[1]:
             raise ValueError(f"vertical: {self.vertical!r} is the horizontal axis too")
 
@@ -208,13 +205,13 @@ class Placement(Part):
     @property
     def axes(self) -> tuple[int, int]:
         """Indices of the horizontal and the vertical axis."""
-        first, second = (_AXES.index(name.removeprefix("-")) for name in self._names)
-        return first, second
+        return _AXES.index(self.horizontal[-1]), _AXES.index(self.vertical[-1])
 
     @property
     def signs(self) -> tuple[float, float]:
         """1 or -1 for the horizontal and the vertical axis."""
-        first, second = (-1.0 if name.startswith("-") else 1.0 for name in self._names)
+        names = self.horizontal, self.vertical
+        first, second = (-1.0 if name.startswith("-") else 1.0 for name in names)
         return first, second
 
     @property
@@ -224,13 +221,11 @@ class Placement(Part):
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return positions in the scene in m, shape (n, 2), of points of shape (n, 3) in m."""
-        placed: NDArray[np.float64] = (points[:, self.axes] - self.origin) * self.signs
-        return placed
+        return np.asarray((points[:, self.axes] - self.origin) * self.signs)
 
     def turn(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
-        turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
-        return turned
+        return np.asarray(vectors[:, self.axes] * self.signs)
 
     def grid(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> PlacedGrid:
         """Return columns and rows of the scene for those of a file at x and y in m."""
@@ -261,7 +256,3 @@ class Placement(Part):
         if name.startswith("material"):
             values = values - self.origin[number]
         return values * self.signs[number]
-
-    @property
-    def _names(self) -> tuple[str, str]:
-        return self.horizontal, self.vertical

@@ -104,7 +104,6 @@ class GridSource(Source, Part):
     def survey(self) -> Survey:
         with ExitStack() as stack:
             grid = _Grid(self, stack)
-            temperatures = grid.check_ends()
             return Survey(
                 kind=grid.kind,
                 times=grid.times,
@@ -112,7 +111,7 @@ class GridSource(Source, Part):
                 found={name: layer.array.name for name, layer in grid.layers.items()},
                 unused=grid.unused,
                 spacing=min(abs(float(np.ptp(one)) / (one.size - 1)) for one in (grid.x, grid.y)),
-                temperatures=temperatures,
+                temperatures=grid.check_ends(),
                 notes=Notes() + grid.notes,
             )
 
@@ -134,6 +133,8 @@ class _Layer:
         self.array, self.axes, self.unit = array, axes, unit
         self.shape = tuple(array.shape[axes.index(axis)] if axis in axes else 1 for axis in AXES)
         """Number of samples along `AXES`."""
+        self.dims = dict(zip(axes, array.dims, strict=False))
+        """Names of the axes in the file, if it states them."""
         samples = self.shape[1] * self.shape[2]
         for axis, length in zip(AXES[1:], self.shape[1:], strict=True):
             if not 2 <= length <= MOST_ON_A_SIDE:
@@ -146,12 +147,6 @@ class _Layer:
         together = array.chunks[axes.index("time")] if array.chunks and "time" in axes else 1
         self._together = max(1, min(together, _LARGEST_BLOCK // samples))
 
-    def dim(self, axis: str) -> str:
-        """Return the name of an axis in the file; empty if it states none."""
-        if axis not in self.axes or not self.array.dims:
-            return ""
-        return self.array.dims[self.axes.index(axis)]
-
     def read(self, index: int) -> NDArray[np.float32]:
         """Return numbers of a frame as they are in the file, shape (y, x), NaN if missing."""
         if not self._first <= index < self._first + len(self._block):
@@ -159,8 +154,7 @@ class _Layer:
             last = min(self._first + self._together, self.shape[0])
             frames = read_frames(self.array, self.axes, slice(self._first, last))
             self._block = np.asarray(frames, np.float32)
-        values: NDArray[np.float32] = self._block[index - self._first]
-        return values
+        return np.asarray(self._block[index - self._first])
 
 
 class _Grid:
@@ -171,6 +165,7 @@ class _Grid:
         files = source.files
         paths = tuple(files.values()) if isinstance(files, dict) else (str(files),)
         self._files = {path: list(open_arrays(path, stack).values()) for path in paths}
+        self._arrays = [array for arrays in self._files.values() for array in arrays]
         layers = {name: self._layer(name, array) for name, array in self._choose().items()}
         used = {layer.array.name for layer in layers.values()} | set(source.names.values())
         self._first = first = next(iter(layers.values()))
@@ -190,20 +185,15 @@ class _Grid:
         _, rows, columns = first.shape
         self.kind = f"grid of {rows} x {columns} samples, {', '.join(self._files)}"
         axes = {name for axis in COORDINATES for name in OTHER_NAMES[axis]}
-        self.unused = tuple(
-            array.name
-            for arrays in self._files.values()
-            for array in arrays
-            if array.name not in used and simple(array.short) not in axes
-        )
+        others = (one for one in self._arrays if simple(one.short) not in axes)
+        self.unused = tuple(one.name for one in others if one.name not in used)
         """Arrays that are neither field nor coordinate."""
 
     def _layer(self, name: str, array: FileArray) -> _Layer:
         axes = axes_of(array, self._source.axes, self.notes)
         unit = SI
         if name != "material":
-            own = self._source.units.of(name)
-            unit = unit_of(name, str(array), array.unit, own, self.notes)
+            unit = unit_of(name, str(array), array.unit, self._source.units.of(name), self.notes)
         return _Layer(array, axes, unit)
 
     def _choose(self) -> dict[str, FileArray]:
@@ -238,9 +228,8 @@ class _Grid:
 
     def _coordinate(self, axis: str) -> FileArray | None:
         count = self._first.shape[AXES.index(axis)]
-        arrays = [array for of_file in self._files.values() for array in of_file]
-        given, dim = self._source.names.get(axis), self._first.dim(axis)
-        return coordinate(axis, arrays, given, dim, count)
+        given, dim = self._source.names.get(axis), self._first.dims.get(axis, "")
+        return coordinate(axis, self._arrays, given, dim, count)
 
     def _positions(self, axis: str) -> NDArray[np.float64]:
         """Return the centres of the columns or rows in m, in the order of the file."""
@@ -250,13 +239,10 @@ class _Grid:
                 raise SourceError(
                     f"{self._first.array.path}: has no coordinate {axis!r}, expected grid.spacing"
                 )
-            values = read_list(axis, array, source.units.length, self.notes)
-            return check_even(str(array), values)
+            return check_even(str(array), read_list(axis, array, source.units.length, self.notes))
         number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5
         if array is not None:
-            self.notes.remarks.append(
-                f"The coordinate {axis} is not used, as the spacing is given."
-            )
+            self.notes.remarks.append(f"The coordinate {axis} is not used: the spacing is given.")
         if axis == "x":
             return source.left + source.spacing * number
         edge = "upper" if source.top_first else "lower"

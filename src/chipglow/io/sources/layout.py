@@ -1,6 +1,6 @@
 """Which array of a file is which field or coordinate, along which axes and in which unit."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +27,11 @@ def find_fields(
     path = next(iter(arrays.values())).path
     if "velocity" in given:
         raise SourceError(f"{path}: velocity needs velocity_x and velocity_y, an array each")
-    labels = _short_names(arrays)
+    last = [array.short for array in arrays.values()]
+    labels = {
+        short if last.count(short) == 1 else label: label
+        for short, label in zip(last, arrays, strict=True)
+    }
     wanted = {name: labels.get(label, label) for name, label in given.items()}
     with naming(path):
         found = match_names(arrays, wanted, (), names=_GRID_NAMES)
@@ -43,17 +47,7 @@ def find_fields(
         raise SourceError(
             f"{path}: no array has the name of a field, say which is {known[0]}: it has {listed}"
         )
-    order = dict.fromkeys((*known, *found))
-    return {name: arrays[found[name]] for name in order if name in found}
-
-
-def _short_names(labels: Collection[str]) -> dict[str, str]:
-    """Return full names by their last part, or by themselves where that is not unique."""
-    last = [label.rsplit("/", 1)[-1] for label in labels]
-    return {
-        short if last.count(short) == 1 else label: label
-        for short, label in zip(last, labels, strict=True)
-    }
+    return {name: arrays[found[name]] for name in dict.fromkeys((*known, *found)) if name in found}
 
 
 def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tuple[str, ...]:
@@ -104,8 +98,7 @@ def coordinate(
         if not match:
             raise SourceError(f"{every[0].path}: there is no list {given!r} for {axis}")
     else:
-        names = OTHER_NAMES[axis]
-        match = [one for one in lists if one.short == dim or simple(one.short) in names]
+        match = [one for one in lists if one.short == dim or simple(one.short) in OTHER_NAMES[axis]]
         # The most specific of several names: t may be another number.
         match.sort(key=lambda one: simple(one.short) == "t")
     if not match:

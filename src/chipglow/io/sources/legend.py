@@ -1,6 +1,7 @@
 """Legends in a picture: a bar whose colours run along one axis."""
 
 from collections.abc import Iterator
+from itertools import compress
 from typing import Any, Final
 
 import numpy as np
@@ -8,7 +9,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
 from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
-from chipglow.io.sources.overlays import MARK_TOLERANCE, Box, dark_lines, plain_colours
+from chipglow.io.sources.overlays import (
+    MARK_TOLERANCE,
+    Box,
+    box_mask,
+    check_box,
+    dark_lines,
+    plain_colours,
+)
 from chipglow.io.sources.source import SourceError
 
 _SHORTEST: Final = 24
@@ -43,11 +51,8 @@ def find_legend(picture: Picture) -> Box | None:
     if best is None:
         return None
     # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
-    within = []
-    for box in boxes:
-        inward = np.subtract(box, best) * (1, 1, -1, -1)
-        if ((inward >= 0) & (inward <= _BLUR)).all():
-            within.append(box)
+    inward = np.subtract(boxes, best) * (1, 1, -1, -1)
+    within = compress(boxes, np.all((inward >= 0) & (inward <= _BLUR), axis=1))
     return _extended(picture, min(within, key=lambda box: (box[2] - box[0]) * (box[3] - box[1])))
 
 
@@ -97,11 +102,7 @@ def _extended(picture: Picture, box: Box) -> Box:
 
 def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
     """Return the fraction of a picture without legend and background in a scale's colours."""
-    left, top, right, bottom = box
-    shown = ~dark_lines(picture)
-    shown[max(top - _AROUND, 0) : bottom + _AROUND, max(left - _AROUND, 0) : right + _AROUND] = (
-        False
-    )
+    shown = ~(dark_lines(picture) | box_mask(picture.shape[:2], [box], _AROUND))
     labs = lab(picture[shown][:: max(1, int(shown.sum()) // _MOST_PIXELS)] / 255.0)
     for colour in plain_colours(picture):
         labs = labs[np.linalg.norm(labs - lab(np.array(colour) / 255.0), axis=1) > MARK_TOLERANCE]
@@ -122,13 +123,7 @@ def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
 
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
     """Return medians of the colours along a legend, from its bottom or left end, shape (n, 3)."""
-    left, top, right, bottom = box
-    rows, columns = picture.shape[:2]
-    if not (0 <= left < right <= columns and 0 <= top < bottom <= rows):
-        raise SourceError(
-            f"legend: box {box} does not lie in the picture of {columns} x {rows} pixels, expected "
-            "left, top, right, bottom"
-        )
+    left, top, right, bottom = check_box("legend", box, *picture.shape[:2])
     bar = picture[top:bottom, left:right]
     bar = bar[::-1] if bottom - top >= right - left else bar.transpose(1, 0, 2)
     if len(bar) < 2:
@@ -163,8 +158,7 @@ def _edges(labs: NDArray[np.float64]) -> list[tuple[int, int, int]]:
     shortest = _shortest(labs)
     result = []
     for column in np.flatnonzero(edge.sum(axis=0) >= shortest)[:_MOST_EDGES]:
-        padded = np.concatenate([[False], edge[:, column], [False]])
-        changes = np.flatnonzero(padded[1:] != padded[:-1])
+        changes = np.flatnonzero(np.diff(edge[:, column], prepend=False, append=False))
         for first, last in changes.reshape(-1, 2):
             if last - first >= shortest:
                 result.append((int(column) + 1, int(first), int(last)))

@@ -44,7 +44,7 @@ MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
 _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
 _VECTOR_SIZES: Final = (2, 3)
-_TENSOR_SIZES: Final = (6, 9)
+_COMPOUND_SIZES: Final = (*_VECTOR_SIZES, 6, 9)
 _MOST_PARTS: Final = 1000
 
 
@@ -101,17 +101,14 @@ class MeshSource(Source, Part):
             raise ValueError(f"times: expected finite times, got {self.times!r}")
         if self.times and self.interval is not None:
             raise ValueError("interval: times are given too, expected one of them")
-        if isinstance(self.section, str) and self.section != "facing":
-            raise ValueError(f"section: {self.section!r}, expected a position or facing")
 
     def survey(self) -> Survey:
         meshes = Meshes(self)
         flat = [meshes.flat(number, blocks) for number, blocks in meshes.ends.items()]
         found, notes = meshes.found, Notes(meshes.assumptions(), remarks=meshes.remarks())
-        times = meshes.times(notes)
         return Survey(
             meshes.reader.kind,
-            times,
+            meshes.times(notes),
             meshes.extent(flat),
             {ours: found[ours] for ours in READABLE if ours in found},
             tuple(sorted(set(fields_of(meshes.ends[0])) - set(found.values()))),
@@ -174,8 +171,7 @@ class Meshes:
         for ours, theirs in given.items():
             _check_size(file, ours, theirs, sizes)
         vectors = [name for name, size in sizes.items() if size in _VECTOR_SIZES]
-        others = (*_VECTOR_SIZES, *_TENSOR_SIZES)
-        scalars = [name for name, size in sizes.items() if size not in others]
+        scalars = [name for name, size in sizes.items() if size not in _COMPOUND_SIZES]
         by_components = bool(set(_COMPONENTS) & set(given))
         known = [name for name in READABLE if name not in _COMPONENTS]
         if not by_components and _VECTOR not in given and self._source.placement.axes == (0, 1):
@@ -322,21 +318,21 @@ class Meshes:
         names = [name for name in READABLE if name in self.found]
         nodes = [name for name in names if self.found[name] in mesh.of_nodes]
         elements = [name for name in names if self.found[name] in mesh.of_elements]
-        sampled = rasterise(
+        sampled, element = rasterise(
             raster,
             source.placement.place(mesh.points * source.units.length.scale),
             mesh.triangles,
-            _columns([self._values(name, mesh.of_nodes[self.found[name]]) for name in nodes]),
-            _columns([self._values(name, mesh.of_elements[self.found[name]]) for name in elements]),
+            np.transpose([self._values(n, mesh.of_nodes[self.found[n]]) for n in nodes]),
+            np.transpose([self._values(n, mesh.of_elements[self.found[n]]) for n in elements]),
             self._height(mesh) if source.section == "facing" else None,
         )
         fields: dict[str, NDArray[np.float32]] = {}
-        for name, values in zip((*nodes, *elements), sampled.fields, strict=True):
+        for name, values in zip((*nodes, *elements), sampled, strict=True):
             before = fields.get(name, values)
             fields[name] = np.where(np.isfinite(before), before, values)
-        tool = np.append(mesh.tool, False)[sampled.element]
+        tool = np.append(mesh.tool, False)[element]
         material = np.where(tool, Material.TOOL, Material.WORKPIECE)
-        material[sampled.element == NOTHING] = Material.VOID
+        material[element == NOTHING] = Material.VOID
         return SampledFrame(time, fields, material.astype(np.uint8))
 
     def _values(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -356,8 +352,7 @@ class Meshes:
         placement = self._source.placement
         axes = (*placement.axes, placement.depth)
         sign = np.prod(placement.signs) * float(np.linalg.det(np.eye(3)[list(axes)]))
-        height: NDArray[np.float64] = sign * mesh.points[:, placement.depth]
-        return height
+        return np.asarray(sign * mesh.points[:, placement.depth])
 
 
 def _reader(source: MeshSource) -> MeshReader:
@@ -373,15 +368,13 @@ def _reader(source: MeshSource) -> MeshReader:
 
 
 def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) -> None:
-    size = sizes.get(theirs, 1)
-    if ours == _VECTOR:
-        if theirs in sizes and size not in _VECTOR_SIZES:
-            raise SourceError(
-                f"{file}: fields: velocity: {theirs!r} has {size} components, expected 2 or 3"
-            )
-    elif size in (*_VECTOR_SIZES, *_TENSOR_SIZES):
+    size = sizes.get(theirs)
+    is_vector = ours == _VECTOR
+    fits = size in _VECTOR_SIZES if is_vector else size not in _COMPOUND_SIZES
+    if size is not None and not fits:
+        expected = "2 or 3" if is_vector else "one value"
         raise SourceError(
-            f"{file}: fields: {ours}: {theirs!r} has {size} components, expected one value"
+            f"{file}: fields: {ours}: {theirs!r} has {size} components, expected {expected}"
         )
 
 
@@ -395,10 +388,6 @@ def _without_value(blocks: Iterable[Block], name: str, of: str) -> tuple[int, in
             lacking += int((~np.isfinite(values)).any(axis=1).sum())
             count += len(values)
     return lacking, count
-
-
-def _columns(columns: Sequence[NDArray[np.float32]]) -> NDArray[np.float64] | None:
-    return np.stack(columns, axis=1).astype(np.float64) if columns else None
 
 
 def _parts(block: Block, part_field: str | None) -> dict[str, NDArray[np.bool_]]:

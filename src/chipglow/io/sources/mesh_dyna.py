@@ -52,7 +52,7 @@ def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
         if nodes is None or not len(nodes):
             continue
         of_elements = _of_elements(arrays, prefix)
-        alive = of_elements.pop("is_alive", np.ones(len(nodes))) > 0
+        alive = arrays.get(prefix + "is_alive", [np.ones(len(nodes))])[0] > 0
         cells, kinds = _cells(np.asarray(nodes)[alive], family)
         living = {name: values[alive] for name, values in of_elements.items()}
         grid = grid_of(cells, kinds, points, of_nodes, living)
@@ -60,9 +60,8 @@ def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
 
 
 def _of_nodes(arrays: Mapping[str, Any]) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-    initial = arrays["node_coordinates"]
     # lasso's displacement is the position of the nodes.
-    points = arrays["node_displacement"][0] if "node_displacement" in arrays else initial
+    points = arrays.get("node_displacement", [arrays["node_coordinates"]])[0]
     of_nodes = {}
     for name in ("temperature", "velocity"):
         if f"node_{name}" in arrays:
@@ -79,8 +78,6 @@ def _of_elements(arrays: Mapping[str, Any], prefix: str) -> dict[str, NDArray[An
         if prefix + name in arrays:
             values = arrays[prefix + name][0]
             found[name] = values.reshape(len(values), -1).mean(axis=1)
-    if prefix + "is_alive" in arrays:
-        found["is_alive"] = arrays[prefix + "is_alive"][0]
     for name in ("history_vars", "history_variables"):
         if prefix + name in arrays:
             values = arrays[prefix + name][0]

@@ -1,6 +1,6 @@
 """A mesh as triangles: flat elements, a cut through solid ones, or their visible surface."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, TypeAlias
 
@@ -13,7 +13,6 @@ from chipglow.io.sources.source import SourceError
 from chipglow.io.sources.triangles import split_quads
 
 Arrays: TypeAlias = Mapping[str, NDArray[np.float64]]
-Section: TypeAlias = float | Literal["facing"] | None
 
 _TRIANGLE, _PIXEL, _QUAD = 5, 8, 9
 _OTHER_FLAT: Final = (6, 7, 22, 23, 28, 34, 35, 63, 69, 70, 76, 77)
@@ -46,10 +45,10 @@ class FlatMesh:
 
 def flatten(
     blocks: Sequence[Block],
-    fields: Iterable[str],
+    fields: Collection[str],
     tool: Sequence[NDArray[np.bool_]],
     placement: Placement,
-    section: Section,
+    section: float | Literal["facing"] | None,
     unit: float,
 ) -> FlatMesh:
     """Return the triangles of all blocks, with some fields; `unit` is the file's unit of length.
@@ -57,8 +56,7 @@ def flatten(
     In a mesh with solid elements flat ones are not seen in a cut, and those on the nodes of solid
     ones are their boundary and left out.
     """
-    wanted = set(fields)
-    parts = [_with_only(block.grid, wanted, of) for block, of in zip(blocks, tool, strict=True)]
+    parts = [_with_only(block.grid, fields, of) for block, of in zip(blocks, tool, strict=True)]
     grids = [grid for grid in parts if grid.n_cells]
     solids = [grid for grid in grids if _is_solid(grid).any()]
     if not solids:
@@ -91,9 +89,7 @@ def _range(solids: Sequence[Any], placement: Placement, unit: float) -> str:
 
 
 def _is_solid(grid: Any) -> NDArray[np.bool_]:
-    return np.asarray(
-        np.isin(grid.celltypes, (_TRIANGLE, _PIXEL, _QUAD, *_OTHER_FLAT), invert=True)
-    )
+    return np.isin(grid.celltypes, (_TRIANGLE, _PIXEL, _QUAD, *_OTHER_FLAT), invert=True)
 
 
 def _without_boundary(grids: Sequence[Any]) -> Iterator[Any]:
@@ -122,7 +118,7 @@ def _keys(points: Any) -> NDArray[Any]:
     return rows.view(np.dtype((np.void, 24))).ravel()
 
 
-def _with_only(grid: Any, wanted: set[str], is_tool: NDArray[np.bool_]) -> Any:
+def _with_only(grid: Any, wanted: Collection[str], is_tool: NDArray[np.bool_]) -> Any:
     """Return the grid without lines, points, deleted elements and fields that are not wanted."""
     kept = grid.copy(deep=False)
     keep = ~np.isin(grid.celltypes, _LINES_AND_POINTS)
@@ -131,7 +127,7 @@ def _with_only(grid: Any, wanted: set[str], is_tool: NDArray[np.bool_]) -> Any:
     if "STATUS" in grid.cell_data:
         keep &= np.asarray(grid.cell_data["STATUS"]) != 0
     for data in (kept.point_data, kept.cell_data):
-        for name in set(data.keys()) - wanted:
+        for name in set(data.keys()).difference(wanted):
             del data[name]
     kept.cell_data[_TOOL] = is_tool.astype(np.uint8)
     return kept if keep.all() else kept.extract_cells(np.flatnonzero(keep))
@@ -198,8 +194,7 @@ def _nodes(grid: Any, kind: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     offsets = offsets_of(grid)
     count = int(offsets[cells[0] + 1] - offsets[cells[0]])
     nodes = np.asarray(grid.cell_connectivity)[offsets[cells][:, None] + np.arange(count)]
-    ordered: NDArray[np.int64] = nodes[:, (0, 1, 3, 2)] if kind == _PIXEL else nodes
-    return ordered.astype(np.int64)
+    return np.asarray(nodes[:, (0, 1, 3, 2)] if kind == _PIXEL else nodes, np.int64)
 
 
 def _arrays(data: Any) -> dict[str, NDArray[np.float64]]:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import pairwise
-from mmap import ACCESS_READ, mmap
+from mmap import mmap
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
-from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.source import SourceError, head_of, mapped, naming
 from chipglow.io.sources.tecplot_binary import (
     ELEMENTS,
     MAGIC,
@@ -47,14 +47,12 @@ class TecplotReader(MeshReader):
     def read(self, number: int) -> Sequence[Block]:
         zones = self._zones or _zones(self.file(number))
         if self.times:
-            wanted = self.times[number]
-            zones = tuple(zone for zone in zones if zone.time in (None, wanted))
+            zones = tuple(zone for zone in zones if zone.time in (None, self.times[number]))
         return tuple(zone.load() for zone in zones)
 
 
 def _is_binary(file: Path) -> bool:
-    with file.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC
+    return head_of(file, len(MAGIC)) == MAGIC
 
 
 def _times(zones: Sequence[Zone]) -> tuple[float, ...] | None:
@@ -76,8 +74,7 @@ def _zones(file: Path) -> tuple[Zone, ...]:
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
-    with file.open("rb") as stream:
-        content = mmap(stream.fileno(), 0, access=ACCESS_READ)
+    content = mapped(file)
     starts = [match.start() for match in _ZONE.finditer(content)]
     names = _names(_text(content[: starts[0] if starts else 0]))
     zones = []
@@ -123,11 +120,9 @@ def _load(
     words = re.sub(rb"(?m)^\s*#.*$", b"", content[begin:end]).split()
     kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", ORDERED))).upper().removeprefix("FE")
     with naming(f"{file}: zone {number}"):
-        for key in _NOT_READ:
-            if key in keys:
-                raise ValueError(f"{key} is not read")
-        across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
-        counts = (across, down, deep)
+        if unread := [key for key in _NOT_READ if key in keys]:
+            raise ValueError(f"{unread[0]} is not read")
+        counts = int(keys.get("I", "1")), int(keys.get("J", "1")), int(keys.get("K", "1"))
         if kind in _ORDERED:
             nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
         else:

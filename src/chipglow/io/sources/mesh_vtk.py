@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from chipglow.io.sources.mesh_reader import Block, MeshReader
-from chipglow.io.sources.source import SourceError, check_hdf5, reading
+from chipglow.io.sources.source import SourceError, check_hdf5, head_of, reading
 
 OTHER_HDF: Final = (".hdf", ".h5", ".hdf5")
 """Endings of HDF5 files, which are VTK's only if they have its group."""
@@ -30,9 +30,6 @@ KINDS: Final[Mapping[str, str]] = {
 }
 """Formats by the ending of a file's name."""
 
-_NAMES: Final[Mapping[str, Mapping[str, str]]] = {"OpenFOAM": {"velocity": "U"}}
-"""Names of fields in one format, which mean another thing in others."""
-
 _AS: Final[Mapping[str, str]] = {
     ".xmf": ".xdmf", ".encas": ".case", **dict.fromkeys(OTHER_HDF, ".vtkhdf"),
 }  # fmt: skip
@@ -48,7 +45,8 @@ class VtkReader(MeshReader):
 
     def __init__(self, files: Sequence[Path]) -> None:
         super().__init__(files, kind_of(files[0]))
-        self.known = _NAMES.get(kind_of(files[0]), {})
+        if kind_of(files[0]) == "OpenFOAM":
+            self.known = {"velocity": "U"}  # which means another thing in other formats
         self._opened: Any = None
         if len(files) == 1:
             opened = _open(files[0])
@@ -56,16 +54,15 @@ class VtkReader(MeshReader):
             if self.times:
                 self._opened, self.count = opened, len(self.times)
         if self.times is None:
-            heads = [re.search(_TIME, _head(file, _HEAD)) for file in files]
+            heads = [re.search(_TIME, head_of(file, _HEAD)) for file in files]
             found = tuple(float(head[1]) for head in heads if head)
             self.times = found if len(found) == len(files) else None
 
     def read(self, number: int) -> Sequence[Block]:
         file = self.file(number)
-        if self._opened is None:
+        if self._opened is None or self.times is None:
             data = read_data(file)
         else:
-            assert self.times is not None
             with reading_vtk(file):
                 data = _at_time(self._opened, number, self.times[number])
         # The state of an unfinished reader may crash the next one.
@@ -118,8 +115,7 @@ def _open(file: Path) -> Any:
     if kind == "XDMF":
         return _open_xdmf(file)
     with reading_vtk(file):
-        reader_for: Any = pyvista.get_reader
-        reader = reader_for(str(file), force_ext=_AS.get(suffix, suffix))
+        reader = pyvista.get_reader(str(file), force_ext=_AS.get(suffix, suffix))
         if kind == "OpenFOAM":
             reader.cell_to_point_creation = False  # the case has values of cells alone
         if kind == "Exodus II":
@@ -132,7 +128,8 @@ def _open_xdmf(file: Path) -> Any:
     from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
     # VTK crashes where the HDF5 file is missing.
-    for name in sorted(set(re.findall(rb">\s*([^<>:\"]+\.(?:h5|hdf5)):", _head(file)))):
+    named = re.findall(rb">\s*([^<>:\"]+\.(?:h5|hdf5)):", head_of(file, _MOST_XDMF))
+    for name in sorted(set(named)):
         heavy = file.parent / name.decode(errors="replace").strip()
         if not heavy.is_file():
             raise SourceError(f"{file}: its data should be in {heavy.name}, which is not there")
@@ -144,17 +141,12 @@ def _open_xdmf(file: Path) -> Any:
     return reader
 
 
-def _head(file: Path, size: int = _MOST_XDMF) -> bytes:
-    with file.open("rb") as stream:
-        return stream.read(size)
-
-
 def _of_time_series(file: Path, blocks: tuple[Block, ...]) -> tuple[Block, ...]:
     """Leave out the grid that only lends its nodes to a time series beside it.
 
     VTK gives it the fields of some time.
     """
-    grids = re.findall(rb"<Grid\b[^>]*>", _head(file))
+    grids = re.findall(rb"<Grid\b[^>]*>", head_of(file, _MOST_XDMF))
     series = [grid for grid in grids if b'CollectionType="Temporal"' in grid]
     names = [re.search(rb'Name="([^"]*)"', grid) for grid in series]
     wanted = {name.group(1).decode(errors="replace") for name in names if name}

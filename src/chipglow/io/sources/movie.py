@@ -1,9 +1,10 @@
 """Movies of fields with a colour scale: a source of scenes."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import hypot, isfinite, sqrt
+from math import dist, isfinite, sqrt
 from pathlib import Path
 from statistics import fmean
 from typing import Annotated, Any, ClassVar, Final
@@ -33,6 +34,7 @@ from chipglow.io.sources.overlays import (
     FieldPicture,
     FieldReader,
     box_mask,
+    check_box,
     find_background,
     place_of,
     polygon_mask,
@@ -56,7 +58,6 @@ Pixel = tuple[float, float]
 """Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
-_HALF: Final = 0.5
 _ROUNDING: Final = 0.29
 _LOWEST: Final = 0.02
 """Fraction of a scale up to which a colour at the border is taken for its lowest value."""
@@ -119,15 +120,12 @@ def _number(place: str, name: str, value: str | float) -> float:
     if not isinstance(value, str):
         return float(value)
     number, _, unit = value.strip().partition(" ")
-    if not number or (not unit and name != "plastic_strain"):
-        what = f"{value!r} has no unit" if number else "is missing"
-        raise ValueError(f"{place}: {what}, expected a value such as {_EXAMPLES[name]}")
-    try:
-        return float(parse_unit(unit, SI_UNITS[name], name).to_si(float(number)))
-    except ValueError:
-        raise ValueError(
-            f"{place}: {value!r}, expected a value such as {_EXAMPLES[name]}"
-        ) from None
+    lacks_unit = not unit and name != "plastic_strain"
+    with suppress(ValueError):
+        if not lacks_unit:
+            return float(parse_unit(unit, SI_UNITS[name], name).to_si(float(number)))
+    what = f"{value!r}{' has no unit' if lacks_unit else ''}" if number else "is missing"
+    raise ValueError(f"{place}: {what}, expected a value such as {_EXAMPLES[name]}")
 
 
 @dataclass(frozen=True)
@@ -262,7 +260,7 @@ class MovieSource(Source, Part):
             values, material = regrid(turned(_values(read)), turned(material), across, down)
             *means, distance, filled = values
             quality = np.round(np.nan_to_num(distance)).astype(np.uint8)
-            quality[filled > _HALF] = FILLED
+            quality[filled > 0.5] = FILLED
             fields = dict(zip(readers, means, strict=True))
             yield SampledFrame(float(times[number // self.every]), fields, material, quality)
 
@@ -290,8 +288,7 @@ class MovieSource(Source, Part):
 
     @property
     def _movies(self) -> dict[str, FieldMovie]:
-        movies = {name: getattr(self, name) for name in _EXAMPLES}
-        return {name: movie for name, movie in movies.items() if movie is not None}
+        return {name: movie for name in _EXAMPLES if (movie := getattr(self, name)) is not None}
 
     def _path(self, name: str) -> Path:
         file = self._movies[name].file or (name == "temperature" and self.files)
@@ -309,8 +306,7 @@ class MovieSource(Source, Part):
                 "movie.pixel: is missing, expected the side of a pixel such as 1 um, "
                 "or scale_from, scale_to and scale_length"
             )
-        (left, top), (right, bottom) = self.scale_from, self.scale_to
-        pixels = hypot(right - left, bottom - top)
+        pixels = dist(self.scale_from, self.scale_to)
         if not pixels:
             raise ValueError(f"movie.scale_to: {self.scale_to}, expected another point")
         return self.scale_length / pixels, self.scale_length / pixels
@@ -368,13 +364,7 @@ class MovieSource(Source, Part):
 
     def _crop(self, index: MovieIndex) -> Box:
         box = self.crop or (0, 0, index.columns, index.rows)
-        left, top, right, bottom = box
-        if not (0 <= left < right <= index.columns and 0 <= top < bottom <= index.rows):
-            raise SourceError(
-                f"crop: {box} does not lie in pictures of {index.columns} x {index.rows} pixels, "
-                "expected left, top, right, bottom"
-            )
-        return box
+        return check_box("crop", box, index.rows, index.columns)
 
     def _cropped(self, values: NDArray[Any]) -> NDArray[Any]:
         if self.crop is None:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from os import SEEK_END
 from pathlib import Path
 from typing import Any, Final
@@ -50,22 +51,17 @@ def index_movie(path: Path) -> MovieIndex:
 
 
 def pictures(path: Path, index: MovieIndex, numbers: Iterable[int]) -> Iterator[Picture]:
-    """Decode the pictures of some ascending numbers one at a time."""
-    wanted = iter(numbers)
-    following, number = next(wanted, index.count), 0
+    """Decode the pictures of some numbers one at a time, in the order of the movie."""
+    chosen, number = set(numbers), -1
     with _opened(path) as (container, stream):
         interpolation = _interpolation()
-        for frame in container.decode(stream):
-            if number >= index.count:
-                break
+        for number, frame in enumerate(islice(container.decode(stream), index.count)):
             _check(path, index, frame, number)
-            if number == following:
+            if number in chosen:
                 yield frame.to_ndarray(format="rgb24", interpolation=interpolation)
-                following = next(wanted, index.count)
-            number += 1
-    if number < index.count:
+    if number + 1 < index.count:
         raise SourceError(
-            f"{path}: picture {number + 1} of {index.count} cannot be decoded, expected a whole "
+            f"{path}: picture {number + 2} of {index.count} cannot be decoded, expected a whole "
             "movie"
         )
 

@@ -84,8 +84,7 @@ class FieldReader:
         """Return a picture's contents; pixels of lines and text take those of the nearest pixel."""
         values, distance = self.scale.invert(picture)
         void, tool = self._marked(picture, distance)
-        off_scale = (distance > self.limit) & ~void & ~tool
-        lines = off_scale | (dark_lines(picture) & ~void & ~tool)
+        lines = ((distance > self.limit) | dark_lines(picture)) & ~void & ~tool
         # Drawings over a field shade into the pixels around.
         drawn = maximum_filter(lines.view(np.uint8), 3).view(np.bool_) | self.covered
         seen = ~(drawn | void | tool)
@@ -200,6 +199,17 @@ def _is_plain(pixels: NDArray[np.uint8], colour: Colour) -> bool:
     place = lab(np.array(colour) / 255.0)
     apart = np.linalg.norm(lab(pixels / 255.0) - place, axis=1)
     return bool(np.hypot(*place[1:]) < _GREY or np.sqrt((apart**2).mean()) < _ONE_COLOUR)
+
+
+def check_box(name: str, box: Box, rows: int, columns: int) -> Box:
+    """Return a box, which must lie in a picture."""
+    left, top, right, bottom = box
+    if not (0 <= left < right <= columns and 0 <= top < bottom <= rows):
+        raise SourceError(
+            f"{name}: box {box} does not lie in the picture of {columns} x {rows} pixels, expected "
+            "left, top, right, bottom"
+        )
+    return box
 
 
 def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:

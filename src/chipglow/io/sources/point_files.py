@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from io import BytesIO
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.source import SourceError, files_of, reading, required
+from chipglow.io.sources.source import SourceError, files_of, head_of, mapped, reading, required
 from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
@@ -95,10 +94,8 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     paths = files_of(pattern)
     path, suffix = paths[0], paths[0].suffix.lower()
     _check_empty(path)
-    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES):
-        with path.open("rb") as stream:
-            if stream.read(len(_ITEM)) == _ITEM:
-                return _dumps(paths)
+    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES) and head_of(path, len(_ITEM)) == _ITEM:
+        return _dumps(paths)
     if len(paths) == 1 and suffix in TEXT_SUFFIXES:
         return _split(_read_text(path), time)
     if len(paths) == 1 and suffix not in VTK_SUFFIXES:
@@ -178,8 +175,7 @@ def _split(table: PointTable, time: str | None) -> PointFrames:
 
 
 def _rows(table: PointTable, rows: slice) -> PointTable:
-    columns = {label: values[rows] for label, values in table.columns.items()}
-    return replace(table, columns=columns)
+    return replace(table, columns={label: values[rows] for label, values in table.columns.items()})
 
 
 def _time_in(labels: Iterable[str]) -> str:
@@ -295,7 +291,7 @@ class _Snapshot:
         import pandas as pd
 
         check_samples(f"{self.path}: a frame", self.count * len(self.labels))
-        with reading(self.path), _mapped(self.path) as content:
+        with reading(self.path), mapped(self.path) as content:
             table = pd.read_csv(BytesIO(content[self.rows]), sep=r"\s+", header=None)
         shape = self.count, len(self.labels)
         if table.shape != shape or table.iloc[:, -1].isna().any():
@@ -330,14 +326,9 @@ def _dumps(paths: Sequence[Path]) -> PointFrames:
     return PointFrames([snapshot.table for snapshot in found], times, unit)
 
 
-def _mapped(path: Path) -> mmap:
-    with path.open("rb") as stream:
-        return mmap(stream.fileno(), 0, access=ACCESS_READ)
-
-
 def _snapshots(path: Path) -> Iterator[_Snapshot]:
     """Yield all frames of a dump, whose atoms are not read yet."""
-    content = _mapped(path)
+    content = mapped(path)
     if content[-1:] != b"\n":
         raise SourceError(f"{path}: its last line has no end, it is truncated")
     begin, units = 0, _units("")

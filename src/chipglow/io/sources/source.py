@@ -10,6 +10,7 @@ from glob import glob, has_magic
 from importlib import import_module
 from itertools import pairwise
 from math import isfinite
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -69,6 +70,18 @@ def check_hdf5(file: Path) -> None:
         check_own_data(file)
 
 
+def head_of(file: Path, size: int) -> bytes:
+    """Return the first bytes of a file, as many as there are."""
+    with file.open("rb") as stream:
+        return stream.read(size)
+
+
+def mapped(file: Path) -> mmap:
+    """Return the bytes of a file, mapped into memory."""
+    with file.open("rb") as stream:
+        return mmap(stream.fileno(), 0, access=ACCESS_READ)
+
+
 def natural(name: str) -> tuple[tuple[int, str], ...]:
     """Return a key that sorts 9 before 10."""
     words = re.split(r"(\d+)", name)
@@ -95,11 +108,10 @@ def files_of(pattern: str | Path, *, gaps_allowed: bool = True) -> tuple[Path, .
 
 def _check_gaps(pattern: str | Path, files: Sequence[Path]) -> None:
     numbers = [[int(digits) for digits in re.findall(r"\d+", file.name)] for file in files]
-    columns = [set(column) for column in zip(*numbers, strict=False)]
-    counted = [at for at, column in enumerate(columns) if len(column) == len(files)]
-    if len(files) < 3 or not counted:
+    columns = [column for column in zip(*numbers, strict=False) if len(set(column)) == len(files)]
+    if len(files) < 3 or not columns:
         return
-    counts = [row[counted[-1]] for row in numbers]
+    counts = columns[-1]
     steps = [after - before for before, after in pairwise(counts)]
     usual = max(sorted(set(steps)), key=steps.count)
     for file, count, step in zip(files, counts, steps, strict=False):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite, prod
-from mmap import ACCESS_READ, mmap
+from mmap import mmap
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import simple
 from chipglow.io.sources.mesh_reader import Block
-from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.source import SourceError, mapped, naming
 
 ORDERED: Final = "ORDERED"
 ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
@@ -134,19 +134,19 @@ class _Zone:
 
 def binary_zones(file: Path) -> tuple[Zone, ...]:
     """Return the zones of a binary file, whose numbers are not read yet."""
-    with file.open("rb") as stream:
-        cursor = _Cursor(file, mmap(stream.fileno(), 0, access=ACCESS_READ))
-    version = cursor.version()
-    names = cursor.variables(version)
-    zones = _headers(cursor, version, len(names))
-    begin, ghosts = cursor.at, False
-    try:
-        _locate(cursor, names, zones, ghosts)
-    except SourceError:
-        if not any(zone.kind == ORDERED and any(zone.centred) for zone in zones):
-            raise
-        cursor.at, ghosts = begin, True
-        _locate(cursor, names, zones, ghosts)
+    with naming(file):
+        cursor = _Cursor(mapped(file))
+        version = cursor.version()
+        names = cursor.variables(version)
+        zones = _headers(cursor, version, len(names))
+        begin, ghosts = cursor.at, False
+        try:
+            _locate(cursor, names, zones, ghosts)
+        except SourceError:
+            if not any(zone.kind == ORDERED and any(zone.centred) for zone in zones):
+                raise
+            cursor.at, ghosts = begin, True
+            _locate(cursor, names, zones, ghosts)
     # Zones without strands exist at all times, but whoever gives each another time means it.
     timed = all(zone.strand == _STATIC for zone in zones)
     timed = timed and len({zone.time for zone in zones}) == len(zones)
@@ -179,18 +179,16 @@ def _block(file: Path, number: int, names: Sequence[str], zone: _Zone, ghosts: b
         return block_of(called, columns, of_elements, zone.kind, cells)
 
 
+def _damaged(said: str) -> SourceError:
+    return SourceError(f"{said}, expected a binary file of Tecplot that is whole")
+
+
 class _Cursor:
     """Position in a file that moves on and never beyond the file's end."""
 
-    def __init__(self, file: Path, content: mmap) -> None:
-        self.file, self.at = file, 0
+    def __init__(self, content: mmap) -> None:
+        self.at = 0
         self._content, self._order = content, "<"
-
-    def damaged(self, said: str) -> SourceError:
-        return SourceError(f"{self.file}: {said}, expected a binary file of Tecplot that is whole")
-
-    def refused(self, said: str) -> SourceError:
-        return SourceError(f"{self.file}: {said}")
 
     @property
     def left(self) -> int:
@@ -200,7 +198,7 @@ class _Cursor:
         """Move on by as many numbers, and return them without reading them."""
         dtype = np.dtype(self._order + kind)
         if count < 0 or dtype.itemsize * count > self.left:
-            raise self.damaged(f"{count} numbers at byte {self.at} of {len(self._content)}")
+            raise _damaged(f"{count} numbers at byte {self.at} of {len(self._content)}")
         values: NDArray[Any] = np.ndarray((count,), dtype, self._content, self.at)
         self.at += dtype.itemsize * count
         return values
@@ -218,7 +216,7 @@ class _Cursor:
         letters = self.skip("i4", min(self.left // 4, _LONGEST_TEXT))
         ends = np.flatnonzero(letters == 0)
         if not ends.size:
-            raise self.damaged(f"a text without an end at byte {begin}")
+            raise _damaged(f"a text without an end at byte {begin}")
         self.at = begin + 4 * (int(ends[0]) + 1)
         return (letters[: ends[0]] & 0xFF).astype(np.uint8).tobytes().decode("utf-8", "replace")
 
@@ -227,7 +225,7 @@ class _Cursor:
         magic = self._content[:8]
         digits = magic[len(MAGIC) :].decode("ascii", "replace").strip()
         if not digits.isdecimal() or int(digits) not in _VERSIONS:
-            raise self.refused(
+            raise SourceError(
                 f"is binary Tecplot of version {digits!r}, expected "
                 f"{_VERSIONS[0]} to {_VERSIONS[-2]}: save it again, or as ASCII"
             )
@@ -235,16 +233,16 @@ class _Cursor:
         if self.integer() != 1:
             self.at, self._order = 8, ">"
             if self.integer() != 1:
-                raise self.damaged("its order of bytes is unknown")
+                raise _damaged("its order of bytes is unknown")
         return int(digits)
 
     def variables(self, version: int) -> tuple[str, ...]:
         if version >= 111 and self.integer() == _SOLUTION:
-            raise self.refused("is a solution without its grid, expected a file with both")
+            raise SourceError("is a solution without its grid, expected a file with both")
         self.text()
         count = self.integer()
         if not 0 < count <= self.left // 4:
-            raise self.damaged(f"{count} variables")
+            raise _damaged(f"{count} variables")
         return tuple(self.text().strip() for _ in range(count))
 
     def flags(self, count: int, without: int = 0) -> list[int]:
@@ -272,9 +270,9 @@ def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Zone]:
             cursor.take("i" if marker == _ABOUT_VARIABLE else "")
             _skip_remark(cursor)
         else:
-            raise cursor.damaged(f"mark {marker:g} at byte {cursor.at - 4}")
+            raise _damaged(f"mark {marker:g} at byte {cursor.at - 4}")
     if not found:
-        raise cursor.damaged("no zone")
+        raise _damaged("no zone")
     return found
 
 
@@ -282,15 +280,15 @@ def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Zone
     name = cursor.text()
     _, strand, time, _, kind_number = cursor.take("iidii")
     if not 0 <= kind_number < len(_KINDS):
-        raise cursor.damaged(f"zone {number} is of the kind {kind_number}")
+        raise _damaged(f"zone {number} is of the kind {kind_number}")
     kind = _KINDS[kind_number]
     if kind != ORDERED and kind not in ELEMENTS:
-        raise cursor.refused(
+        raise SourceError(
             f"zone {number} has elements of the kind FE{kind}, expected points in order, "
             "triangles, quadrilaterals, tetrahedra or bricks"
         )
     if version < 112 and cursor.integer():
-        raise cursor.refused(f"zone {number} is packed by points, expected by blocks")
+        raise SourceError(f"zone {number} is packed by points, expected by blocks")
     centred = cursor.flags(variables)
     raw = cursor.integer() if version >= 108 else 0
     connections = cursor.integer()
@@ -298,7 +296,7 @@ def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Zone
     if connections and kind != ORDERED and version >= 108:
         cursor.integer()
     if mode not in _NEIGHBOURS:
-        raise cursor.refused(f"zone {number} has faces with many neighbours, which are not read")
+        raise SourceError(f"zone {number} has faces with many neighbours, which are not read")
     if kind == ORDERED:
         across, down, deep = cursor.take("iii")
         elements = 0
@@ -306,9 +304,9 @@ def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Zone
         across, elements, *_ = cursor.take("iiiii")
         down, deep = 1, 1
     if not isfinite(time):
-        raise cursor.damaged(f"zone {number} is at the time {time}")
+        raise _damaged(f"zone {number} is at the time {time}")
     if min(across, down, deep, elements, connections) < 0:
-        raise cursor.damaged(f"zone {number} has {across} points and {elements} elements")
+        raise _damaged(f"zone {number} has {across} points and {elements} elements")
     while cursor.integer():
         _skip_remark(cursor)
     neighbours = connections * _NEIGHBOURS[mode] + (elements * _FACES.get(kind, 0) if raw else 0)
@@ -340,7 +338,7 @@ def _locate(cursor: _Cursor, names: Sequence[str], zones: Sequence[_Zone], ghost
     """Find the numbers of the zones; each zone has to begin where the one before ends."""
     for number, zone in enumerate(zones, start=1):
         if (marker := cursor.take("f")[0]) != _ZONE:
-            raise cursor.damaged(f"mark {marker:g} in place of zone {number}")
+            raise _damaged(f"mark {marker:g} in place of zone {number}")
         kinds = cursor.take("i" * len(names))
         passive = cursor.flags(len(names))
         shared = cursor.flags(len(names), _ALONE)
@@ -352,7 +350,7 @@ def _locate(cursor: _Cursor, names: Sequence[str], zones: Sequence[_Zone], ghost
             count = zone.count(variable, ghosts)
             if own[variable]:
                 if kinds[variable] not in _NUMBERS:
-                    raise cursor.refused(
+                    raise SourceError(
                         f"zone {number}: {name!r} has numbers of the kind {kinds[variable]}, "
                         f"expected 1 to {len(_NUMBERS)}"
                     )
@@ -360,23 +358,23 @@ def _locate(cursor: _Cursor, names: Sequence[str], zones: Sequence[_Zone], ghost
             elif passive[variable]:
                 values = None
             else:
-                values = _before(cursor, zones, number, shared[variable]).columns[variable]
+                values = _before(zones, number, shared[variable]).columns[variable]
                 if values is not None and len(values) != count:
-                    raise cursor.damaged(
+                    raise _damaged(
                         f"zone {number} shares {len(values)} numbers of {name!r}, it has {count}"
                     )
             zone.columns.append(values)
         zone.cells = _cells(cursor, zones, number, cells_of)
     if cursor.left:
-        raise cursor.damaged(f"{cursor.left} bytes after the last zone")
+        raise _damaged(f"{cursor.left} bytes after the last zone")
 
 
 def _cells(cursor: _Cursor, zones: Sequence[_Zone], number: int, of: int) -> NDArray[Any] | None:
     zone, cells = zones[number - 1], None
     if of != _ALONE and zone.kind != ORDERED:
-        other = _before(cursor, zones, number, of)
+        other = _before(zones, number, of)
         if (other.kind, other.elements) != (zone.kind, zone.elements):
-            raise cursor.damaged(f"zone {number} shares elements of another kind")
+            raise _damaged(f"zone {number} shares elements of another kind")
         return other.cells
     if zone.kind != ORDERED:
         cells = cursor.skip("i4", zone.elements * ELEMENTS[zone.kind][0])
@@ -385,8 +383,8 @@ def _cells(cursor: _Cursor, zones: Sequence[_Zone], number: int, of: int) -> NDA
     return cells
 
 
-def _before(cursor: _Cursor, zones: Sequence[_Zone], number: int, of: int) -> _Zone:
+def _before(zones: Sequence[_Zone], number: int, of: int) -> _Zone:
     """Return the zone whose numbers a zone shares."""
     if not 0 <= of < number - 1:
-        raise cursor.damaged(f"zone {number} shares with zone {of + 1}, expected one before it")
+        raise _damaged(f"zone {number} shares with zone {of + 1}, expected one before it")
     return zones[of]

@@ -1,6 +1,5 @@
 """Quads as triangles, and the fields of triangles on the samples of a raster."""
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -19,16 +18,6 @@ SMALLEST: Final = 1e-200
 """Twice the area in samples from which on a triangle covers something; its inverse is finite."""
 
 
-@dataclass(frozen=True)
-class Rasterised:
-    """The fields and elements of a mesh at the samples of a raster."""
-
-    fields: NDArray[np.float32]
-    """Fields of nodes, then of elements, float32 (fields, y, x); NaN without an element."""
-    element: NDArray[np.int32]
-    """Index of the triangle at each sample, int32 of shape (y, x); `NOTHING` without one."""
-
-
 def rasterise(
     raster: Raster,
     points: ArrayLike,
@@ -36,8 +25,11 @@ def rasterise(
     node_values: ArrayLike | None = None,
     element_values: ArrayLike | None = None,
     height: ArrayLike | None = None,
-) -> Rasterised:
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Sample the fields of a mesh of triangles at the centres of a raster's samples.
+
+    Returns the fields of nodes, then of elements, float32 (fields, y, x), NaN without an element,
+    and the index of the triangle at each sample, int32 of shape (y, x), `NOTHING` without one.
 
     Points (nodes, 2) and `height` in m; values of nodes and elements have shape (n, fields). A
     sample on an edge that two triangles share belongs to one of them. A triangle without area, or
@@ -62,7 +54,7 @@ def rasterise(
     with np.errstate(over="ignore", invalid="ignore"):
         places = (points - corner) * np.array((1.0, -1.0)) / raster.spacing - 0.5
     _fill(places, triangles, of_nodes, of_elements, heights, fields, element, highest)
-    return Rasterised(fields, element)
+    return fields, element
 
 
 def _columns(values: ArrayLike | None, count: int) -> NDArray[np.float64]:
