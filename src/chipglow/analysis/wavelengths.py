@@ -274,8 +274,7 @@ def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
     parts = "misregistration_K", "noise_K", "emissivity_uncertainty_K"
     squares = (error**2).mean("draw") + sum(table[name] ** 2 for name in parts)
     frame = table.assign(total_K=np.sqrt(squares)).to_dataframe().reset_index()
-    columns = ["place", "first_um", "second_um", *map(str, table.data_vars), "total_K"]
-    return frame[columns]
+    return frame[["place", "first_um", "second_um", *map(str, table.data_vars), "total_K"]]
 
 
 def cut_spots(
