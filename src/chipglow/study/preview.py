@@ -40,15 +40,13 @@ def show_scene(scene: Scene, preview: Preview, on_progress: Callable[[float], No
     last = len(scene.times)
     for number in range(1, last + 1):
         if preview.shows(number, last):
-            frame = scene.frame(number - 1)
-            preview.on_frame(_thinned(frame, step, rows, columns))
+            preview.on_frame(_thinned(scene.frame(number - 1), step, rows, columns))
             on_progress(number / last)
 
 
 def _step(raster: Raster) -> int:
     """Return how many samples of a scene are one of its preview, in either direction."""
-    wanted = ceil(max(raster.shape) / _MOST_SAMPLES)
-    return min(wanted, *raster.shape)
+    return min(ceil(max(raster.shape) / _MOST_SAMPLES), *raster.shape)
 
 
 def _thinned(frame: Frame, step: int, rows: int, columns: int) -> Frame:
