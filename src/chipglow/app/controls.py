@@ -333,8 +333,7 @@ class Controls:
 
 def shown_study(study: Study, start: float) -> ShownStudy:
     """Return a study with the exposure that is shown."""
-    given = {name: getattr(study, name) for name in study.given}
-    return ShownStudy(**given, start=start)
+    return ShownStudy(**{name: getattr(study, name) for name in study.given}, start=start)
 
 
 def _word(row: Control, texts: Texts) -> str:

@@ -73,11 +73,6 @@ class Picture:
         limit = self.camera.lower_limit if self.camera else None
         return None if limit is None else limit - KELVIN
 
-    @property
-    def is_blank(self) -> bool:
-        """Whether every pixel is flagged."""
-        return bool(self.data["flagged"].all())
-
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
@@ -320,8 +315,7 @@ class SceneModel:
             _, surface = self._on(state, quick=False)
             return self._camera(state, scene).prepare(surface, scene).emissivity(scene.frame(index))
         if name == "radiance_temperature":
-            places = scene.raster.centres
-            radiance = nearest(exposure.centre_radiance, exposure.raster, places)
+            radiance = nearest(exposure.centre_radiance, exposure.raster, scene.raster.centres)
             return np.asarray(self._camera(state, scene).band.temperature(radiance))
         return scene.field(name, index)
 
@@ -348,8 +342,7 @@ class MeasurementModel:
         }
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
         panels, lines = {"measured": _measured_panel(data, raster)}, _lines(state, raster, data)
-        crossings = _crossings(state, measurement.tool)
-        return Picture(state, raster, data, panels, lines, crossings)
+        return Picture(state, raster, data, panels, lines, _crossings(state, measurement.tool))
 
     def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
         """Return nothing: the true temperature of a measurement is not known."""
