@@ -134,13 +134,11 @@ class ExposureImages:
         """Return the temperature in K of pixels without error, by default of its kind."""
         kind = kind or self.kind
         key = kind, camera.pitch, camera.offset, camera.shape, camera.fill_factor
-        reference = self._references.get(key)
-        if reference is None:
+        if key not in self._references:
             if len(self._references) >= _KEPT:
                 self._references.clear()
-            reference = reference_temperature(camera, self.exposure, kind)
-            self._references[key] = reference
-        return reference
+            self._references[key] = reference_temperature(camera, self.exposure, kind)
+        return self._references[key]
 
     def radiance(self, camera: Camera) -> Array:
         """Return the radiance of a camera's pixels before its detector in W/(m² sr)."""

@@ -55,9 +55,9 @@ def style() -> Any:
     return matplotlib.rc_context(_STYLE)
 
 
-def new_figure(height: float) -> Figure:
+def new_figure(height: float, layout: Any = "constrained") -> Figure:
     """Return an empty figure of the page's width and a height in inches."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Figure(figsize=(WIDTH, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -65,9 +65,7 @@ def new_figure(height: float) -> Figure:
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
     """Return an empty figure of the page's width for rows of images of a width in inches."""
     panel = panel_width * raster.rows / raster.columns
-    figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
-    FigureCanvasAgg(figure)
-    return figure
+    return new_figure(rows * (panel + 0.35) + 0.45, "compressed")
 
 
 def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
