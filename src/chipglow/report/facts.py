@@ -205,10 +205,8 @@ class Facts:
         if "psf_width" not in self.data or reading not in self.data.reading:
             return None
         order = self.analysis.camera.psf_order
-        if unit == "%":
-            values = 100 * sensitivity_psf_fraction(self.data, order, reading)
-        else:
-            values = sensitivity_error(self.data, order, reading)
+        one = self.data, order, reading
+        values = 100 * sensitivity_psf_fraction(*one) if unit == "%" else sensitivity_error(*one)
         return values if np.isfinite(values).all() else None
 
     def largest_cause(self, reading: str) -> tuple[str, float]:
