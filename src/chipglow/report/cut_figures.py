@@ -193,9 +193,8 @@ def _draw_chart(axes: Axes, chart: xr.Dataset) -> None:
         scales_of.items(), paper.BAND_KEYS, titles, (BLUE, VERMILLION, GREEN), strict=True
     ):
         value = paper.PAPER[key].value
-        level = [scale * value]
         thick: Any = {"colors": colour, "linewidths": 1.8, "linestyles": "solid"}
-        axes.contour(width, rise, chart[name].T, levels=level, **thick)
+        axes.contour(width, rise, chart[name].T, levels=[scale * value], **thick)
         unit = "%" if scale < 1 else "K"
         axes.plot([], [], color=colour, label=f"paper: {title} {value:g} {unit}".replace("-", "−"))
     axes.set_xscale("log")

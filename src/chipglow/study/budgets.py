@@ -103,7 +103,7 @@ class StudyBudget:
                 one, is_set = parts[0], len(parts) == 1 and parts[0].has_slope
                 stated = self.study.uncertainty.inputs.get(one.name)
                 contribution = float(estimate.contribution(name)[output])
-                number = inputs.names.index(one.name)
+                slope = self.budget.sensitivity[inputs.names.index(one.name), output]
                 rows.append(
                     {
                         "reading": reading,
@@ -113,9 +113,7 @@ class StudyBudget:
                         "value": one.value if is_set else np.nan,
                         "standard_uncertainty": one.standard_uncertainty if is_set else np.nan,
                         "unit": self._unit(one.name) if is_set else "",
-                        "sensitivity": self.budget.sensitivity[number, output]
-                        if is_set
-                        else np.nan,
+                        "sensitivity": slope if is_set else np.nan,
                         "degrees_of_freedom": one.degrees_of_freedom,
                         "contribution_K": contribution,
                         "variance_percent": 100 * contribution**2 / total if total else 0.0,
