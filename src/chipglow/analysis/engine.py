@@ -363,8 +363,7 @@ def _completed(task: _Task, cut: Cut) -> Cut:
         lambda: heated_objects(task.camera, task.surfaces, tool, cut.band_width, spacing, textures),
     )
     forces = task.attempt("forces", lambda: cutting_forces(task.scene))
-    overview = task.scene.overview
-    return replace(cut, chip=chip, forces=forces, heated=heated or (), overview=overview)
+    return replace(cut, chip=chip, forces=forces, heated=heated or (), overview=task.scene.overview)
 
 
 def _scene_variables(

@@ -55,7 +55,9 @@ def style() -> Any:
     return matplotlib.rc_context(_STYLE)
 
 
-def new_figure(height: float, layout: Any = "constrained") -> Figure:
+def new_figure(
+    height: float, layout: Literal["constrained", "compressed"] = "constrained"
+) -> Figure:
     """Return an empty figure of the page's width and a height in inches."""
     figure = Figure(figsize=(WIDTH, height), layout=layout)
     FigureCanvasAgg(figure)

@@ -21,12 +21,8 @@ def preview_raster(study: Study) -> Raster:
     """Return the samples of a preview: those of the study's scene, or several together."""
     raster = study.cutting.field_of_view.build()
     step = _step(raster)
-    return replace(
-        raster,
-        spacing=raster.spacing * step,
-        rows=raster.rows // step,
-        columns=raster.columns // step,
-    )
+    rows, columns = (count // step for count in raster.shape)
+    return replace(raster, spacing=raster.spacing * step, rows=rows, columns=columns)
 
 
 def preview_of(study: Study, on_frame: Callable[[Frame], None]) -> Preview:
