@@ -300,7 +300,7 @@ def test_lines_across_the_rake_face_follow_its_normal():
     points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
     error = -40.0 + (points - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_normal) * 1e6
     images = np.array([np.full(pixels.shape, 900.0), 900.0 + error, 900.0 + 0.75 * error])
-    place = RakePlace("rake face", TOOL, 120e-6, 30e-6, 1e-6)
+    place = RakePlace("rake face", TOOL, 120e-6)
     found = place.lines(6e-6)
     lines = {
         name: np.array([sample(image, pixels, line.points) for image in images])
@@ -327,10 +327,7 @@ def test_lines_across_the_rake_face_follow_its_normal():
 def test_lines_beyond_the_image_have_no_reading():
     pixels = Raster(left=-300e-6, top=300e-6, spacing=6e-6, rows=60, columns=60)
     band = find_shear_band(GRID, *band_scene(BandImage()), TOOL)
-    for place in (
-        RakePlace("rake face", TOOL, 120e-6, 30e-6, 1e-6),
-        BandPlace("shear band", band, 30e-6, 1e-6),
-    ):
+    for place in (RakePlace("rake face", TOOL, 120e-6), BandPlace("shear band", band)):
         lines = {
             name: np.full((3, line.distance.size), np.nan)
             for name, line in place.lines(6e-6).items()

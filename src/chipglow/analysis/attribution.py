@@ -12,9 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.cut import middle_start
-from chipglow.analysis.images import Array, ExposureImages, reference_temperature
+from chipglow.analysis.images import Array, ExposureImages, read_temperature, reference_temperature
 from chipglow.analysis.places import Place
-from chipglow.camera import UNUSABLE, Camera, Exposure
+from chipglow.camera import Camera, Exposure
 from chipglow.camera.exposure import View, expose
 from chipglow.camera.optics.sampling import integrate, largest
 from chipglow.camera.sweep import Check
@@ -154,10 +154,8 @@ def attribute(
     model = _Model(camera, _sources(scene, camera, surface, field, start, check), plan, check)
     variables = _divided(model, plan.permutations, seed)
     half = replace(camera, integration_time=camera.integration_time / 2)
-    middle = start + half.integration_time / 2
-    (shorter,) = half.expose_fields(scene, (field,), middle, check)
-    longer = model.sources.exposures[0]
-    gain = _size(camera, longer, reference) - _size(half, shorter, reference)
+    (shorter,) = half.expose_fields(scene, (field,), start + half.integration_time / 2, check)
+    gain = _size(camera, model.sources.exposures[0], reference) - _size(half, shorter, reference)
     variables["gain_half_exposure"] = ("y", "x"), gain, _KELVIN
     pixels = camera.pixels(scene.raster)
     coordinates = {"effect": list(model.players), "other_effect": list(model.players)}
@@ -299,8 +297,7 @@ class _Model:
         self.contained = frozenset({"emissivity", "reflection"} if is_contained else ())
         detector = camera.detector
         self.noises = frozenset(one.kind for one in (detector.terms if detector else ()))
-        kinds = self.noises | {one.kind for one in camera.optics}
-        self.named = kinds.intersection(plan.effects)
+        self.named = (self.noises | {one.kind for one in camera.optics}) & set(plan.effects)
         self.players = self._players(plan.effects)
         self._image = lru_cache(None)(self._formed)
         self._read = lru_cache(None)(self._reading)
@@ -351,16 +348,12 @@ class _Model:
                 groups[group] = groups.get(group, frozenset()) | {name}
         return groups
 
-    def _reading(self, on: _Coalition) -> tuple[Array, NDArray[np.bool_]]:
+    def _reading(self, on: _Coalition) -> tuple[Array, NDArray[np.bool_] | bool]:
         """Return temperatures, and the pixels that the detector marks as unusable."""
-        usable = np.zeros(self.reference.shape, bool)
         if not on - {"range limit"} - self.contained:
-            return self.reference, usable
-        camera = self._switched(on)
+            return self.reference, False
         image = self._image(on - {"range limit", "detector"} - self.noises)
-        radiance, flags = camera.read(image[None], np.array([self.start]))
-        kelvins = np.asarray(camera.band.temperature(radiance[0]), np.float64)
-        return kelvins, usable if flags is None else flags[0] & UNUSABLE != 0
+        return read_temperature(self._switched(on), image, self.start)
 
     def _formed(self, on: _Coalition) -> Array:
         """Return the radiance of the pixels before the detector in W/(m² sr)."""

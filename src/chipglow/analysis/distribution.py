@@ -109,11 +109,9 @@ class Distribution:
         low, high = self.limits
         if not isfinite(low) or not low < self.range[0] <= self.range[1] < high:
             return self._interval
-        if isfinite(high):
-            transformed = self.having(logit((self.values - low) / (high - low)))
-        else:
-            transformed = self.having(np.log(self.values - low))
-        ends = np.array(transformed._interval)
+        above = self.values - low
+        transformed = logit(above / (high - low)) if isfinite(high) else np.log(above)
+        ends = np.array(self.having(transformed)._interval)
         if not np.isfinite(ends).all():
             return -inf, inf
         ends = low + ((high - low) * expit(ends) if isfinite(high) else np.exp(ends))

@@ -363,8 +363,7 @@ def _completed(task: _Task, cut: Cut) -> Cut:
         lambda: heated_objects(task.camera, task.surfaces, tool, cut.band_width, spacing, textures),
     )
     forces = task.attempt("forces", lambda: cutting_forces(task.scene))
-    overview = task.scene.overview
-    return replace(cut, chip=chip, forces=forces, heated=heated or (), overview=overview)
+    return replace(cut, chip=chip, forces=forces, heated=heated or (), overview=task.scene.overview)
 
 
 def _scene_variables(
@@ -428,8 +427,7 @@ def _corrected(camera: Camera, variables: Variables) -> Variables:
     emissivity, temperature = variables["emissivity"][1], variables["temperature"][1]
     hot = temperature >= (np.nanmin(temperature) + np.nanmax(temperature)) / 2
     assumed = np.nanmedian(np.where(hot, emissivity, np.nan), axis=(1, 2))
-    surfaces = variables["surface"][1]
-    number = [surfaces.index(name) for name in variables["seen_surface"][1]]
+    number = [variables["surface"][1].index(name) for name in variables["seen_surface"][1]]
     set_to = assumed[number][:, None, None, None]
     band = camera.band
     reflected = surroundings_radiance(band, camera.reflected)

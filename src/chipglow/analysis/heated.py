@@ -49,7 +49,6 @@ class HeatedRow:
     true: Emissivity
     found: RegionEmissivity  # of the first texture
     means: NDArray[np.float64]  # over the pixels, shape (texture,)
-    deviations: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,10 +174,4 @@ def _images(
 
 def _row(feature: str, true: Emissivity, images: list[EmissivityMap], area: Area) -> HeatedRow:
     rows = [image.of(area) for image in images]
-    return HeatedRow(
-        feature=feature,
-        true=true,
-        found=rows[0],
-        means=np.array([row.mean for row in rows]),
-        deviations=np.array([row.standard_deviation for row in rows]),
-    )
+    return HeatedRow(feature, true, rows[0], np.array([row.mean for row in rows]))

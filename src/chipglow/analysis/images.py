@@ -41,14 +41,10 @@ ALL: Final = "all"
 WITHOUT_PSF: Final = "without psf"
 
 
-def _without_psf(camera: Camera, exposure: Exposure) -> tuple[Camera, Exposure]:
-    # Without a PSF its order does not matter; one value lets cameras share the image.
-    return replace(camera, psf=None, psf_order="optics"), exposure
-
-
 CASES: Final[Mapping[str, Effect]] = {
     ALL: lambda camera, exposure: (camera, exposure),
-    WITHOUT_PSF: _without_psf,
+    # Without a PSF its order does not matter; one value lets cameras share the image.
+    WITHOUT_PSF: lambda camera, exposure: (replace(camera, psf=None, psf_order="optics"), exposure),
 }
 """The paper's case 1 and case 2."""
 
@@ -128,8 +124,9 @@ class ExposureImages:
                 "returns: a measurement no longer holds the scene's true temperatures"
             )
         self.exposure, self.kind = exposure, kind
-        blurred = lru_cache(1)(partial(_blurred, exposure)) if shares_blur else None
-        self._formed = lru_cache(8)(partial(_formed, exposure, blurred))
+        blurred = partial(blur, exposure.mean_radiance, spacing=exposure.raster.spacing)
+        kept = lru_cache(1)(blurred) if shares_blur else None
+        self._formed = lru_cache(8)(partial(_formed, exposure, kept))
         self._read = lru_cache(_KEPT)(partial(_read, self._formed, exposure.start))
         self._references: dict[tuple[object, ...], Array] = {}
 
@@ -137,13 +134,11 @@ class ExposureImages:
         """Return the temperature in K of pixels without error, by default of its kind."""
         kind = kind or self.kind
         key = kind, camera.pitch, camera.offset, camera.shape, camera.fill_factor
-        reference = self._references.get(key)
-        if reference is None:
+        if key not in self._references:
             if len(self._references) >= _KEPT:
                 self._references.clear()
-            reference = reference_temperature(camera, self.exposure, kind)
-            self._references[key] = reference
-        return reference
+            self._references[key] = reference_temperature(camera, self.exposure, kind)
+        return self._references[key]
 
     def radiance(self, camera: Camera) -> Array:
         """Return the radiance of a camera's pixels before its detector in W/(m² sr)."""
@@ -232,10 +227,6 @@ def _without_detector(camera: Camera) -> Camera:
     return replace(camera, detector=None) if camera.detector else camera
 
 
-def _blurred(exposure: Exposure, psf: PointSpreadFunction) -> Array:
-    return blur(exposure.mean_radiance, psf, exposure.raster.spacing)
-
-
 def _formed(
     exposure: Exposure, blurred: Callable[[PointSpreadFunction], Array] | None, camera: Camera
 ) -> Array:
@@ -248,8 +239,13 @@ def _formed(
 def _read(
     formed: Callable[[Camera], Array], start: float, camera: Camera
 ) -> tuple[Array, NDArray[np.bool_] | bool]:
-    """Return measured temperatures, and which pixels the detector marks as unusable."""
-    radiance = formed(_without_detector(camera))
+    return read_temperature(camera, formed(_without_detector(camera)), start)
+
+
+def read_temperature(
+    camera: Camera, radiance: Array, start: float
+) -> tuple[Array, NDArray[np.bool_] | bool]:
+    """Return measured temperatures in K, and which pixels the detector marks as unusable."""
     read, flags = camera.read(radiance[None], np.array([start]))
     kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
     return kelvins, False if flags is None else flags[0] & UNUSABLE != 0

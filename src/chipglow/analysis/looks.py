@@ -66,8 +66,7 @@ class Schedule:
 
     def reading(self, view: int, place: str, quantity: str) -> str:
         """Return the name of a reading."""
-        found = self.headlines.get((place, quantity))
-        return found or self.named(view, f"{place}, {quantity}")
+        return self.headlines.get((place, quantity)) or self.named(view, f"{place}, {quantity}")
 
     @property
     def varied_phases(self) -> tuple[int, ...]:
@@ -264,7 +263,6 @@ def look(
                 stack = images.stack(camera.redrawn(number), schedule.effects)
                 looked.shown[name] = images.exposure, stack[1:]
         if i in schedule.drawn:
-            drawn = schedule.drawn.index(i)
-            looked.draw(drawn, exposures, cameras, share_from(begun + share))
+            looked.draw(schedule.drawn.index(i), exposures, cameras, share_from(begun + share))
     progress(1.0)
     return looked

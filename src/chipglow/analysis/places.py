@@ -19,6 +19,9 @@ _EXTREMES: Final = ("mean", "most negative", "greatest")
 LINE_REACH, LINE_STEP = 60e-6, 1e-6
 """Reach of the lines across rake face and shear band to either side, and their points' distance."""
 
+_ACROSS: Final = LINE_STEP * np.arange(-60.0, 61.0)
+"""Distances of the points of such a line in m."""
+
 TOUCHING: Final = 3e-6
 """Distance from the rake face in m within which material touches it: half the paper's pixel."""
 
@@ -172,8 +175,6 @@ class RakePlace(Place):
 
     tool: Tool
     contact_length: float
-    half_length: float = LINE_REACH
-    step: float = LINE_STEP
     quantities: ClassVar = (
         "mid-contact",
         "most negative within two pixels",
@@ -183,22 +184,20 @@ class RakePlace(Place):
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
         length = self.contact_length
-        along = np.linspace(0.0, length, max(round(length / self.step) + 1, 2))
-        distance = _to_both_sides(self.half_length, self.step)
+        along = np.linspace(0.0, length, max(round(length / LINE_STEP) + 1, 2))
         middle = self.tool.rake_point(length / 2)
         return {
-            "rake": straight_line(middle, self.tool.rake_normal, distance),
+            "rake": straight_line(middle, self.tool.rake_normal, _ACROSS),
             "contact": Line(along, self.tool.rake_point(along)),
         }
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         across, contact = lines["rake"], lines["contact"]
-        distance = _to_both_sides(self.half_length, self.step)
         reference = _mean(contact[0])
         errors = [_mean(measured - contact[0]) for measured in contact[1:]]
-        lowest = _lowest_near(distance, across[1] - across[0], pixels.spacing)
+        lowest = _lowest_near(_ACROSS, across[1] - across[0], pixels.spacing)
         along = reference + np.array([0.0, *errors])
-        return np.stack([across[:, np.argmin(np.abs(distance))], across[:, lowest], along])
+        return np.stack([across[:, np.argmin(np.abs(_ACROSS))], across[:, lowest], along])
 
     def outline(self) -> NDArray[np.float64]:
         return np.asarray(self.tool.rake_point(np.array([0.0, self.contact_length])))
@@ -209,8 +208,6 @@ class BandPlace(Place):
     """The shear band, read on a line across its centre."""
 
     band: ShearBand
-    half_length: float = LINE_REACH
-    step: float = LINE_STEP
     quantities: ClassVar = (
         "ridge of strain rate",
         "ridge of measured temperature",
@@ -218,11 +215,11 @@ class BandPlace(Place):
     )
 
     def lines(self, pitch: float) -> Mapping[str, Line]:
-        return {"band": self.band.across(self.half_length, self.step)}
+        return {"band": self.band.across(LINE_REACH, LINE_STEP)}
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         across = lines["band"]
-        distance = self.band.across(self.half_length, self.step).distance
+        distance = self.band.across(LINE_REACH, LINE_STEP).distance
         # A camera shows no strain rate: the hottest is the centre for who has the image alone.
         hottest = _lowest_near(distance, -across[1], pixels.spacing)
         lowest = _lowest_near(distance, across[1] - across[0], inf)
@@ -238,11 +235,6 @@ def polyline(corners: NDArray[np.float64], pitch: float) -> Line:
     distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
     points = [np.interp(distance, along, coordinate) for coordinate in corners.T]
     return Line(distance, np.stack(points, axis=1))
-
-
-def _to_both_sides(half_length: float, step: float) -> NDArray[np.float64]:
-    count = round(half_length / step)
-    return step * np.arange(-count, count + 1, dtype=np.float64)
 
 
 def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> int:

@@ -66,15 +66,7 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
         return None
     one = data[["reference", "measured", "true", "corrected"]].sel(reading=reading)
     one = one.isel(texture=slice(int(one.textures)))
-    measured = one.measured.sel(effects=ALL, drop=True)
-    arrays = (
-        one.reference,
-        error(one),
-        psf_portion(one),
-        measured - one.true,
-        one.corrected - one.true,
-    )
-    values = [array.transpose(*_DRAWS).values for array in arrays]
+    values = [array.transpose(*_DRAWS).values for array in (one.reference, *_errors(one))]
     if not np.isfinite(values).all():
         return None
     causes = (str(data.exposure.attrs["title"]), "texture", PIXEL_PHASE)
@@ -87,6 +79,12 @@ def headline(data: xr.Dataset, reading: str) -> Headline | None:
     )
 
 
+def _errors(one: xr.Dataset) -> tuple[xr.DataArray, ...]:
+    """Return error, the PSF's portion, true error and corrected error of readings."""
+    measured = one.measured.sel(effects=ALL, drop=True)
+    return error(one), psf_portion(one), measured - one.true, one.corrected - one.true
+
+
 def headlines(data: xr.Dataset) -> dict[str, Headline]:
     """Return all readings that are finite in every draw."""
     every = {str(name): headline(data, str(name)) for name in data.reading.values}
@@ -96,9 +94,7 @@ def headlines(data: xr.Dataset) -> dict[str, Headline]:
 def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
     """Return a reading of the first exposure, texture and pixel phase."""
     one = data.sel(reading=reading).isel(dict.fromkeys(_DRAWS, 0))
-    measured = one.measured.sel(effects=ALL)
-    values = error(one), psf_portion(one), measured - one.true, one.corrected - one.true
-    return OneDraw(*map(float, values))
+    return OneDraw(*map(float, _errors(one)))
 
 
 def line_error(data: xr.Dataset, line: str) -> xr.DataArray:

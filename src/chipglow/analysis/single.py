@@ -100,11 +100,10 @@ class SingleReadings:
             for n, i, p in places
             for quantity in p.quantities
         }
-        if unknown := [
-            one for one in at if one not in every and one not in {p.name for *_, p in places}
-        ]:
-            known = "; ".join(dict.fromkeys([*(p.name for *_, p in places), *every]))
-            raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {known}")
+        known = dict.fromkeys([*(p.name for *_, p in places), *every])
+        if unknown := [one for one in at if one not in known]:
+            names = "; ".join(known)
+            raise ValueError(f"{unknown[0]}: no such place or reading, expected one of {names}")
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
         self.names, self.places = tuple(kept), tuple(key[2] for key in kept.values())
         self._raster = scene.raster
@@ -208,10 +207,8 @@ class SingleReadings:
                 one = replace(one, scene=_cropped(frames, scene, part))
                 moved = _on_grid(camera, scene.raster, one)
                 alone = moved.expose(one.scene, surfaces[view.surface], start)
-                pixels, image = (
-                    moved.pixels(one.scene.raster),
-                    ExposureImages(alone).radiance(moved),
-                )
+                pixels = moved.pixels(one.scene.raster)
+                image = ExposureImages(alone).radiance(moved)
                 light = nearest(whole[view.surface], camera.pixels(scene.raster), pixels.centres)
                 one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
             windows.append(one)

@@ -128,7 +128,6 @@ def band_with(
         return StraightBand(float(width), float(rise), float(sweep), beside)
 
     def differences(logs: Array) -> Array:
-        read = read_straight_band(camera, emissivity, band(logs))
-        return np.asarray((read - wanted) / spread)
+        return np.asarray((read_straight_band(camera, emissivity, band(logs)) - wanted) / spread)
 
     return band(least_squares(differences, np.log(_STARTS), diff_step=1e-3).x)

@@ -274,8 +274,7 @@ def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
     parts = "misregistration_K", "noise_K", "emissivity_uncertainty_K"
     squares = (error**2).mean("draw") + sum(table[name] ** 2 for name in parts)
     frame = table.assign(total_K=np.sqrt(squares)).to_dataframe().reset_index()
-    columns = ["place", "first_um", "second_um", *map(str, table.data_vars), "total_K"]
-    return frame[columns]
+    return frame[["place", "first_um", "second_um", *map(str, table.data_vars), "total_K"]]
 
 
 def cut_spots(
@@ -332,15 +331,11 @@ def _draws(
         delayed = expose(scene, views, spot.start + plan.delay, duration)
         late = [ExposureImages(one, shares_blur=True) for one in delayed]
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
-    pixels = [
-        np.transpose(
-            [
-                _of_pixel(phase, seen, later, centre, plan.misregistration)
-                for phase, centre in zip(pixel_phases(camera, phases), centres, strict=True)
-            ]
-        )
-        for camera, seen, later in zip(cameras, images, late, strict=True)
-    ]
+    pixels = []
+    for camera, seen, later in zip(cameras, images, late, strict=True):
+        moved = zip(pixel_phases(camera, phases), centres, strict=True)
+        read = [_of_pixel(one, seen, later, at, plan.misregistration) for one, at in moved]
+        pixels.append(np.transpose(read))
     part, window = around(scene.raster, centres)
     at_centres = partial(sample, raster=window, points=centres)  # linear between the samples
     local = [np.stack([one.centre_radiance[part], one.mean_radiance[part]]) for one in exposures]

@@ -36,15 +36,11 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
     _check_installed()
     import panel as pn
 
-    from chipglow.app.opening import open_any, open_scene_object
+    from chipglow.app.opening import open_any
     from chipglow.app.view import View
-    from chipglow.scene import Scene
 
     pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
-    if isinstance(scene, Scene):
-        view = View(open_scene_object(scene, study, "scene"), embedded=True)
-    else:
-        view = View(open_any(scene, study), embedded=True)
+    view = View(open_any(scene, study), embedded=True)
     view.start(None)
     return view.page
 

@@ -333,8 +333,7 @@ class Controls:
 
 def shown_study(study: Study, start: float) -> ShownStudy:
     """Return a study with the exposure that is shown."""
-    given = {name: getattr(study, name) for name in study.given}
-    return ShownStudy(**given, start=start)
+    return ShownStudy(**{name: getattr(study, name) for name in study.given}, start=start)
 
 
 def _word(row: Control, texts: Texts) -> str:
@@ -373,25 +372,21 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
     scene_images = {
         name: label for name, (label, _, needed) in SCENE_IMAGES.items() if needed in scene.fields
     }
-    orders = {"detector": "Blur on the pixels", "optics": "Blur on the scene"}
     words = {
         "scene_image": scene_images,
         "error_image": ERROR_IMAGES,
         "analysis.reference": _REFERENCES,
-        "camera.psf_order": orders,
+        "camera.psf_order": {"detector": "Blur on the pixels", "optics": "Blur on the scene"},
     }
-    return {
-        **{
-            path: _first(
-                value_at(study, path),
-                {word: Option(label, {path: word}) for word, label in labels.items()},
-            )
-            for path, labels in words.items()
-        },
+    options = {
         "camera.psf": _first("none" if psf is None else psf.kind, psfs),
         "camera.detector": _first(AS_STUDY if camera.detector else "none", detectors),
         "surface": _surfaces(study),
     }
+    for path, labels in words.items():
+        every = {word: Option(label, {path: word}) for word, label in labels.items()}
+        options[path] = _first(value_at(study, path), every)
+    return options
 
 
 def _first(word: str, options: dict[str, Option]) -> dict[str, Option]:
@@ -407,24 +402,16 @@ def _surfaces(study: Study) -> dict[str, Option]:
     if not isinstance(section, FeaturesSection):
         return _first(section.kind, uniform | {section.kind: Option(section.kind.capitalize())})
     kinds = {kind: getattr(section, kind) for kind in ("chips", "maps", "measured")}
-    surfaces = {
-        name: unchecked(
-            section,
-            **{
-                kind: {key: one for key, one in of_kind.items() if key == name}
-                for kind, of_kind in kinds.items()
-            },
-        )
-        for name in surface_names(section)
-    }
+    surfaces = {}
+    for name in surface_names(section):
+        alone = {kind: {name: one[name]} if name in one else {} for kind, one in kinds.items()}
+        surfaces[name] = unchecked(section, **alone)
     surfaces[OWN] = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
-    return {
-        name: Option(
-            name.capitalize(),
-            {"surface": surface, "analysis.rake_chip": name, "analysis.band_chip": name},
-        )
-        for name, surface in surfaces.items()
-    } | uniform
+    options = {}
+    for name, surface in surfaces.items():
+        changes = {"surface": surface, "analysis.rake_chip": name, "analysis.band_chip": name}
+        options[name] = Option(name.capitalize(), changes)
+    return options | uniform
 
 
 def _starts(scene: Scene, duration: float) -> Iterator[float]:

@@ -55,6 +55,5 @@ def chip_picture(scene: Scene, colour: str) -> str:
     assert scene.overview is not None
     file = BytesIO()
     with style(), rc_context(dict.fromkeys(_COLOURED, colour)):
-        figure = draw_chip(scene.overview, scene.raster, scene.tool)
-        figure.savefig(file, dpi=110, transparent=True)
+        draw_chip(scene.overview, scene.raster, scene.tool).savefig(file, dpi=110, transparent=True)
     return data_url(file.getvalue())

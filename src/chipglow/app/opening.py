@@ -60,10 +60,12 @@ def measurement_model(measurement: Measurement, name: str) -> MeasurementModel:
     return MeasurementModel(name, measurement, controls)
 
 
-def open_any(path: str | Path | None, study: Study | None = None) -> Model:
+def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Model:
     """Open a scene, a measurement or a folder of results; without a path the bundled scene."""
     if path is None:
         return open_scene_object(example_scene(), study, "bundled scene")
+    if isinstance(path, Scene):
+        return open_scene_object(path, study, "scene")
     path = Path(path)
     if path.is_dir():
         return _results(path)
@@ -127,8 +129,7 @@ def _results(folder: Path) -> SceneModel:
             f"{folder}: the scene of its study is not in the cache; repeat "
             f"chipglow run {file} --out {folder}, or open a scene file"
         )
-    scene = open_scene(study.scene or cut(study))
-    return scene_model(scene, study, folder.name, study.scene)
+    return scene_model(open_scene(study.scene or cut(study)), study, folder.name, study.scene)
 
 
 def _with_places(study: Study, raster: Raster, *places: _Points) -> Study:
@@ -155,8 +156,7 @@ def _developed(scene: Scene, duration: float, count: int) -> Segment | None:
     heat = {i: one.temperatures[one.band.middle] for i, one in enumerate(instants) if one.band}
     if not heat:
         return None
-    hottest = instants[max(heat, key=lambda i: heat[i])]
-    segment = Segment.of(scene, hottest, duration, TOUCHING)
+    segment = Segment.of(scene, instants[max(heat, key=heat.__getitem__)], duration, TOUCHING)
     return segment if segment.contact_length > 0 else None
 
 

@@ -73,11 +73,6 @@ class Picture:
         limit = self.camera.lower_limit if self.camera else None
         return None if limit is None else limit - KELVIN
 
-    @property
-    def is_blank(self) -> bool:
-        """Whether every pixel is flagged."""
-        return bool(self.data["flagged"].all())
-
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
@@ -101,25 +96,22 @@ class SceneModel:
         init=False, default_factory=lambda: defaultdict(dict)
     )
 
-    @property
-    def has_quick_look(self) -> bool:
-        return self.coarse is not None
-
     def is_ready(self, state: State) -> bool:
-        """Return whether the exact picture takes milliseconds."""
+        """Return whether the exact picture needs no quick look, as it takes milliseconds."""
+        if self.coarse is None:
+            return True
         key, camera = self._exposure_key(state), state.study.camera
         kind = camera.psf.kind if camera.psf else ""
         # A quick look at pixels hardly larger than the coarse samples takes half as long.
-        spacing = self.coarse.raster.spacing if self.coarse else 0.0
         on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
-        is_slow = on_samples or camera.pitch < 1.5 * spacing
+        is_slow = on_samples or camera.pitch < 1.5 * self.coarse.raster.spacing
         exact = key, self._camera(state, self.scene), False
         is_known = exact in self._caches["errors"]
         return key in self._caches["exposure"] and (is_known or not is_slow)
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return images and lines at a state; `check` is called meanwhile and may raise."""
-        quick = quick and self.has_quick_look
+        quick = quick and self.coarse is not None
         scene, surface = self._on(state, quick)
         camera, shown = self._camera(state, scene, quick), state.study.error_image
         images, untextured = self._exposed(scene, surface, camera, state, quick, check)
@@ -320,8 +312,7 @@ class SceneModel:
             _, surface = self._on(state, quick=False)
             return self._camera(state, scene).prepare(surface, scene).emissivity(scene.frame(index))
         if name == "radiance_temperature":
-            places = scene.raster.centres
-            radiance = nearest(exposure.centre_radiance, exposure.raster, places)
+            radiance = nearest(exposure.centre_radiance, exposure.raster, scene.raster.centres)
             return np.asarray(self._camera(state, scene).band.temperature(radiance))
         return scene.field(name, index)
 
@@ -333,10 +324,7 @@ class MeasurementModel:
     name: str
     measurement: Measurement
     controls: Controls
-    has_quick_look: ClassVar = False
-
-    def is_ready(self, state: State) -> bool:
-        return True
+    coarse: ClassVar[None] = None
 
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
@@ -348,8 +336,7 @@ class MeasurementModel:
         }
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
         panels, lines = {"measured": _measured_panel(data, raster)}, _lines(state, raster, data)
-        crossings = _crossings(state, measurement.tool)
-        return Picture(state, raster, data, panels, lines, crossings)
+        return Picture(state, raster, data, panels, lines, _crossings(state, measurement.tool))
 
     def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
         """Return nothing: the true temperature of a measurement is not known."""

@@ -56,13 +56,12 @@ class App:
         auth = TokenAuth()
         everywhere = address == "0.0.0.0"
         names = _own_names() if everywhere else {address, LOCAL, "localhost"}
-        origins = tuple(f"{name}:{port}" for name in sorted(names))
         self.url = f"http://{LOCAL if everywhere else address}:{port}/?{TOKEN}={auth.token}"
         self.server = pn.io.server.get_server(
             {"/": self._page},
             port=port,
             address=address,
-            websocket_origin=list(origins),
+            websocket_origin=[f"{name}:{port}" for name in sorted(names)],
             title="chipglow",
             location=False,
             auth_provider=auth,

@@ -147,7 +147,7 @@ class Session:
     def _picture(self, state: State) -> None:
         """Send a picture at once, so that it follows a moving control, then the exact one."""
         work, model = self._pictures, self.model
-        if model.has_quick_look and not model.is_ready(state):
+        if isinstance(model, SceneModel) and not model.is_ready(state):
             self._send(model.picture(state, quick=True))
             work.pause(PAUSE)
             picture = model.picture(state, check=work.check)
@@ -157,7 +157,7 @@ class Session:
             picture = model.picture(state)
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
-            work.pause(PAUSE if model.has_quick_look else 0.0)
+            work.pause(PAUSE if model.coarse else 0.0)
         numbers = model.numbers(picture)
         self._notify("numbers", picture, numbers, {})
         if contributions := model.contributions(picture, work.check):

@@ -239,7 +239,7 @@ class View:
             )
         if self._refused:
             return self._refused, "error"
-        if picture.is_blank:
+        if picture.data["flagged"].all():
             limit = picture.lower_limit
             above = "" if limit is None else f", which begins at {limit:.0f} °C"
             return f"No pixel is within the camera's range{above}.", "error"

@@ -117,8 +117,7 @@ def _print_fit(result: "BlackbodyCalibration", name: str) -> None:
         f"{calibration.highest - 273.15:.5g} °C"
     )
     parameters = result.parameter_frame().query("model == @name")
-    columns = ["parameter", "value ± standard_uncertainty", "unit"]
-    screen.table("parameters", parameters, columns)
+    screen.table("parameters", parameters, ["parameter", "value ± standard_uncertainty", "unit"])
     points = result.to_frame().query("model == @name")
     screen.table("blackbodies", points, list(points.columns.drop("model")))
     scatter = float((fit.residuals_temperature**2).mean() ** 0.5)

@@ -38,8 +38,7 @@ def examine() -> None:
     required = packages[packages["extra"] == ""]
     screen.table("packages", required, [*columns, "state"])
     screen.heading("\nOptional parts")
-    optional = packages[packages["extra"] != ""]
-    screen.table("optional", optional, ["extra", *columns, "advice"])
+    screen.table("optional", packages[packages["extra"] != ""], ["extra", *columns, "advice"])
     largest = max(map(_radiance_difference, _TEMPERATURES))
     screen.heading()
     screen.say(

@@ -120,6 +120,5 @@ def _print_table(analysis: Analysis, study: Study) -> None:
         "single frame (95 %)": "interval",
         **({"differs": "differs"} if compared else {}),
     }
-    frame = pd.DataFrame([[row.cells[name] for name in names.values()] for row in rows])
-    frame.columns = list(names)
-    current().table("results", frame)
+    cells = [{title: row.cells[name] for title, name in names.items()} for row in rows]
+    current().table("results", pd.DataFrame(cells))

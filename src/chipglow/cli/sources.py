@@ -140,8 +140,7 @@ def _say(looked: "Prospect") -> None:
         f"{survey.kind}: {times.size} frames, {times[0]:g} us to {times[-1]:g} us",
         {"kind": survey.kind, "frames": times.size, "from_us": times[0], "to_us": times[-1]},
     )
-    fields = pd.DataFrame(survey.found.items(), columns=["field", "from"])
-    screen.table("fields", fields)
+    screen.table("fields", pd.DataFrame(survey.found.items(), columns=["field", "from"]))
     if survey.unused:
         screen.say(f"Not used: {', '.join(survey.unused)}", {"unused": list(survey.unused)})
     left, right, bottom, top = (round(edge * 1e6, 6) + 0.0 for edge in raster.extent)

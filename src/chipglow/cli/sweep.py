@@ -160,13 +160,10 @@ def design(
 
 def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]") -> "pd.DataFrame":
     """Return the frame with the settings as text in their units."""
-    texts = {
-        path: [
-            quantity.text(value) if quantity and not isinstance(value, str) else str(value)
-            for value in frame[path]
-        ]
-        for path, quantity in quantities.items()
-    }
+    texts = {}
+    for path, quantity in quantities.items():
+        text = quantity.text if quantity else str
+        texts[path] = [value if isinstance(value, str) else text(value) for value in frame[path]]
     return frame.assign(**texts)
 
 

@@ -1,7 +1,7 @@
 """Style of figures: sizes, colours, images on micrometre axes."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import pairwise
@@ -55,9 +55,11 @@ def style() -> Any:
     return matplotlib.rc_context(_STYLE)
 
 
-def new_figure(height: float) -> Figure:
+def new_figure(
+    height: float, layout: Literal["constrained", "compressed"] = "constrained"
+) -> Figure:
     """Return an empty figure of the page's width and a height in inches."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Figure(figsize=(WIDTH, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -65,9 +67,7 @@ def new_figure(height: float) -> Figure:
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
     """Return an empty figure of the page's width for rows of images of a width in inches."""
     panel = panel_width * raster.rows / raster.columns
-    figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
-    FigureCanvasAgg(figure)
-    return figure
+    return new_figure(rows * (panel + 0.35) + 0.45, "compressed")
 
 
 def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
@@ -277,6 +277,18 @@ def draw_chip(overview: Scene, view: Raster, tool: Tool | None) -> Figure:
         draw_line(axes, view.border, GREEN, factor=factor)
         axes.label_outer()
     return figure
+
+
+def legend(
+    figure: Figure, columns: int, panels: Iterable[Axes] | None = None, title: str | None = None
+) -> None:
+    """Add one legend below all panels, or with the labels of some; each label once."""
+    handles: dict[str, Any] = {}
+    for axes in figure.axes if panels is None else panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    look: Any = {"loc": "outside lower center", "ncols": columns, "title": title}
+    figure.legend(handles.values(), handles.keys(), **look)
 
 
 def leave_out(axes: Axes, above: Axes | None, raster: Raster) -> None:

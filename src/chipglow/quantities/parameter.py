@@ -117,8 +117,7 @@ class Parameter:
             limits = (self.over, self.least, self.under, self.most)
             json |= {k: v for k, v in zip(names, limits, strict=True) if v is not None}
         if words:
-            allowed = [*words, None] if NONE in words else list(words)
-            json = {"anyOf": [json, {"enum": allowed}]}
+            json = {"anyOf": [json, {"enum": [*words, None] if NONE in words else list(words)}]}
         return json | {"description": self.meaning}
 
     @property

@@ -62,8 +62,7 @@ def own_settings(part: Part) -> Iterator[Setting]:
     for name in plain:
         value = getattr(part, name)
         if name not in part._annotations:
-            kind = Parameter(first_sentence(type(part)))
-            yield Setting(name, kind, str, value, value, value)
+            yield Setting(name, Parameter(first_sentence(type(part))), str, value, value, value)
             continue
         annotation, default = part._annotations[name], defaults.get(name)
         examples = next((family.examples for family in families(annotation)), "")

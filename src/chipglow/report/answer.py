@@ -1,6 +1,6 @@
 """The answer: the errors in sentences, each with its interval."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from math import isfinite
 from typing import Final, NamedTuple
@@ -9,7 +9,7 @@ from chipglow.analysis import Distribution
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
-from chipglow.report.rows import MAIN, Row, draws_text, slug, spread_text
+from chipglow.report.rows import Row, draws_text, main_readings, slug, spread_text
 
 _MAX_SENTENCES: Final = 3
 """Number of sentences; the tables hold all errors."""
@@ -31,7 +31,7 @@ def answer(facts: Facts, errors: Sequence[Row]) -> list[Statement]:
     The last one states the error against the true temperature at the first of these places.
     """
     rows = {row.key: row for row in errors}
-    names = list(islice(_main(facts), _MAX_SENTENCES))
+    names = list(islice(main_readings(facts), _MAX_SENTENCES))
     statements = [
         Statement(_sentence(facts, name, rows), rows[f"{slug(name)}_error_degC"].link)
         for name in names
@@ -40,16 +40,6 @@ def answer(facts: Facts, errors: Sequence[Row]) -> list[Statement]:
         link = rows[f"{slug(name)}_corrected_error_degC"].link
         statements.append(Statement(_of_true_temperature(facts, name), link))
     return statements
-
-
-def _main(facts: Facts) -> Iterator[str]:
-    """Yield the first error at every place with every surface; of a cut its main ones."""
-    places = set()
-    for name, found in facts.headlines.items():
-        place = (found.place, found.surface)
-        if name in MAIN if facts.analysis.cut is not None else place not in places:
-            places.add(place)
-            yield name
 
 
 def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
@@ -91,7 +81,7 @@ def changes(facts: Facts, errors: Sequence[Row]) -> list[str]:
     """Return a sentence for each main error: its largest part, and what would reduce it."""
     rows = {row.key: row for row in errors}
     sentences = []
-    for name in islice(_main(facts), _MAX_SENTENCES):
+    for name in islice(main_readings(facts), _MAX_SENTENCES):
         row = rows[f"{slug(name)}_error_degC"]
         if row.here is None or not row.parts:
             continue

@@ -100,7 +100,7 @@ def profiles(facts: Facts) -> Figure | None:
     data = facts.data
     if "effect" not in data.dims or "line" not in data.dims:
         return None
-    data = data.sel(exposure=_shown_start(data), method="nearest")
+    data = data.sel(exposure=data.instant.values[data.attrs["shown_instant"]], method="nearest")
     factor, unit = drawing.length_unit(facts.analysis.raster)
     figure = drawing.new_figure(2.9 * ((data.sizes["line"] + 1) // 2) + 0.6)
     grid = figure.subplots((data.sizes["line"] + 1) // 2, 2, squeeze=False).flat
@@ -113,17 +113,12 @@ def profiles(facts: Facts) -> Figure | None:
         axes.set_ylabel("contribution / K")
     for axes in list(grid):
         axes.remove()
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    drawing.legend(figure, 4, figure.axes[:1])
     return figure
 
 
 def _label(effect: str) -> str:
     return effect.replace("psf", "PSF")
-
-
-def _shown_start(data: xr.Dataset) -> float:
-    return float(data.instant.values[data.attrs["shown_instant"]])
 
 
 def _stack(axes: Axes, along: Array, values: Array, effects: list[str]) -> None:

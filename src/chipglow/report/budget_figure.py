@@ -31,11 +31,10 @@ def draw_budget(result: StudyBudget) -> Figure:
             positions = np.arange(len(part))
             colours = [colour_of[group] for group in part.group]
             panel.barh(positions, part.contribution_K, color=colours)
-            total = summary.standard_uncertainty_K[reading]
-            panel.barh(len(part), total, color="black")
+            one = summary.loc[reading]
+            panel.barh(len(part), one.standard_uncertainty_K, color="black")
             panel.set_yticks(range(len(part) + 1), [*map(_label, part.input), "all together"])
             panel.invert_yaxis()
-            one = summary.loc[reading]
             panel.set_title(
                 f"{reading}: error {_number(one.error_K)} K, 95 % of readings within "
                 f"{_number(one.low_K)} to {_number(one.high_K)} K"

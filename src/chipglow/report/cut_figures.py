@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import Analysis, Cut, HeatedObject
+from chipglow.analysis import Analysis, HeatedObject
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
@@ -27,7 +27,7 @@ _VOID, _SHEARED, _DARKEST = 0.28, (1.5, 5.0), 0.45
 
 def heated_chips(facts: Facts) -> Figure | None:
     """Draw the radiance temperature of isothermal chips, with the regions that are read."""
-    chips = [heated for heated in _cut(facts).heated if heated.regions]
+    chips = [heated for heated in facts.cut.heated if heated.regions]
     if not chips:
         return None
     figure = drawing.new_figure(2.6)
@@ -36,16 +36,16 @@ def heated_chips(facts: Facts) -> Figure | None:
         _draw_heated(figure, axes, heated)
         truth = heated.map.heating.reference - KELVIN
         axes.set_title(f"{letter}) {heated.name}, at {truth:.0f} °C")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    drawing.legend(figure, 2)
     return figure
 
 
 def heated_tool(facts: Facts) -> Figure | None:
     """Draw the radiance temperature of an isothermal tool, and its emissivity."""
-    tools = [heated for heated in _cut(facts).heated if not heated.regions]
+    tools = [heated for heated in facts.cut.heated if not heated.regions]
     if not tools:
         return None
-    found, raster, tool = tools[0], tools[0].map.raster, _cut(facts).segments[0].tool
+    found, raster, tool = tools[0], tools[0].map.raster, facts.cut.segments[0].tool
     figure = drawing.new_figure(2.9)
     left, right = figure.subplots(1, 2)
     _draw_heated(figure, left, found)
@@ -87,8 +87,7 @@ def rake_profiles(facts: Facts) -> Figure | None:
             )
         axes.set(title=name, xlabel="distance along the rake face / µm")
     panels[0].set_ylabel("radiance temperature / °C")
-    handles = panels[0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", ncols=5, title="depth")
+    drawing.legend(figure, 5, panels[:1], "depth")
     return figure
 
 
@@ -106,7 +105,7 @@ def rake_grids(analysis: Analysis) -> dict[str, RakeGrid]:
 
 def dual_spectrum(facts: Facts) -> Figure:
     """Draw a grey picture and the infrared image of the same moments."""
-    analysis, cut = facts.analysis, _cut(facts)
+    analysis, cut = facts.analysis, facts.cut
     name, tool, rows = analysis.data.attrs["band_surface"], cut.segments[0].tool, len(cut.moments)
     images = analysis.data.radiance_temperature.sel(surface=name).values - KELVIN
     starts = analysis.data.instant.values[: facts.starts]
@@ -152,14 +151,13 @@ def band_curves(facts: Facts) -> Figure:
             axes.axhline(limit, color=GREY, linestyle="--", linewidth=1.0)
         axes.set(title=name, xlabel="distance along the band / µm")
     panels[0].set_ylabel("radiance temperature / °C")
-    handles = panels[0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", ncols=6, title="time")
+    drawing.legend(figure, 6, panels[:1], "time")
     return figure
 
 
 def chip(facts: Facts) -> Figure | None:
     """Draw the whole chip at the end of the cut, with the view of the scene."""
-    overview, tool = _cut(facts).overview, facts.analysis.tool
+    overview, tool = facts.cut.overview, facts.analysis.tool
     return None if overview is None else drawing.draw_chip(overview, facts.analysis.raster, tool)
 
 
@@ -178,9 +176,7 @@ def bands(facts: Facts) -> Figure | None:
     panels[0].plot(*ours.T, "o", color="black", label="segments of this study")
     panels[1].plot(1e6 * found.width, found.rise, "D", color="black", label="the paper's numbers")
     panels[0].set_ylabel("rise over the sides / K")
-    shown = [axes.get_legend_handles_labels() for axes in panels]
-    handles = {label: handle for each in shown for handle, label in zip(*each, strict=True)}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    drawing.legend(figure, 3)
     return figure
 
 
@@ -197,9 +193,8 @@ def _draw_chart(axes: Axes, chart: xr.Dataset) -> None:
         scales_of.items(), paper.BAND_KEYS, titles, (BLUE, VERMILLION, GREEN), strict=True
     ):
         value = paper.PAPER[key].value
-        level = [scale * value]
         thick: Any = {"colors": colour, "linewidths": 1.8, "linestyles": "solid"}
-        axes.contour(width, rise, chart[name].T, levels=level, **thick)
+        axes.contour(width, rise, chart[name].T, levels=[scale * value], **thick)
         unit = "%" if scale < 1 else "K"
         axes.plot([], [], color=colour, label=f"paper: {title} {value:g} {unit}".replace("-", "−"))
     axes.set_xscale("log")
@@ -209,7 +204,7 @@ def _draw_chart(axes: Axes, chart: xr.Dataset) -> None:
 
 def forces(facts: Facts) -> Figure | None:
     """Draw the force history with its segments."""
-    known = _cut(facts).forces
+    known = facts.cut.forces
     if known is None:
         return None
     history, time = known.history, known.history.time * 1e6
@@ -237,7 +232,7 @@ def forces(facts: Facts) -> Figure | None:
 
 def chip_thickness(facts: Facts) -> Figure | None:
     """Draw where the thickness of the chip is read, and its course over time."""
-    cut, raster, frame = _cut(facts), facts.analysis.raster, facts.analysis.frame
+    cut, raster, frame = facts.cut, facts.analysis.raster, facts.analysis.frame
     if cut.chip is None or not np.isfinite(cut.chip.scan.height):
         return None
     scan, tool = cut.chip.scan, cut.segments[0].tool
@@ -268,16 +263,10 @@ def chip_thickness(facts: Facts) -> Figure | None:
     return figure
 
 
-def _cut(facts: Facts) -> Cut:
-    assert facts.analysis.cut is not None
-    return facts.analysis.cut
-
-
 def _draw_heated(figure: Figure, axes: Axes, heated: HeatedObject) -> None:
     temperature, raster = heated.map.radiance_temperature - KELVIN, heated.map.raster
     low, high = scales.ends(temperature[heated.map.emissivity > 0.1], 1.0, 99.9)
-    limits = (low - 10.0, high)
-    picture = drawing.show_image(axes, temperature, raster, None, scales.HEAT, limits)
+    picture = drawing.show_image(axes, temperature, raster, None, scales.HEAT, (low - 10.0, high))
     drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
     for colour, region in zip(_COLOURS, heated.regions, strict=False):
         outline = region.outline(raster)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import (
     Analysis,
+    Cut,
     Headline,
     StraightBand,
     band_chart,
@@ -43,8 +44,7 @@ class Facts:
     def __init__(self, analysis: Analysis, study: Any = None) -> None:
         self.analysis, self.data = analysis, analysis.data
         self.study = study
-        is_papers = study is not None and study.is_papers
-        self.is_compared = analysis.cut is not None and is_papers
+        self.is_compared = analysis.cut is not None and study is not None and study.is_papers
         cut, names = analysis.cut, list(analysis.measurements)
         self.starts = len(cut.one_segment) if cut else self.data.sizes["instant"]
         seen = self.data.seen_surface.values
@@ -64,6 +64,7 @@ class Facts:
             "camera": camera,
             "cause": data.exposure.attrs["title"],
             "chip": cut.chip if cut else None,
+            "contact_reaches_border": self.contact_reaches_border,
             "cut": cut,
             "data": data,
             "exposure": time_text(camera.integration_time),
@@ -71,6 +72,7 @@ class Facts:
             "forces": cut.forces if cut else None,
             "image_error": image_error(data),
             "is_compared": self.is_compared,
+            "largest_cause": self.largest_cause,
             "line_change": partial(line_change, data),
             "line_error": partial(line_error, data),
             "line_steepest": partial(line_steepest, data),
@@ -79,36 +81,33 @@ class Facts:
             "pitch": camera.pitch,
             "plan": analysis.plan,
             "psf": camera.psf,
+            "psf_fractions": self.psf_fractions,
             "scene_fields": [name for name in SCENE_FIELDS if name in data],
+            "series": self.series,
             "shown": data.isel(instant=data.attrs["shown_instant"]),
             "starts": self.starts,
             "surfaces": list(data.surface.values),
             "time": time_text(analysis.frame.time, ".4g"),
             "widths": data.psf_width.values if "psf_width" in data else (),
         }
-        functions = (
-            self.series,
-            self.largest_cause,
-            self.psf_fractions,
-            self.contact_reaches_border,
-        )
-        values |= {function.__name__: function for function in functions}
-        definition = template(texts()["definition"]).render(values)
-        return {**values, "definition": definition}
+        return {**values, "definition": template(texts()["definition"]).render(values)}
+
+    @property
+    def cut(self) -> Cut:
+        """The cut, for what is shown of a cut only."""
+        assert self.analysis.cut is not None
+        return self.analysis.cut
 
     @cached_property
     def bands(self) -> tuple[StraightBand, ...]:
         """Straight bands closest to those of the segments; no unknown ones."""
-        assert self.analysis.cut is not None
-        raster, segments = self.analysis.raster, self.analysis.cut.segments
-        known = [segment for segment in segments if np.isfinite(segment.sweep)]
-        return tuple(StraightBand.of(segment, raster) for segment in known)
+        known = [segment for segment in self.cut.segments if np.isfinite(segment.sweep)]
+        return tuple(StraightBand.of(segment, self.analysis.raster) for segment in known)
 
     @cached_property
     def band_emissivity(self) -> float:
         """Mean emissivity along the middle half of the shown shear band."""
-        assert self.analysis.cut is not None
-        band, surface = self.analysis.cut.band, self.data.attrs["band_surface"]
+        band, surface = self.cut.band, self.data.attrs["band_surface"]
         points = band.ridge.points[band.middle_half]
         image = self.data.emissivity.sel(surface=surface).values
         return float(np.nanmean(sample(image, self.analysis.raster, points)))
@@ -151,20 +150,20 @@ class Facts:
         analysis, camera = self.analysis, self.analysis.camera
         pixels, psf, limit = camera.pixels(analysis.raster), camera.psf, camera.lower_limit
         spectral = f"{1e6 * camera.band.lower:.4g} to {1e6 * camera.band.upper:.4g} µm"
-        blur = "none" if psf is None else f"{psf}, {1e6 * psf.fwhm:.3g} µm wide at half maximum"
         applied = {"detector": "on the pixel image", "optics": "before the pixels integrate"}
+        order, blur = applied[camera.psf_order], "none"
+        if psf is not None:
+            blur = f"{psf}, {1e6 * psf.fwhm:.3g} µm wide at half maximum, {order}"
         bits = camera.detector.bits if camera.detector else None
         lowest = "no lower limit" if limit is None else f"from {limit - KELVIN:.0f} °C"
-        calibration = camera.calibration((pixels.rows, pixels.columns))
+        calibration = camera.calibration(pixels.shape)
         highest = f" to {calibration.full_temperature - KELVIN:.0f} °C" if calibration else ""
         reflected = camera.reflected
         settings = {
             "Spectral band": spectral,
             "Pixels": f"{pixels.columns} × {pixels.rows}, {1e6 * camera.pitch:.4g} µm on the scene",
             "Exposure": f"{time_text(camera.integration_time)} at {camera.frame_rate:.6g} Hz",
-            "Point spread function": blur
-            if psf is None
-            else f"{blur}, {applied[camera.psf_order]}",
+            "Point spread function": blur,
             "Range": f"{lowest}{highest}",
             "Reflected temperature": (
                 "none" if reflected is None else f"{reflected - KELVIN:.0f} °C"
@@ -206,10 +205,8 @@ class Facts:
         if "psf_width" not in self.data or reading not in self.data.reading:
             return None
         order = self.analysis.camera.psf_order
-        if unit == "%":
-            values = 100 * sensitivity_psf_fraction(self.data, order, reading)
-        else:
-            values = sensitivity_error(self.data, order, reading)
+        one = self.data, order, reading
+        values = 100 * sensitivity_psf_fraction(*one) if unit == "%" else sensitivity_error(*one)
         return values if np.isfinite(values).all() else None
 
     def largest_cause(self, reading: str) -> tuple[str, float]:
@@ -233,8 +230,7 @@ class Facts:
 
     def contact_reaches_border(self) -> bool:
         """Return whether the contact ends at the border of the view."""
-        cut, raster = self.analysis.cut, self.analysis.raster
-        assert cut is not None
+        cut, raster = self.cut, self.analysis.raster
         x, y = cut.segments[0].tool.rake_point(cut.segments[0].contact_length)
         left, _, _, top = raster.extent
         return bool(y > top - 3 * raster.spacing or x < left + 3 * raster.spacing)

@@ -1,7 +1,7 @@
 """Figures of any analysis: scene, measurement, errors as images, along lines and over time."""
 
-from collections.abc import Callable, Iterable
-from itertools import cycle, groupby
+from collections.abc import Callable
+from itertools import cycle
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -19,13 +19,12 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
-from chipglow.analysis.reductions import Headline
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER
-from chipglow.report.rows import MAIN
+from chipglow.report.rows import MAIN, main_readings
 from chipglow.scene import Material
 
 Array = NDArray[Any]
@@ -182,40 +181,34 @@ def error_lines(facts: Facts) -> Figure | None:
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
             axes.set_xlabel(_LINE_LABELS.get(name, f"distance / {unit}"))
-    _legend(figure, rows.T.flat, columns=3)
+    drawing.legend(figure, 3, rows.T.flat)
     return figure
 
 
 def over_time(facts: Facts) -> Figure | None:
     """Draw the error at the first reading of every place over the exposures."""
     starts = facts.data.exposure.values
-    if len(starts) < 2:
+    readings = [facts.headlines[name] for name in main_readings(facts)]
+    if len(starts) < 2 or not readings:
         return None
-    first: dict[tuple[str, str], tuple[str, Headline]] = {}
-    for name, found in facts.headlines.items():
-        if facts.analysis.cut is None or name in MAIN:
-            key = (found.surface, found.place if facts.analysis.cut is None else name)
-            first.setdefault(key, (f"{found.place}: {found.quantity}", found))
-    surfaces = {key: list(rows) for key, rows in groupby(sorted(first), lambda key: key[0])}
-    if not surfaces:
-        return None
+    surfaces = sorted({found.surface for found in readings})
+    coloured = list(zip(readings, cycle(scales.COLOURS)))
     figure = drawing.new_figure(3.4)
     panels = figure.subplots(1, len(surfaces), sharex=True, sharey=True, squeeze=False)[0]
     factor, unit = drawing.time_unit(float(starts[-1]))
-    colours = dict(zip(first, cycle(scales.COLOURS)))
-    for axes, (surface, keys) in zip(panels, surfaces.items(), strict=True):
-        for key in [one for one in first if one in keys][:_MAX_CURVES]:
-            label, found = first[key]
+    for axes, surface in zip(panels, surfaces, strict=True):
+        curves = [(found, colour) for found, colour in coloured if found.surface == surface]
+        for found, colour in curves[:_MAX_CURVES]:
             values = found.error.values.reshape(len(starts), -1)
-            bars: Any = {"marker": "o", "markersize": 3, "capsize": 2, "label": label}
-            bars["color"] = colours[key]
+            bars: Any = {"marker": "o", "markersize": 3, "capsize": 2, "color": colour}
+            bars["label"] = f"{found.place}: {found.quantity}"
             axes.errorbar(starts * factor, values.mean(axis=1), values.std(axis=1), **bars)
         axes.axhline(0.0, color=GREY, linewidth=0.6)
         axes.set(
             title=of_surface(facts, "error", surface), xlabel=f"start of the exposure / {unit}"
         )
     panels[0].set_ylabel("error / K")
-    _legend(figure, list(panels), columns=2)
+    drawing.legend(figure, 2)
     return figure
 
 
@@ -250,7 +243,7 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
             axes.set(title=place, ylabel=f"{title} / {'%' if scale == 100 else 'K'}")
     for axes in grid[-1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
-    _legend(figure, grid.flat, columns=2)
+    drawing.legend(figure, 2)
     return figure
 
 
@@ -299,12 +292,3 @@ def _draw_published(axes: Axes, line: str) -> None:
 def _draw_point(axes: Axes, at: float, value: float, colour: str, label: str) -> None:
     look: Any = {"marker": "D", "markersize": 6, "markeredgecolor": "black", "linestyle": "none"}
     axes.plot(at, value, color=colour, label=label, **look)
-
-
-def _legend(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
-    """Add one legend below all panels, each label once."""
-    handles: dict[str, Any] = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)

@@ -24,8 +24,7 @@ def material_figure(material: MaterialFile) -> Figure:
     count = len(sets)
     with style():
         figure = new_figure(2.6 * (count + 1))
-        halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(count, 1))
-        above, below = halves[:, 0]
+        (above,), (below,) = figure.subfigures(2, 1, squeeze=False, height_ratios=(count, 1))
         panels = above.subplots(count, squeeze=False)[:, 0]
         for axes, (name, workpiece) in zip(panels, sets.items(), strict=True):
             _flow_stress_panel(axes, name, workpiece)

@@ -115,11 +115,10 @@ def exposure_player(facts: Facts) -> Player:
     """Return the images of an analysis: of the longest part of a cut, else of all exposures."""
     analysis = facts.analysis
     starts = analysis.data.instant.values[: facts.starts]
-    caption = facts.text(texts()["figures"]["player"]["caption"])
     raster = next(iter(analysis.measurements.values())).raster
     return Player(
         title=texts()["figures"]["player"]["title"],
-        caption=caption,
+        caption=facts.text(texts()["figures"]["player"]["caption"]),
         views=list(_views(facts)),
         times=[
             f"Exposure {i + 1} of {len(starts)}: begins at {time_text(start, '.4g')}, lasts "

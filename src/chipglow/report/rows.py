@@ -150,10 +150,9 @@ def _number_rows(facts: Facts, group: str) -> list[Row]:
 
 def _segment_rows(facts: Facts) -> Iterator[Row]:
     """Yield rows of values of every segment; the first belongs to the one draw."""
-    assert facts.analysis.cut is not None
     for key, template in texts()["rows"]["segments"].items():
         every = np.array(
-            [facts.value(template["value"], segment=one) for one in facts.analysis.cut.segments]
+            [facts.value(template["value"], segment=one) for one in facts.cut.segments]
         )
         finite = every[np.isfinite(every)]
         draws = Distribution(finite, ("segment",), limits=(0.0, inf)) if finite.size else None
@@ -239,6 +238,16 @@ def _parts(facts: Facts, name: str, found: Headline) -> Mapping[str, Distributio
             moved = np.broadcast_to(motion, rest.shape)
             return {"psf": psf, "motion": psf.having(moved), "footprint": psf.having(rest - moved)}
     return {"psf": psf, "rest": psf.having(rest)}
+
+
+def main_readings(facts: Facts) -> Iterator[str]:
+    """Yield the first error at every place with every surface; of a cut its main ones."""
+    places = set()
+    for name, found in facts.headlines.items():
+        place = (found.place, found.surface)
+        if name in MAIN if facts.analysis.cut is not None else place not in places:
+            places.add(place)
+            yield name
 
 
 def slug(name: str) -> str:

@@ -59,8 +59,7 @@ def tool_rows(own: Analysis, steady: Analysis) -> list[ToolRow]:
         template, surface = texts()["rows"]["tool"][kind], key[len("rake_peak_") : -len("_degC")]
         name = next((one for one in own.measurements if slug(one) == surface), "")
         quantity = facts.text(template["quantity"], surface=name)
-        row = ToolRow(key, quantity, template["unit"], spread, after[key], template["text"])
-        rows.append(row)
+        rows.append(ToolRow(key, quantity, template["unit"], spread, after[key], template["text"]))
     return rows
 
 

@@ -16,25 +16,25 @@ _Numbers = dict[str, _Known]
 class _Numbered(BaseModel):
     """Numbers that are finite, or null where unknown."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
 class Scatter(_Numbered):
     """A number over its draws, in the unit at the end of its name."""
 
-    count: Annotated[int, Field(ge=1, description="Number of draws.")]
+    count: Annotated[int, Field(ge=1)]
+    """Number of draws."""
     mean: FiniteFloat
-    standard_deviation: Annotated[_Known, Field(description="Sample standard deviation.")]
-    expanded_uncertainty: Annotated[
-        _Known, Field(description="Uncertainty of the mean, coverage 95 %.")
-    ]
+    standard_deviation: _Known
+    """Sample standard deviation."""
+    expanded_uncertainty: _Known
+    """Uncertainty of the mean, coverage 95 %."""
     lowest: FiniteFloat
     highest: FiniteFloat
-    interval_low: Annotated[
-        _Known,
-        Field(description="Lower end of the 95 % prediction interval for one further frame."),
-    ]
-    interval_high: Annotated[_Known, Field(description="Its upper end.")]
+    interval_low: _Known
+    """Lower end of the 95 % prediction interval for one further frame."""
+    interval_high: _Known
+    """Its upper end."""
 
     @classmethod
     def of(cls, draws: Distribution) -> "Scatter":
@@ -55,12 +55,12 @@ class Scatter(_Numbered):
 class Cause(_Numbered):
     """Contribution of one cause to the scatter of a number."""
 
-    count: Annotated[int, Field(ge=1, description="Number of values that the cause took.")]
-    standard_deviation: Annotated[
-        _Known,
-        Field(description="Deviation of the means over all other causes, in the number's unit."),
-    ]
-    fraction_percent: Annotated[FiniteFloat, Field(description="Fraction of the sum of squares.")]
+    count: Annotated[int, Field(ge=1)]
+    """Number of values that the cause took."""
+    standard_deviation: _Known
+    """Deviation of the means over all other causes, in the number's unit."""
+    fraction_percent: FiniteFloat
+    """Fraction of the sum of squares."""
 
 
 class Mean(_Numbered):
@@ -77,58 +77,51 @@ class BothTools(_Numbered):
     own_standard_deviation: _Known
     steady: _Known
     steady_standard_deviation: _Known
-    difference: Annotated[_Known, Field(description="Steady minus own.")]
-    difference_standard_deviation: Annotated[
-        _Known, Field(description="Deviation of the difference of two single values.")
-    ]
+    difference: _Known
+    """Steady minus own."""
+    difference_standard_deviation: _Known
+    """Deviation of the difference of two single values."""
 
 
 class Summary(_Numbered):
     """summary.json: numbers by names that end in their unit; unknown ones are null."""
 
-    provenance: Annotated[
-        dict[str, str], Field(description="Origin, time, version, seed and the like.")
-    ]
-    camera: Annotated[_Numbers, Field(description="Detector values, if present.")] = {}
-    results: Annotated[_Numbers, Field(description="Means of the draws, and single numbers.")]
-    lower_bounds: Annotated[
-        list[str], Field(description="Results that continue beyond the border of the view.")
-    ] = []
-    references: Annotated[
-        _Numbers, Field(description="Mean reading of a camera without error, of each error.")
-    ] = {}
-    draws: Annotated[dict[str, Scatter], Field(description="Scatter of the results.")]
-    causes: Annotated[
-        dict[str, dict[str, Cause]], Field(description="Causes of the scatter of the results.")
-    ]
-    parts: Annotated[
-        dict[str, dict[str, Mean]],
-        Field(
-            description="Contributions to the errors: psf, motion and footprint, or psf and rest."
-        ),
-    ]
-    attribution: Annotated[
-        dict[str, dict[str, FiniteFloat]],
-        Field(description="Contribution of each effect to the errors of the shown exposure in K."),
-    ] = {}
-    one_draw: Annotated[_Numbers, Field(description="Results of a single frame.")]
-    chip: Annotated[_Numbers, Field(description="Metrics of the chip.")] = {}
-    chip_uncertainty: Annotated[
-        dict[str, FiniteFloat],
-        Field(description="Standard uncertainty or standard deviation, see the explanation."),
-    ] = {}
-    paper: Annotated[dict[str, FiniteFloat], Field(description="Published values.")] = {}
-    differs: Annotated[
-        dict[str, bool | None], Field(description="Whether the published value differs.")
-    ] = {}
-    explanation: Annotated[
-        dict[str, str], Field(description="Cause or determination of each number.")
-    ]
-    steady_tool: Annotated[
-        dict[str, BothTools], Field(description="Comparison with a steady tool, if requested.")
-    ] = {}
-    missing: Annotated[list[str], Field(description="Unavailable results with the reason.")] = []
-    failed: Annotated[dict[str, str], Field(description="Parts that failed, with the reason.")] = {}
+    provenance: dict[str, str]
+    """Origin, time, version, seed and the like."""
+    camera: _Numbers = {}
+    """Detector values, if present."""
+    results: _Numbers
+    """Means of the draws, and single numbers."""
+    lower_bounds: list[str] = []
+    """Results that continue beyond the border of the view."""
+    references: _Numbers = {}
+    """Mean reading of a camera without error, of each error."""
+    draws: dict[str, Scatter]
+    """Scatter of the results."""
+    causes: dict[str, dict[str, Cause]]
+    """Causes of the scatter of the results."""
+    parts: dict[str, dict[str, Mean]]
+    """Contributions to the errors: psf, motion and footprint, or psf and rest."""
+    attribution: dict[str, dict[str, FiniteFloat]] = {}
+    """Contribution of each effect to the errors of the shown exposure in K."""
+    one_draw: _Numbers
+    """Results of a single frame."""
+    chip: _Numbers = {}
+    """Metrics of the chip."""
+    chip_uncertainty: dict[str, FiniteFloat] = {}
+    """Standard uncertainty or standard deviation, see the explanation."""
+    paper: dict[str, FiniteFloat] = {}
+    """Published values."""
+    differs: dict[str, bool | None] = {}
+    """Whether the published value differs."""
+    explanation: dict[str, str]
+    """Cause or determination of each number."""
+    steady_tool: dict[str, BothTools] = {}
+    """Comparison with a steady tool, if requested."""
+    missing: list[str] = []
+    """Unavailable results with the reason."""
+    failed: dict[str, str] = {}
+    """Parts that failed, with the reason."""
 
 
 def summary(

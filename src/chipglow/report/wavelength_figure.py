@@ -47,8 +47,7 @@ def draw_wavelengths(data: xr.Dataset) -> Figure:
         bar = figure.colorbar(picture, ax=panels[0], label="error / K", aspect=25, extend="max")
         bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks], minor=False)
         bar.ax.minorticks_off()
-        handles, labels = panels[1, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        drawing.legend(figure, 3)
         return figure
 
 

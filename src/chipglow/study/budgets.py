@@ -103,7 +103,7 @@ class StudyBudget:
                 one, is_set = parts[0], len(parts) == 1 and parts[0].has_slope
                 stated = self.study.uncertainty.inputs.get(one.name)
                 contribution = float(estimate.contribution(name)[output])
-                number = inputs.names.index(one.name)
+                slope = self.budget.sensitivity[inputs.names.index(one.name), output]
                 rows.append(
                     {
                         "reading": reading,
@@ -113,9 +113,7 @@ class StudyBudget:
                         "value": one.value if is_set else np.nan,
                         "standard_uncertainty": one.standard_uncertainty if is_set else np.nan,
                         "unit": self._unit(one.name) if is_set else "",
-                        "sensitivity": self.budget.sensitivity[number, output]
-                        if is_set
-                        else np.nan,
+                        "sensitivity": slope if is_set else np.nan,
                         "degrees_of_freedom": one.degrees_of_freedom,
                         "contribution_K": contribution,
                         "variance_percent": 100 * contribution**2 / total if total else 0.0,
@@ -196,7 +194,8 @@ def study_budget(
         inputs = [
             replace(one, group=SCENE) if one.group == "cutting" else one for one in stated.inputs
         ]
-        inputs += [Input(name, group=_group(name)) for name in readings.random]
+        groups = {EXPOSURE: SCENE, TEXTURE: SURFACE}
+        inputs += [Input(name, group=groups.get(name, CAMERA)) for name in readings.random]
         surrogates, notes = dict[str, Surrogate](), fitted.notes
         if any(is_cut):
             surrogates, lost = _surrogates(study, stated, scenes, readings.names, at, tell)
@@ -251,8 +250,7 @@ def corrected_temperatures(
     for name, row in rows.items():
         names = zip(found.readings, found.places, strict=True)
         number = next(n for n, known in enumerate(names) if name in known)
-        error = found.budget.estimate[number].without(NOISE)
-        estimates[name] = row.estimate - row.gain * error
+        estimates[name] = row.estimate - row.gain * found.budget.estimate[number].without(NOISE)
     return estimates, found
 
 
@@ -290,14 +288,6 @@ def _section(
         raise ValueError(f"uncertainty.inputs: a draw is impossible: {prefix}{reason}") from None
 
 
-def _one_thread() -> None:
-    set_num_threads(1)
-
-
-def _group(name: str) -> str:
-    return {EXPOSURE: SCENE, TEXTURE: SURFACE}.get(name, CAMERA)
-
-
 def reader(
     study: Study, scene: Scene, readings: SingleReadings, names: Sequence[str]
 ) -> Callable[[Array], Array]:
@@ -312,7 +302,9 @@ def reader(
         return readings.read(camera, surfaces, values)
 
     def read_all(rows: Array) -> Array:
-        with ThreadPoolExecutor(get_num_threads(), initializer=_one_thread) as pool:
+        with ThreadPoolExecutor(
+            get_num_threads(), initializer=set_num_threads, initargs=(1,)
+        ) as pool:
             return np.stack(list(pool.map(read, rows)))
 
     return read_all

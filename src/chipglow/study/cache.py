@@ -48,9 +48,8 @@ def cached_scenes() -> list[CachedScene]:
             scenes.append(CachedScene(path, status.st_size, status.st_mtime))
     for unfinished in _unfinished():
         with suppress(FileNotFoundError):
-            scenes.append(
-                CachedScene(unfinished.part, unfinished.size, unfinished.part.stat().st_mtime)
-            )
+            modified = unfinished.part.stat().st_mtime
+            scenes.append(CachedScene(unfinished.part, unfinished.size, modified))
     return sorted(scenes, key=lambda scene: scene.modified, reverse=True)
 
 

@@ -152,8 +152,7 @@ class CameraSection(Part):
 
     def build(self, seed: int = 2010) -> Camera:
         """Return the camera, with as many pixels as see the scene."""
-        response = None if self.response is None else read_response(self.response)
-        band = Band(*self.band, response)
+        band = Band(*self.band, None if self.response is None else read_response(self.response))
         shared = Camera.declared().keys() & self.declared().keys()
         made = {
             **{name: getattr(self, name) for name in shared},

@@ -244,8 +244,7 @@ class _Search:
                 reasons[n] = f"{full[n].max():.0%} of a place is saturated"
             elif not np.isfinite(bias[n]).all():
                 reasons[n] = "a place is not in every image"
-        names = self.names
-        return Design(tuple(settings), names, bias, spread, lost, full, draws, reasons, notes)
+        return Design(tuple(settings), self.names, bias, spread, lost, full, draws, reasons, notes)
 
 
 def _inputs(study: Study) -> Inputs:
@@ -259,17 +258,11 @@ def _inputs(study: Study) -> Inputs:
 
 def _ranks(objectives: Array, allowed: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the number of the Pareto front of each setting, from 0; -1 if it is not allowed."""
-    ranks, rest, front = np.full(len(objectives), -1), set(np.flatnonzero(allowed).tolist()), 0
-    while rest:
-        first = {
-            one
-            for one in rest
-            if not any(
-                (objectives[other] <= objectives[one]).all()
-                and (objectives[other] < objectives[one]).any()
-                for other in rest
-            )
-        }
-        ranks[list(first)] = front
-        rest, front = rest - first, front + 1
+    other = objectives[:, None]
+    is_better = np.all(other <= objectives, axis=-1) & np.any(other < objectives, axis=-1)
+    ranks, rest, front = np.full(len(objectives), -1), allowed, 0
+    while rest.any():
+        first = rest & ~is_better[rest].any(axis=0)
+        ranks[first] = front
+        rest, front = rest & ~first, front + 1
     return ranks

@@ -112,8 +112,7 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
             if low == high:
                 yield f"{text}: it is taken to be the same at all temperatures."
             else:
-                beyond = "its straight line is extrapolated."
-                yield f"{text} to {high - 273.15:.0f} °C: {beyond}"
+                yield f"{text} to {high - 273.15:.0f} °C: its straight line is extrapolated."
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:

@@ -21,12 +21,8 @@ def preview_raster(study: Study) -> Raster:
     """Return the samples of a preview: those of the study's scene, or several together."""
     raster = study.cutting.field_of_view.build()
     step = _step(raster)
-    return replace(
-        raster,
-        spacing=raster.spacing * step,
-        rows=raster.rows // step,
-        columns=raster.columns // step,
-    )
+    rows, columns = (count // step for count in raster.shape)
+    return replace(raster, spacing=raster.spacing * step, rows=rows, columns=columns)
 
 
 def preview_of(study: Study, on_frame: Callable[[Frame], None]) -> Preview:
@@ -40,15 +36,13 @@ def show_scene(scene: Scene, preview: Preview, on_progress: Callable[[float], No
     last = len(scene.times)
     for number in range(1, last + 1):
         if preview.shows(number, last):
-            frame = scene.frame(number - 1)
-            preview.on_frame(_thinned(frame, step, rows, columns))
+            preview.on_frame(_thinned(scene.frame(number - 1), step, rows, columns))
             on_progress(number / last)
 
 
 def _step(raster: Raster) -> int:
     """Return how many samples of a scene are one of its preview, in either direction."""
-    wanted = ceil(max(raster.shape) / _MOST_SAMPLES)
-    return min(wanted, *raster.shape)
+    return min(ceil(max(raster.shape) / _MOST_SAMPLES), *raster.shape)
 
 
 def _thinned(frame: Frame, step: int, rows: int, columns: int) -> Frame:

@@ -143,8 +143,7 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
 
 def errors(study: Study, progress: Progress | None = None, resume: bool = False) -> Analysis:
     """Return the measurement error of any scene, exposure by exposure, at the study's places."""
-    any_scene = unchecked(study, analysis=unchecked(study.analysis, cut=False))
-    return run(any_scene, progress, resume)
+    return run(unchecked(study, analysis=unchecked(study.analysis, cut=False)), progress, resume)
 
 
 def wavelengths(study: Study, progress: Progress | None = None, resume: bool = False) -> xr.Dataset:

@@ -84,8 +84,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
         times |= {"start": CUT_LENGTH.text(start), "end": CUT_LENGTH.text(end)}
         length = {"cutting_length": CUT_LENGTH.text(max(ratio * _LENGTH, 1.05 * end))}
     if ratio != 1.0 or slower != 1.0:
-        interval = min(ratio * slower * _INTERVAL, exposure / _SUB_FRAMES)
-        times["interval"] = TIME.text(interval)
+        times["interval"] = TIME.text(min(ratio * slower * _INTERVAL, exposure / _SUB_FRAMES))
     if exposure > _BAND:
         times["band_duration"] = TIME.text(exposure)
     if ratio != 1.0 or rake != _RAKE:

@@ -251,22 +251,17 @@ def _numbers(analysis: Analysis, at: Sequence[str]) -> dict[str, Any]:
     kept = {name: one for name, one in known.items() if not at or name in at or one.place in at}
     if missing := [name for name in at if not any(name in (k, o.place) for k, o in kept.items())]:
         raise ValueError(f"{', '.join(missing)}: not read, expected any of {', '.join(known)}")
-    readings = {
-        name: (
+    readings = {}
+    for name, one in kept.items():
+        values = (
             one.reference.mean,
             one.error.mean,
             one.error.expanded_uncertainty,
             one.psf_portion.mean,
             one.true_error.mean,
         )
-        for name, one in kept.items()
-    }
-    return {
-        "readings": {
-            name: dict(zip(NUMBERS, map(_finite, values), strict=True))
-            for name, values in readings.items()
-        }
-    }
+        readings[name] = dict(zip(NUMBERS, map(_finite, values), strict=True))
+    return {"readings": readings}
 
 
 def _finite(value: float) -> float | None:

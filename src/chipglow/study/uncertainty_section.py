@@ -125,8 +125,7 @@ def _size(stated: object, value: float, parameter: Parameter) -> float:
     if text.endswith("%"):
         size = abs(value) * float(text[:-1]) / 100
     elif parameter.quantity is not None:
-        quantity = replace(parameter.quantity, positive=False, is_difference=True)
-        size = quantity.parse(stated)
+        size = replace(parameter.quantity, positive=False, is_difference=True).parse(stated)
     else:
         size = float(text)
     if not 0 < size < inf:

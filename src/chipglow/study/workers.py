@@ -84,8 +84,7 @@ def _finished(client: Client, running: Collection[Any]) -> Collection[Any]:
     """Return the tasks that are finished, one or more; wait while the cluster has workers."""
     while True:
         try:
-            every = _distributed().wait(list(running), _SILENCE, "FIRST_COMPLETED")
-            return set(every.done)
+            return set(_distributed().wait(list(running), _SILENCE, "FIRST_COMPLETED").done)
         except CancelledError:
             raise _lost("the scheduler of the cluster") from None
         except TimeoutError:

@@ -32,8 +32,7 @@ def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[st
 
     Files in `settings`, which were typed in a shell, are looked up in its folder.
     """
-    described = path.suffix.lower() in (".yaml", ".yml")
-    data = read_yaml(path) if described else {field: path.name}
+    data = read_yaml(path) if path.suffix.lower() in (".yaml", ".yml") else {field: path.name}
     for setting in settings:
         data = _with(data, setting)
     return validated(kind, data, path.name, path.parent)
