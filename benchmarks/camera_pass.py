@@ -4,19 +4,17 @@ python benchmarks/camera_pass.py [--rounds 7] [--sub-frames 50]
 
 A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels: temperature and emissivity
 given in memory, all fields in memory, and a file, looked at for the first time and again. Beside
-them are the bound, which is to read once what the pass needs, and the paper's Figure 6 in plain
-NumPy. An image is formed from a kept mean radiance; Pyxel also makes counts, if it is installed
+them is the paper's Figure 6 in plain NumPy. An image is formed from a kept mean radiance; Pyxel also makes counts, if it is installed
 (``pip install pyxel-sim``). Frames are timed in turn; the best of the rounds counts. Processor
 time, of all threads, can be compared on a shared machine.
 """
 
 import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
-from itertools import count, pairwise, product
+from itertools import count, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -115,26 +113,6 @@ def open_cold(path):
     return open_scene(path)
 
 
-@numba.njit(nogil=True, fastmath=True)
-def read_words(words, first, last):
-    """Read memory and do next to nothing with it."""
-    total = np.uint64(0)
-    for i in range(first, last):
-        total ^= words[i]
-    return total
-
-
-def read_once(arrays):
-    """Read arrays once with all threads: nothing that needs them all can be faster."""
-    with ThreadPoolExecutor(numba.get_num_threads()) as pool:
-        work = []
-        for array in arrays:
-            words = array.reshape(-1).view(np.uint64)
-            ends = np.linspace(0, words.size, 33).astype(int)
-            work += [pool.submit(read_words, words, *part) for part in pairwise(ends)]
-        return [one.result() for one in work]
-
-
 def main():
     given = arguments(__doc__, rounds=7, sub_frames=50)
     with TemporaryDirectory() as folder:
@@ -167,10 +145,8 @@ def compare_frames(path, rounds, sub_frames):
 
     best = best_of(
         {
-            "given: bound, reading once": lambda: read_once([arrays["temperature"], emissivity]),
             "given: chipglow, exposure": lambda: CAMERA.expose(plain, surface, 0.0),
             "given: NumPy, Figure 6, table": literal,
-            "in memory: bound, reading once": lambda: read_once(list(arrays.values())),
             "in memory: chipglow, exposure": lambda: CAMERA.expose(whole, CHIP_1, 0.0),
             "stored: chipglow, first look": lambda: CAMERA.expose(open_cold(path), CHIP_1, 0.0),
             "stored: chipglow, again": lambda: CAMERA.expose(stored, CHIP_1, 0.0),
