@@ -17,6 +17,7 @@ from chipglow.analysis import Plan, SingleReadings, analyse
 from chipglow.analysis.single import ACROSS, DOWN, MEASURED, REFERENCE
 from chipglow.camera import Camera, GaussianPSF
 from chipglow.io import write_measurement, write_scene
+from chipglow.quantities import changed
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, study_budget
@@ -421,10 +422,25 @@ def test_a_measured_temperature_is_corrected_with_the_whole_budget(strip):
     assert row.corrected_uncertainty_K == pytest.approx(total, abs=0.002)  # printed in mK
 
 
-def test_a_study_of_other_places_is_refused(strip):
+def test_a_study_of_another_measurement_is_refused(strip):
     arguments = ["temperature", strip / "image.nc", "--regions", strip / "regions.yaml"]
     arguments += ["--emissivity", 0.6, "--study", strip / "other.yaml"]
     text = (strip / "study.yaml").read_text(encoding="utf-8")
-    text = text.replace("strip: {polygon", "edge: {polygon")
-    (strip / "other.yaml").write_text(text, encoding="utf-8")
-    refused(list(map(str, arguments)), "strip: no such place or reading")
+    for old, new, message in (
+        ("strip: {polygon", "edge: {polygon", "strip: no such place or reading"),
+        ("psf_order: optics", "band: 3.8-4.9 um", "5.1 um in the image, 4.9 um in the study"),
+        ("psf_order: optics", "pitch: 5 um", "pitch: 6 um in the image, 5 um in the study"),
+    ):
+        (strip / "other.yaml").write_text(text.replace(old, new), encoding="utf-8")
+        refused(list(map(str, arguments)), message)
+
+
+def test_readings_without_a_temperature_are_stated(plate):
+    study = study_of(plate, **{"surface.emissivity": {"standard": "2 %"}})
+    study = changed(study, {"camera.lower_limit": "900 K"})  # 835 K are seen
+    (warning,) = study_budget(study, ("middle",), 100, 2).notes.warnings
+    assert warning.startswith("middle, pixel: 100% of the place is below the lower range limit")
+    small = {"hot": {"circle": {"centre": ("0 um", "0 um"), "radius": "2 um"}}}
+    study = changed(study, {"camera.lower_limit": None, "analysis.regions": small})
+    notes = study_budget(study, ("hot",), 100, 2).notes
+    assert any("hot, mean: in some draws the place has no pixel" in one for one in notes.warnings)

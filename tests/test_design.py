@@ -107,12 +107,17 @@ def test_settings_beyond_a_limit_are_excluded(heating):
     assert list(frame.own).index(True) < 3 and not frame.pareto.iloc[-1]
     full = {"camera.detector.full_well": (1e5, 1e8)}
     found = design(study_of(heating), full, ("middle",), draws=64)
-    assert "100% of a place is saturated" in found.reasons[1]
+    reason = "camera.detector.full_well = 100000.0: middle, pixel: 100% of it is saturated"
+    assert found.reasons[1] == reason
 
 
 def test_a_path_outside_of_camera_and_surface_is_refused(heating):
     with pytest.raises(ValueError, match="expected a path in camera, surface"):
         design(study_of(heating), {"cutting.feed": ("1 um",)})
+    with pytest.raises(ValueError, match="unknown key 'pich', did you mean 'pitch'"):
+        design(study_of(heating), {"camera.pich": ("1 um",)})
+    with pytest.raises(ValueError, match="draws: 8, expected 16 or more"):
+        design(study_of(heating), {"camera.pitch": ("1 um",)}, draws=8)
 
 
 def test_the_command_prints_the_settings_and_draws_them(heating, tmp_path):

@@ -10,6 +10,7 @@ from chipglow.cli.screen import current, figure, finish
 if TYPE_CHECKING:
     import pandas as pd
 
+    from chipglow.camera import Measurement
     from chipglow.laboratory import emissivity as lab
     from chipglow.text import Notes
 
@@ -194,11 +195,13 @@ def temperature(
         notes += Notes(warnings=list(dict.fromkeys(doubts)))
     frame = result.to_frame()
     if study is not None:
-        notes += _correct(result, frame, study)
+        notes += _correct(result, measurements[0], frame, study)
     finish(notes, (table, partial(write_frame, frame)))
 
 
-def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Path) -> "Notes":
+def _correct(
+    result: "lab.RegionTemperatures", image: "Measurement", frame: "pd.DataFrame", study: Path
+) -> "Notes":
     """Print the corrected temperatures and their budgets, and add them to the frame."""
     import pandas as pd
 
@@ -207,10 +210,11 @@ def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Pat
 
     screen = current()
     with progress_bars() as progress:
-        estimates, found = corrected_temperatures(result, load_study(study), progress)
+        estimates, found = corrected_temperatures(result, image, load_study(study), progress)
     rows = list(estimates.values())
     frame["corrected_temperature_K"] = [float(one.values) for one in rows]
     frame["corrected_uncertainty_K"] = [float(one.standard_uncertainty) for one in rows]
+    frame["corrected_coverage_factor"] = [float(one.coverage_factor()) for one in rows]
     frame["corrected_expanded_uncertainty_K"] = [float(one.expanded_uncertainty()) for one in rows]
     shown = frame.assign(
         corrected_temperature_degC=frame.corrected_temperature_K - 273.15,
@@ -221,6 +225,7 @@ def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Pat
         "correction / K": "correction_K",
         "corrected ± u / °C": "corrected_temperature_degC ± corrected_uncertainty_K",
         "U 95 % / K": "corrected_expanded_uncertainty_K",
+        "k": "corrected_coverage_factor",
     }
     screen.heading("\nCorrected for blur, pixels and motion")
     screen.table("corrected", shown, columns)
@@ -229,9 +234,8 @@ def _correct(result: "lab.RegionTemperatures", frame: "pd.DataFrame", study: Pat
         for name, estimate in estimates.items()
         for part in estimate.names
     ).dropna()
-    order = parts.sort_values(["region", "contribution_K"], ascending=[True, False])
     screen.heading()
-    screen.table("budget", order.round(3))
+    screen.table("budget", parts.sort_values(["region", "contribution_K"], ascending=[True, False]))
     return found.notes.about(str(study))
 
 

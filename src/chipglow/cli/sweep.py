@@ -140,8 +140,10 @@ def design(
         "draws": "draws",
         "Pareto": "pareto",
         "own": "own",
+        "excluded": "is_excluded",
     }
     best = _with_units(frame[frame.regret_K.notna()].head(_MAX_ROWS), quantities)
+    best = best.assign(is_excluded=best.excluded != "")
     screen.table("settings", best, {path: path for path in axes} | columns)
     count, total = len(result.settings), int(result.draws.sum())
     screen.say(
@@ -160,11 +162,14 @@ def design(
 
 def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]") -> "pd.DataFrame":
     """Return the frame with the settings as text in their units."""
-    texts = {}
-    for path, quantity in quantities.items():
-        text = quantity.text if quantity else str
-        texts[path] = [value if isinstance(value, str) else text(value) for value in frame[path]]
-    return frame.assign(**texts)
+    from chipglow.report.design_figure import value_text
+
+    return frame.assign(
+        **{
+            path: [value_text(value, quantity) for value in frame[path]]
+            for path, quantity in quantities.items()
+        }
+    )
 
 
 def _axis(text: str) -> tuple[str, str]:

@@ -9,7 +9,9 @@ from matplotlib.patches import Patch
 
 from chipglow.drawing import drawing, scales
 from chipglow.study import StudyBudget
+from chipglow.study.budgets import CAMERA, SCENE, SURFACE
 
+GROUPS: Final = (SCENE, SURFACE, CAMERA)
 _LARGEST: Final = 6
 _HEIGHT: Final = 0.22
 """Height of a bar in inches."""
@@ -18,8 +20,8 @@ _HEIGHT: Final = 0.22
 def draw_budget(result: StudyBudget) -> Figure:
     """Draw the largest contributions to each reading, coloured by group, and their total."""
     frame, summary = result.to_frame(), result.summary().set_index("reading")
-    groups = list(dict.fromkeys(frame.group))
-    colour_of = dict(zip(groups, cycle(scales.COLOURS)))
+    colour_of = dict(zip(dict.fromkeys([*GROUPS, *frame.group]), cycle(scales.COLOURS)))
+    groups = [one for one in colour_of if one in set(frame.group)]
     count = min(frame.input.nunique(), _LARGEST) + 1
     with drawing.style():
         figure = drawing.new_figure(len(result.readings) * (count * _HEIGHT + 0.75) + 0.4)

@@ -20,7 +20,10 @@ def draw_design(result: Design, quantities: Mapping[str, Quantity | None]) -> Fi
         "beyond a limit": (excluded, {"marker": "x", "color": scales.GREY}),
         "other settings": ([not one for one in excluded], {"marker": "o", "color": scales.GREY}),
         "Pareto front": (front, {"marker": "o", "color": scales.BLUE, "linestyle": "-"}),
-        "own settings of the study": ([0], {"marker": "D", "color": "black"}),
+        f"own settings of the study{', excluded' * excluded[0]}": (
+            [0],
+            {"marker": "D", "color": "black"},
+        ),
     }
     if result.best is not None:
         best = result.settings[result.best]
@@ -41,6 +44,13 @@ def draw_design(result: Design, quantities: Mapping[str, Quantity | None]) -> Fi
 
 def setting_text(path: str, value: object, quantities: Mapping[str, Quantity | None]) -> str:
     """Return a setting's name without its section, and its value in its unit."""
-    quantity = quantities[path]
-    text = quantity.text(value) if quantity and isinstance(value, float) else str(value)
-    return f"{path.partition('.')[2].replace('_', ' ')} {text}"
+    return f"{path.partition('.')[2].replace('_', ' ')} {value_text(value, quantities[path])}"
+
+
+def value_text(value: object, quantity: Quantity | None) -> str:
+    """Return the value of a setting in its unit."""
+    if isinstance(value, str):
+        return value
+    if value is None or value != value:
+        return "none"
+    return quantity.text(value) if quantity and isinstance(value, float) else f"{value}"

@@ -13,6 +13,7 @@ from numba import get_num_threads, set_num_threads
 from scipy.stats import qmc
 
 from chipglow.analysis.single import (
+    BELOW,
     EXPOSURE,
     MEASURED,
     NOISE,
@@ -21,10 +22,11 @@ from chipglow.analysis.single import (
     TEXTURE,
     SingleReadings,
 )
-from chipglow.camera import Camera
+from chipglow.camera import Camera, Measurement
 from chipglow.io import open_scene
 from chipglow.laboratory.emissivity import RegionTemperatures
 from chipglow.quantities import Array, changed, setting_at
+from chipglow.quantities.units import LENGTH
 from chipglow.scene import Scene
 from chipglow.study.fitting import fit, surfaces_on
 from chipglow.study.running import Progress, cut, fitted_study, silent
@@ -32,6 +34,7 @@ from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes
 from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget
+from chipglow.uncertainty.budget import check_trials
 from chipglow.uncertainty.surrogate import Surrogate
 
 SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
@@ -40,6 +43,12 @@ SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 _SURROGATE: Final = "scene settings between the cut ones"
 _SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-out scenes"}
 """Sources of the inputs that the study does not state, by distribution."""
+
+_MOST_BELOW: Final = 0.05
+"""Fraction of a place below the lower range limit without a warning."""
+
+_ALIKE: Final = 0.01
+"""Relative difference of an image's band and pitch from the study's that is accepted."""
 
 _NOMINAL_DRAWS: Final = 32
 """Draws of the random inputs over which the error of a cut scene is a mean."""
@@ -101,7 +110,9 @@ class StudyBudget:
             for name in estimate.names:
                 parts = [lines[one] for one in name.split(", ")]
                 one, is_set = parts[0], len(parts) == 1 and parts[0].has_slope
-                stated = self.study.uncertainty.inputs.get(one.name)
+                stated = self.study.uncertainty.inputs
+                sources = [stated[part.name].source for part in parts if part.name in stated]
+                is_student = one.distribution == "normal" and np.isfinite(one.degrees_of_freedom)
                 contribution = float(estimate.contribution(name)[output])
                 slope = self.budget.sensitivity[inputs.names.index(one.name), output]
                 rows.append(
@@ -109,7 +120,7 @@ class StudyBudget:
                         "reading": reading,
                         "input": name,
                         "group": one.group,
-                        "distribution": one.distribution,
+                        "distribution": "t" if is_student else one.distribution,
                         "value": one.value if is_set else np.nan,
                         "standard_uncertainty": one.standard_uncertainty if is_set else np.nan,
                         "unit": self._unit(one.name) if is_set else "",
@@ -117,7 +128,7 @@ class StudyBudget:
                         "degrees_of_freedom": one.degrees_of_freedom,
                         "contribution_K": contribution,
                         "variance_percent": 100 * contribution**2 / total if total else 0.0,
-                        "source": stated.source if stated else _SOURCES[one.distribution],
+                        "source": "; ".join(dict.fromkeys(sources)) or _SOURCES[one.distribution],
                     }
                 )
         return pd.DataFrame(rows)
@@ -182,6 +193,7 @@ def study_budget(
     hypercube of their distributions. Its cross-validated error is an input.
     """
     tell = progress or silent
+    check_trials(trials)
     stated = study.uncertainty.build(study)
     is_cut = [one.name.startswith("cutting.") for one in stated.inputs]
     if any(is_cut) and study.scene is not None:
@@ -201,21 +213,29 @@ def study_budget(
             surrogates, lost = _surrogates(study, stated, scenes, readings.names, at, tell)
             notes = notes + lost
             inputs.append(Input(_SURROGATE, 0.0, 1.0, "normal", group=SCENE))
-        read = reader(study, fitted.scene, readings, [one.name for one in inputs])
+        known = Inputs(inputs, stated.correlations)
+        read = reader(study, fitted.scene, readings, known.names)
         model = _model(read, inputs, list(surrogates.values()))
-        found = budget(
-            model,
-            Inputs(inputs, stated.correlations),
-            np.random.default_rng(study.seed),
-            trials,
-            samples,
-            progress=tell,
-        )
+        generator = np.random.default_rng(study.seed)
+        found = budget(model, known, generator, trials, samples, progress=tell)
+        below = read(known.at(np.full((1, len(known)), 0.5)))[0, :, BELOW]
+    doubts = [
+        f"{name}: {part:.0%} of the place is below the lower range limit: the camera gives no "
+        "temperature there."
+        for name, part in zip(readings.names, below, strict=True)
+        if part > _MOST_BELOW
+    ]
+    doubts += [
+        f"{name}: in some draws the place has no pixel, or is not in the image."
+        for name, value in zip(readings.names, found.monte_carlo.mean, strict=True)
+        if not np.isfinite(value)
+    ]
+    notes = notes + Notes(warnings=doubts)
     return StudyBudget(readings.names, readings.places, found, study, notes, surrogates)
 
 
 def corrected_temperatures(
-    measured: RegionTemperatures, study: Study, progress: Progress | None = None
+    measured: RegionTemperatures, image: Measurement, study: Study, progress: Progress | None = None
 ) -> tuple[dict[str, Estimate], StudyBudget]:
     """Correct measured temperatures by the errors of a study of the same measurement.
 
@@ -225,6 +245,8 @@ def corrected_temperatures(
     ----------
     measured : RegionTemperatures
         True temperatures by `true_temperatures`; the camera's resolution is not in them.
+    image : Measurement
+        The image, whose band and pixels must be those of the study's camera.
     study : Study
         The study; a region is corrected by the first reading of the place of its name.
     progress : callable, optional
@@ -235,23 +257,32 @@ def corrected_temperatures(
     estimates : dict
         Mean temperature of each region in K, with the components of both budgets. The study's noise
         is left out: the measurement states its own.
-    found : StudyBudget
+    result : StudyBudget
         The budget of the errors.
 
     Raises
     ------
     ValueError
-        If a region has not the name of a place.
+        If a region has not the name of a place, or band or pitch differ from the study's.
     """
+    camera = study.camera.build(study.seed)
+    for name, found, stated in (
+        ("lower limit of the band", image.band.lower, camera.band.lower),
+        ("upper limit of the band", image.band.upper, camera.band.upper),
+        ("pitch", image.raster.spacing, camera.pitch),
+    ):
+        if abs(found / stated - 1.0) > _ALIKE:
+            texts = LENGTH.text(found), LENGTH.text(stated)
+            raise ValueError("{}: {} in the image, {} in the study".format(name, *texts))
     study = changed(study, {"analysis.reference": "mean"})
     rows = {row.name: row for row in measured.rows}
-    found = study_budget(study, tuple(rows), 100, 2, progress=progress)
+    result = study_budget(study, tuple(rows), 100, 2, progress=progress)
     estimates = {}
     for name, row in rows.items():
-        names = zip(found.readings, found.places, strict=True)
+        names = zip(result.readings, result.places, strict=True)
         number = next(n for n, known in enumerate(names) if name in known)
-        estimates[name] = row.estimate - row.gain * found.budget.estimate[number].without(NOISE)
-    return estimates, found
+        estimates[name] = row.estimate - row.gain * result.budget.estimate[number].without(NOISE)
+    return estimates, result
 
 
 def errors_of(numbers: Array) -> Array:
@@ -285,7 +316,10 @@ def _section(
     try:
         return changed(part, own, stated) if own else part
     except ValueError as reason:
-        raise ValueError(f"uncertainty.inputs: a draw is impossible: {prefix}{reason}") from None
+        raise ValueError(
+            f"uncertainty.inputs: a draw is impossible: {prefix}{reason}; state a smaller or a "
+            "bounded uncertainty"
+        ) from None
 
 
 def reader(

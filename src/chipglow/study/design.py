@@ -15,7 +15,7 @@ from chipglow.scene import Scene
 from chipglow.study.budgets import errors_of, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
-from chipglow.study.sweeps import Method, axis, in_si, points_of, studies_at
+from chipglow.study.sweeps import Method, axis, in_si, point_text, points_of, studies_at
 from chipglow.text import Notes
 from chipglow.uncertainty import Input, Inputs
 
@@ -113,7 +113,8 @@ class Design:
             own=np.arange(len(self.settings)) == 0,
             excluded=[self.reasons.get(number, "") for number in range(len(self.settings))],
         )
-        return frame.sort_values(["excluded", "regret_K"], kind="stable")
+        order = np.lexsort([frame.regret_K, frame.excluded != ""])
+        return frame.iloc[order]
 
 
 def design(
@@ -149,7 +150,7 @@ def design(
     Raises
     ------
     ValueError
-        If a path is not of camera or surface, or all settings are impossible.
+        If a path is not of camera or surface, all settings are impossible, or draws are below 16.
 
     Notes
     -----
@@ -162,14 +163,18 @@ def design(
     for path in vary:
         if path.partition(".")[0] not in ("camera", "surface"):
             raise ValueError(f"vary: {path!r}, expected a path in camera, surface")
+    if draws < _FEWEST_DRAWS:
+        raise ValueError(f"draws: {draws}, expected {_FEWEST_DRAWS} or more")
     axes = {path: axis(values) for path, values in vary.items()}
-    own = {path: setting_at(study, path).value for path in axes}
-    every = [own, *points_of(axes, method, samples, study.seed)]
+    points = list(points_of(axes, method, samples, study.seed))
+    studies = [study, *studies_at(study, points)]
+    every = [{path: setting_at(study, path).value for path in axes}, *points]
     settings = [{path: in_si(study, path, one[path]) for path in one} for one in every]
     unique = [n for n, one in enumerate(settings) if one not in settings[:n]]
-    studies = [study, *studies_at(study, every[1:])]
+    labels = ["own settings", *map(point_text, points)]
+    cases = {labels[n]: studies[n] for n in unique}
     with fitted_study(study, progress, False) as fitted:
-        search = _Search([studies[n] for n in unique], fitted.scene, tuple(at), study.seed)
+        search = _Search(cases, fitted.scene, tuple(at), study.seed)
         counts = [draws]
         while counts[0] >= _FEWEST_DRAWS * _KEPT:
             counts.insert(0, counts[0] // _KEPT)
@@ -189,10 +194,11 @@ class _Search:
     """Values of the readings at each setting, as far as they are drawn."""
 
     def __init__(
-        self, studies: Sequence[Study | str], scene: Scene, at: tuple[str, ...], seed: int
+        self, cases: Mapping[str, Study | str], scene: Scene, at: tuple[str, ...], seed: int
     ) -> None:
-        self.studies, self.scene, self.at, self.seed = studies, scene, at, seed
-        self.reasons = {n: one for n, one in enumerate(studies) if isinstance(one, str)}
+        self.labels, self.studies = list(cases), list(cases.values())
+        self.scene, self.at, self.seed = scene, at, seed
+        self.reasons = {n: one for n, one in enumerate(self.studies) if isinstance(one, str)}
         self.names: tuple[str, ...] = ()
         self.numbers: dict[int, Array] = {}
 
@@ -208,7 +214,7 @@ class _Search:
         except ValueError as error:
             if not number:  # the study itself
                 raise
-            self.reasons[number] = str(error)
+            self.reasons[number] = f"{self.labels[number]}: {error}"
             return
         self.names = readings.names
         earlier = self.numbers.get(number, np.zeros((0, len(self.names), SATURATED + 1)))
@@ -238,12 +244,15 @@ class _Search:
             draws[n], bias[n] = len(errors), errors.mean(axis=0)
             spread[n] = _COVERAGE * errors.std(axis=0, ddof=1)
             lost[n], full[n] = numbers[..., [BELOW, SATURATED]].mean(axis=0).T
-            if lost[n].max() > below:
-                reasons[n] = f"{lost[n].max():.0%} of a place is below the range"
-            elif full[n].max() > saturated:
-                reasons[n] = f"{full[n].max():.0%} of a place is saturated"
-            elif not np.isfinite(bias[n]).all():
-                reasons[n] = "a place is not in every image"
+            for parts, most, state in (
+                (lost[n], below, "below the lower range limit"),
+                (full[n], saturated, "saturated"),
+            ):
+                if parts.max() > most:
+                    worst = self.names[parts.argmax()]
+                    reasons[n] = f"{self.labels[n]}: {worst}: {parts.max():.0%} of it is {state}"
+            if not np.isfinite(bias[n]).all():
+                reasons[n] = f"{self.labels[n]}: a place is not in every image"
         return Design(tuple(settings), self.names, bias, spread, lost, full, draws, reasons, notes)
 
 

@@ -302,11 +302,15 @@ def studies_at(study: Study, points: Sequence[Mapping[str, Any]]) -> list[Study 
         try:
             studies.append(changed(study, point))
         except (ValueError, LookupError) as error:
-            stated = ", ".join(f"{path} = {value}" for path, value in point.items())
-            studies.append(f"{stated}: {error}")
+            studies.append(f"{point_text(point)}: {error}")
     if all(isinstance(one, str) for one in studies):
         raise ValueError(studies[0])
     return studies
+
+
+def point_text(point: Mapping[str, Any]) -> str:
+    """Return a point's settings as text, as they were given."""
+    return ", ".join(f"{path} = {value}" for path, value in point.items())
 
 
 def in_si(study: Study, path: str, value: Any) -> Any:

@@ -93,8 +93,7 @@ def budget(
     random inputs from a Sobol sequence. The contribution of a random or discrete input is the root
     of half the mean square of the change when it alone is drawn again (Jansen, 1999).
     """
-    if trials < _LEAST:
-        raise ValueError(f"trials: {trials}, expected {_LEAST} or more")
+    check_trials(trials)
     progress("sensitivities", 0.0)
     values, slopes, scatter = _first_order(model, inputs, generator)
     progress("sensitivities", 1.0)
@@ -117,6 +116,12 @@ def budget(
     progress("variance", 1.0)
     estimate = _estimate(inputs, values, slopes, scatter)
     return Budget(inputs, estimate, slopes, monte_carlo, indices)
+
+
+def check_trials(trials: int) -> None:
+    """Raise a ValueError if a Monte Carlo has too few trials."""
+    if trials < _LEAST:
+        raise ValueError(f"trials: {trials}, expected {_LEAST} or more")
 
 
 def _first_order(
