@@ -151,8 +151,15 @@ def init(
     current().file(path)
 
 
-for main_command in (run, error, cut, import_source, measure, wavelengths, sweep, budget, design):
-    app.command("import" if main_command is import_source else None)(main_command)
+app.command()(run)
+app.command()(error)
+app.command()(cut)
+app.command("import")(import_source)
+app.command()(measure)
+app.command()(wavelengths)
+app.command()(sweep)
+app.command()(budget)
+app.command()(design)
 
 
 @app.command()
