@@ -19,7 +19,8 @@ _EXTREMES: Final = ("mean", "most negative", "greatest")
 LINE_REACH, LINE_STEP = 60e-6, 1e-6
 """Reach of the lines across rake face and shear band to either side, and their points' distance."""
 
-_ACROSS: Final = LINE_STEP * np.arange(-60.0, 61.0)
+_STEPS: Final = round(LINE_REACH / LINE_STEP)
+_ACROSS: Final = LINE_STEP * np.arange(-_STEPS, _STEPS + 1.0)
 """Distances of the points of such a line in m."""
 
 TOUCHING: Final = 3e-6

@@ -162,7 +162,7 @@ def design(
 
 def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]") -> "pd.DataFrame":
     """Return the frame with the settings as text in their units."""
-    from chipglow.report.design_figure import value_text
+    from chipglow.quantities import value_text
 
     return frame.assign(
         **{

@@ -24,6 +24,7 @@ from chipglow.quantities.settings import (
     setting_at as setting_at,
     settings as settings,
     value_at as value_at,
+    value_text as value_text,
 )
 from chipglow.quantities.units import (
     ZERO_CELSIUS as ZERO_CELSIUS,

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from chipglow.quantities.parameter import Parameter
 from chipglow.quantities.part import Part, PartType, adapter, families, first_sentence, problem
+from chipglow.quantities.units import Quantity
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,15 @@ def setting_at(part: Part, path: str) -> Setting:
             owner, at = inner, count
     found = {one.name: one for one in own_settings(owner)}[keys[at]]
     return replace(found, path=path, value=value_at(part, path))
+
+
+def value_text(value: object, quantity: Quantity | None) -> str:
+    """Return the value of a setting in its unit."""
+    if isinstance(value, str):
+        return value
+    if value is None or value != value:
+        return "none"
+    return quantity.text(value) if quantity and isinstance(value, float) else f"{value}"
 
 
 def changed(

@@ -11,7 +11,6 @@ from chipglow.drawing import drawing, scales
 from chipglow.study import StudyBudget
 from chipglow.study.budgets import CAMERA, SCENE, SURFACE
 
-GROUPS: Final = (SCENE, SURFACE, CAMERA)
 _LARGEST: Final = 6
 _HEIGHT: Final = 0.22
 """Height of a bar in inches."""
@@ -20,7 +19,8 @@ _HEIGHT: Final = 0.22
 def draw_budget(result: StudyBudget) -> Figure:
     """Draw the largest contributions to each reading, coloured by group, and their total."""
     frame, summary = result.to_frame(), result.summary().set_index("reading")
-    colour_of = dict(zip(dict.fromkeys([*GROUPS, *frame.group]), cycle(scales.COLOURS)))
+    every = dict.fromkeys([SCENE, SURFACE, CAMERA, *frame.group])
+    colour_of = dict(zip(every, cycle(scales.COLOURS)))
     groups = [one for one in colour_of if one in set(frame.group)]
     count = min(frame.input.nunique(), _LARGEST) + 1
     with drawing.style():

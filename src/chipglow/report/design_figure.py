@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing, scales
-from chipglow.quantities import Quantity
+from chipglow.quantities import Quantity, value_text
 from chipglow.study import Design
 
 
@@ -45,12 +45,3 @@ def draw_design(result: Design, quantities: Mapping[str, Quantity | None]) -> Fi
 def setting_text(path: str, value: object, quantities: Mapping[str, Quantity | None]) -> str:
     """Return a setting's name without its section, and its value in its unit."""
     return f"{path.partition('.')[2].replace('_', ' ')} {value_text(value, quantities[path])}"
-
-
-def value_text(value: object, quantity: Quantity | None) -> str:
-    """Return the value of a setting in its unit."""
-    if isinstance(value, str):
-        return value
-    if value is None or value != value:
-        return "none"
-    return quantity.text(value) if quantity and isinstance(value, float) else f"{value}"

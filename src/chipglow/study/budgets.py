@@ -34,7 +34,7 @@ from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes
 from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget
-from chipglow.uncertainty.budget import check_trials
+from chipglow.uncertainty.budget import LEAST_TRIALS, check_trials
 from chipglow.uncertainty.surrogate import Surrogate
 
 SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
@@ -276,7 +276,7 @@ def corrected_temperatures(
             raise ValueError("{}: {} in the image, {} in the study".format(name, *texts))
     study = changed(study, {"analysis.reference": "mean"})
     rows = {row.name: row for row in measured.rows}
-    result = study_budget(study, tuple(rows), 100, 2, progress=progress)
+    result = study_budget(study, tuple(rows), LEAST_TRIALS, 2, progress=progress)
     estimates = {}
     for name, row in rows.items():
         names = zip(result.readings, result.places, strict=True)

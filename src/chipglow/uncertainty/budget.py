@@ -19,8 +19,8 @@ Model: TypeAlias = Callable[[Array], Array]
 _DRAWS: Final = 64
 """Draws of the random inputs over which a sensitivity is a mean."""
 
-_LEAST: Final = 100
-"""Smallest number of trials."""
+LEAST_TRIALS: Final = 100
+"""Smallest number of trials of a Monte Carlo."""
 
 _RESAMPLES: Final = 200
 """Resamples of the intervals of Sobol's indices."""
@@ -120,8 +120,8 @@ def budget(
 
 def check_trials(trials: int) -> None:
     """Raise a ValueError if a Monte Carlo has too few trials."""
-    if trials < _LEAST:
-        raise ValueError(f"trials: {trials}, expected {_LEAST} or more")
+    if trials < LEAST_TRIALS:
+        raise ValueError(f"trials: {trials}, expected {LEAST_TRIALS} or more")
 
 
 def _first_order(
