@@ -78,6 +78,7 @@ from chipglow.camera.optics.blurs import (
     Vibration as Vibration,
 )
 from chipglow.camera.optics.convolution import blur as blur
+from chipglow.camera.optics.image_formation import ImageFormation as ImageFormation
 from chipglow.camera.optics.psf import (
     PSFS as PSFS,
     AiryAperture as AiryAperture,

@@ -1,10 +1,10 @@
 """The virtual infrared camera."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from math import exp
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, Final, Literal
 from warnings import warn
 
 import numpy as np
@@ -17,7 +17,8 @@ from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows, lagged
 from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
-from chipglow.camera.optics.convolution import Beyond, blur, images
+from chipglow.camera.optics.convolution import Beyond, images, without_rounding
+from chipglow.camera.optics.image_formation import Gather, ImageFormation, sensitive_fraction
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
@@ -34,8 +35,6 @@ BORDER_TOLERANCE: Final = 1.0
 
 PAPER_LIMIT: Final = 573.15
 """Lower range limit in K of the paper's camera."""
-
-Gather: TypeAlias = Callable[[Array, Raster, Raster, float], Array]
 
 _ROUNDING: Final = 1e-13
 _FEWEST_SAMPLES: Final = 2.0
@@ -360,13 +359,33 @@ class Camera(Part):
             return self._displayed(self._collect(image, scene, "edge", gather), self.pixels(scene))
         return self._received(image, scene)[0]
 
+    def image_formation(
+        self, samples: Raster, beyond: Beyond = "edge", gather: Gather = integrate
+    ) -> ImageFormation:
+        """Return the linear map from the radiance of samples to the radiance of the pixels.
+
+        It has an adjoint, for corrections of measured images. Radiance beyond the samples continues
+        as at the edge, or is none; `gather` is as in `form_image`.
+        """
+        return ImageFormation(
+            samples,
+            self.pixels(samples),
+            self.psf,
+            self.psf_order == "detector",
+            self.fill_factor,
+            self.optics,
+            beyond,
+            gather,
+        )
+
     def _received(self, image: Array, scene: Raster) -> tuple[Array, Array]:
         """Return the received radiance if the scene's edges continue, and if nothing is beyond."""
         if self.psf is None or self.optics:
             return self._collect(image, scene, "edge"), self._collect(image, scene, "nothing")
         pixels = self.pixels(scene)
         if self.psf_order == "optics":
-            return images(image, self.psf, scene.spacing, (scene, pixels, self._sensitive(scene)))
+            sensitive = sensitive_fraction(self.psf, self.fill_factor, scene, pixels)
+            return images(image, self.psf, scene.spacing, (scene, pixels, sensitive))
         whole, own = whole_raster(scene, pixels)
         received = integrate(image, scene, whole, self.fill_factor)
         edge, nothing = images(received, self.psf, self.pitch)
@@ -376,28 +395,15 @@ class Camera(Part):
         self, image: Array, scene: Raster, beyond: Beyond, gather: Gather = integrate
     ) -> Array:
         """Apply point spread function, optics and footprint."""
-        pixels, blurred = self.pixels(scene), partial(blur, beyond=beyond)
-        if self.psf is not None and self.psf_order == "optics":
-            image = blurred(image, self.psf, scene.spacing)
-        for term in self.optics:
-            image = term.on_samples(image, scene, pixels, blurred)
-        if self.psf is None or self.psf_order == "optics":
-            return gather(image, scene, pixels, self._sensitive(scene))
-        # Pixels that are not read out supply the radiance around the others.
-        whole, own = whole_raster(scene, pixels)
-        return blurred(gather(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
+        received = self.image_formation(scene, beyond, gather).forward(image)
+        is_blurred = self.psf is not None or self.optics
+        return without_rounding(received) if is_blurred else received
 
     def _displayed(self, image: Array, pixels: Raster) -> Array:
         """Apply the optics' effects on pixel radiance."""
         for term in self.optics:
             image = term.on_pixels(image, pixels, self.band)
         return image
-
-    def _sensitive(self, scene: Raster) -> float:
-        """Return the fraction of a pixel to integrate: one sample if the PSF has a footprint."""
-        if not self._blur_has_footprint:
-            return self.fill_factor
-        return min((scene.spacing / self.pitch) ** 2, 1.0)
 
     @property
     def _blur_has_footprint(self) -> bool:

@@ -39,7 +39,8 @@ def images(
     radiance: Array, psf: PointSpreadFunction, spacing: float, grid: Grid | None = None
 ) -> tuple[Array, Array]:
     """Return both images by `blur`, with ``edge`` and ``nothing``, of samples or on pixels."""
-    return _optics(psf, spacing, radiance.shape, grid).images(radiance)
+    edge, nothing = convolution(psf, spacing, radiance.shape, grid).forward(radiance)
+    return without_rounding(edge), without_rounding(nothing)
 
 
 class _Kernel(NamedTuple):
@@ -79,17 +80,34 @@ class _Strip:
         sent = fft.irfft(line * self.spectrum, n=self.length, overwrite_x=True)
         light[self.lines] += sent[:, 2 * self.reach :][:, : edge.size]
 
+    def adjoint(self, light: Array, beyond: Literal["edge", "constant"]) -> Array:
+        """Return the adjoint of `add`, from light on the lines to values of the edge."""
+        count, reach = light.shape[1], self.reach
+        received = np.zeros((self.lines.size, self.length))
+        received[:, 2 * reach : 2 * reach + count] = light[self.lines]
+        line = (fft.rfft(received) * self.spectrum.conj()).sum(axis=0)
+        padded = fft.irfft(line, n=self.length)[: count + 2 * reach]
+        edge = padded[reach : reach + count]
+        if beyond == "edge":
+            edge[0] += padded[:reach].sum()
+            edge[-1] += padded[reach + count :].sum()
+        return np.asarray(edge)
+
 
 @dataclass(frozen=True, eq=False)
-class _Optics:
-    """A kernel, the weights of samples in pixels, and edges: left, right, upper and lower."""
+class Convolution:
+    """The linear map from a field to its blurred image, on samples or on pixels.
+
+    It consists of a kernel, the weights of samples in pixels, and the light from beyond the left,
+    right, upper and lower edge.
+    """
 
     kernel: _Kernel
     down: sparse.csr_array
     across: sparse.csr_array
     edges: tuple[_Strip, ...]
 
-    def images(self, field: Array) -> tuple[Array, Array]:
+    def forward(self, field: Array) -> tuple[Array, Array]:
         """Return the images of a field that continues beyond its edges, and that is zero there."""
         within = _sums(self.across, self._within(field).T).T
         left, right, top, bottom = self.edges
@@ -101,7 +119,27 @@ class _Optics:
         top.add(field[0], "constant", ends)
         bottom.add(field[-1], "constant", ends)
         beyond = _sums(self.down, sides.T) + _sums(self.across, ends.T).T
-        return _without_rounding(within + beyond), _without_rounding(within)
+        return within + beyond, within
+
+    def adjoint(self, image: Array, beyond: Beyond) -> Array:
+        """Return the adjoint of `forward` for one assumption about the field beyond its edges."""
+        rows = _sums(self.down.T, image)
+        field = self._within_adjoint(_sums(self.across.T, rows.T).T)
+        if beyond == "nothing":
+            return field
+        left, right, top, bottom = self.edges
+        columns = _sums(self.across.T, image.T).T
+        field[:, 0] += left.adjoint(rows.T, "edge")
+        field[:, -1] += right.adjoint(rows.T, "edge")
+        field[0] += top.adjoint(columns, "constant")
+        field[-1] += bottom.adjoint(columns, "constant")
+        return field
+
+    def _within_adjoint(self, image: Array) -> Array:
+        """Return the correlation with the kernel, of a field that is zero beyond its edges."""
+        (rows, columns), (spectrum, shape, _) = image.shape, self.kernel
+        transform = fft.rfft2(image, shape) * spectrum.conj()
+        return np.asarray(fft.irfft2(transform, shape)[:rows, :columns])
 
     def _within(self, field: Array) -> Array:
         """Return the convolution of a field that is zero beyond its edges, summed over rows."""
@@ -122,9 +160,13 @@ class _Optics:
 
 
 @lru_cache(maxsize=4)
-def _optics(
-    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: Grid | None
-) -> _Optics:
+def convolution(
+    psf: PointSpreadFunction, spacing: float, shape: tuple[int, int], grid: Grid | None = None
+) -> Convolution:
+    """Return the convolution of a field of this shape (y, x) with a point spread function.
+
+    With `grid`, its images are sums over pixels.
+    """
     (rows, columns), kernel = shape, _transformed(psf, spacing, shape)
     down, across = (
         line_weights(*grid)
@@ -138,7 +180,7 @@ def _optics(
         _Strip.from_sums(top, down, columns),
         _Strip.from_sums(bottom, down[:, ::-1], columns),
     )
-    return _Optics(kernel, down, across, edges)
+    return Convolution(kernel, down, across, edges)
 
 
 @lru_cache(maxsize=2)
@@ -163,6 +205,6 @@ def _sums(weights: sparse.csr_array, values: NDArray[Any]) -> NDArray[Any]:
     return values if weights.shape[0] == weights.shape[1] else weights @ values
 
 
-def _without_rounding(image: Array) -> Array:
+def without_rounding(image: Array) -> Array:
     """Set the rounding errors of transforms to zero."""
     return np.where(image > _ROUNDING * image.max(), image, 0.0)

@@ -26,7 +26,8 @@ OPTICS_TERMS: Final = Family("optics_term")
 class OpticsTerm(Part, ABC):
     """An effect of the optics on radiance in W/(m² sr), shape (y, x).
 
-    Subclasses override either method or both.
+    Subclasses override `on_samples`, which is linear, with its adjoint `from_samples`; or
+    `on_pixels`, which is affine in each pixel; or both.
     """
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
@@ -35,6 +36,12 @@ class OpticsTerm(Part, ABC):
         `blurred` is a convolution, which includes the assumption about radiance beyond the scene.
         """
         return radiance
+
+    def from_samples(self, image: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
+        """Return the adjoint of `on_samples`; `blurred` is the adjoint of the convolution."""
+        if type(self).on_samples is not OpticsTerm.on_samples:
+            raise ValueError(f"optics: the adjoint of {self.kind} is not implemented")
+        return image
 
     def on_pixels(self, radiance: Array, pixels: Raster, band: Band) -> Array:
         """Return the displayed radiance for the radiance that the pixels received."""
@@ -156,6 +163,9 @@ class Veil(OpticsTerm):
         veil = blurred(radiance, VeilPSF(self.radius), scene.spacing)
         return (1 - self.fraction) * radiance + self.fraction * veil
 
+    def from_samples(self, image: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
+        return self.on_samples(image, scene, pixels, blurred)  # the mixture is its own adjoint
+
 
 @OPTICS_TERMS.part
 @dataclass(frozen=True)
@@ -181,13 +191,30 @@ class Distortion(OpticsTerm):
     radius: Annotated[float, Parameter("Radius R, on the scene.", LENGTH)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
+        positions = self._positions(scene, pixels)
+        return np.asarray(map_coordinates(radiance, positions, order=1, mode="nearest"))
+
+    def from_samples(self, image: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
+        last = np.array(scene.shape)[:, None, None] - 1
+        positions = np.clip(self._positions(scene, pixels), 0, last)
+        below = np.minimum(np.floor(positions).astype(np.intp), np.maximum(last - 1, 0))
+        (row, column), (down, right) = below, positions - below
+        radiance = np.zeros(scene.shape)
+        for step, across in ((0, 1 - right), (1, right)):
+            beside = np.minimum(column + step, scene.columns - 1)
+            np.add.at(radiance, (row, beside), (1 - down) * across * image)
+            lower = np.minimum(row + 1, scene.rows - 1)
+            np.add.at(radiance, (lower, beside), down * across * image)
+        return radiance
+
+    def _positions(self, scene: Raster, pixels: Raster) -> Array:
+        """Return row and column of the scene that each sample of the image sees, (2, y, x)."""
         x, y = _from_axis(scene, pixels)
         shift = self.fraction * (x**2 + y**2) / self.radius**2
         rows, columns = (np.arange(count, dtype=np.float64) for count in scene.shape)
-        positions = np.stack(
+        return np.stack(
             [rows[:, None] - shift * y / scene.spacing, columns + shift * x / scene.spacing]
         )
-        return np.asarray(map_coordinates(radiance, positions, order=1, mode="nearest"))
 
 
 @OPTICS_TERMS.part
@@ -209,16 +236,36 @@ class FieldBlur(OpticsTerm):
     radius: Annotated[float, Parameter("Radius R at which it holds, on the scene.", LENGTH)]
 
     def on_samples(self, radiance: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
-        x, y = _from_axis(scene, pixels)
-        variance = (self.standard_deviation * (x**2 + y**2) / self.radius**2) ** 2
-        result, sharper, low, high = radiance.copy(), radiance, 0.0, (scene.spacing / 2) ** 2
-        while low < variance.max():
-            softer = blurred(radiance, GaussianPSF(FWHM_PER_SIGMA * sqrt(high)), scene.spacing)
-            here = (variance > low) & (variance <= high)
-            part = (variance[here] - low) / (high - low)
-            result[here] = sharper[here] + part * (softer[here] - sharper[here])
-            sharper, low, high = softer, high, 2 * high
+        weights = self._weights(scene, pixels)
+        result = weights.pop(0.0) * radiance
+        for variance, weight in weights.items():
+            result += weight * blurred(radiance, _gaussian(variance), scene.spacing)
         return result
+
+    def from_samples(self, image: Array, scene: Raster, pixels: Raster, blurred: Blur) -> Array:
+        weights = self._weights(scene, pixels)
+        result = weights.pop(0.0) * image
+        for variance, weight in weights.items():
+            result += blurred(weight * image, _gaussian(variance), scene.spacing)
+        return result
+
+    def _weights(self, scene: Raster, pixels: Raster) -> dict[float, Array]:
+        """Return the fraction of each sample from the image of each variance in m²; 0: sharp."""
+        x, y = _from_axis(scene, pixels)
+        wanted = (self.standard_deviation * (x**2 + y**2) / self.radius**2) ** 2
+        low, high = 0.0, (scene.spacing / 2) ** 2
+        weights = {low: np.where(wanted <= low, 1.0, 0.0)}
+        while low < wanted.max():
+            between = (wanted > low) & (wanted <= high)
+            part = np.where(between, (wanted - low) / (high - low), 0.0)
+            weights[low] += np.where(between, 1 - part, 0.0)
+            weights[high] = part
+            low, high = high, 2 * high
+        return weights
+
+
+def _gaussian(variance: float) -> GaussianPSF:
+    return GaussianPSF(FWHM_PER_SIGMA * sqrt(variance))
 
 
 def _from_axis(raster: Raster, pixels: Raster) -> tuple[Array, Array]:
