@@ -16,6 +16,7 @@ from chipglow.cli.budget import budget
 from chipglow.cli.camera import calibrate, psf
 from chipglow.cli.chip import rake, shearband
 from chipglow.cli.compare import compare
+from chipglow.cli.correct import correct
 from chipglow.cli.emissivity import emissivity, temperature
 from chipglow.cli.materials import materials
 from chipglow.cli.register import register
@@ -41,6 +42,7 @@ EXAMPLES = {
     "error": "scene.nc --emissivity 0.7 --out results",
     "cut": "study.yaml --out scene.nc",
     "import": "'chip_*.vtu' --set units.length=mm --set interval=1us --out scene.nc",
+    "correct": "measured.nc --study study.yaml --out corrected.nc --plot corrected.png",
     "measure": "scene.nc --study study.yaml --chip 'chip 2' --out measured.nc",
     "wavelengths": "study.yaml --plot bands.png",
     "sweep": "study.yaml --vary camera.integration_time=2us,5us,10us --out sweep",
@@ -226,7 +228,7 @@ def doctor() -> None:
 
 
 for command in (
-    calibrate, convert, emissivity, temperature, psf, register, rake, shearband, compare,
+    calibrate, convert, emissivity, temperature, correct, psf, register, rake, shearband, compare,
 ):  # fmt: skip
     app.command(rich_help_panel="The laboratory")(command)
 

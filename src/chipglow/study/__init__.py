@@ -11,6 +11,7 @@ from chipglow.study.cache import (
     cached_scenes as cached_scenes,
     clear_cache as clear_cache,
 )
+from chipglow.study.corrections import correct_study as correct_study
 from chipglow.study.cost import expected_cost as expected_cost
 from chipglow.study.design import Design as Design, design as design
 from chipglow.study.files import load_study as load_study, study_text as study_text

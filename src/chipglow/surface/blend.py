@@ -150,7 +150,7 @@ def in_blocks(count: int, work: Callable[[int, int], None], size: int | None = N
     """
     size = size or (count if get_num_threads() == 1 else 16)
     blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
-    if get_num_threads() == 1:
+    if get_num_threads() == 1 or len(blocks) == 1:
         for first, last in blocks:
             work(first, last)
         return

@@ -23,6 +23,9 @@ Grid: TypeAlias = tuple[Raster, Raster, float]
 
 _ROUNDING: Final = 1e-13
 _COLUMNS: Final = 32
+_SMALL: Final = 2**16
+"""Values of a field whose transform fits the processor's cache."""
+
 _MAX_REACH: Final = 2048
 """Largest half size of a kernel in squares; its border squares contain the light beyond."""
 
@@ -154,8 +157,10 @@ class Convolution:
             inside = fft.ifft(block, axis=0, overwrite_x=True)[:rows]
             summed[:, begin:end] = _sums(self.down, inside)
 
-        # A block of this size stays in the processor's cache between the transforms.
-        in_blocks(lines.shape[1], convolve, _COLUMNS)
+        # A block of this size stays in the processor's cache between the transforms. All of a small
+        # field does, and takes less time than to start threads.
+        columns_at_once = _COLUMNS if field.size > _SMALL else lines.shape[1]
+        in_blocks(lines.shape[1], convolve, columns_at_once)
         return np.asarray(fft.irfft(summed, n=shape[1], axis=1)[:, :columns])
 
 

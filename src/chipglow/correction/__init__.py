@@ -1,0 +1,23 @@
+"""The true temperature of every pixel from measured frames, with its uncertainty."""
+
+from chipglow.correction.correct import ROOM as ROOM, correct as correct
+from chipglow.correction.correction import (
+    UNDETERMINED as UNDETERMINED,
+    Correction as Correction,
+    CorrectionFlag as CorrectionFlag,
+    joined as joined,
+)
+from chipglow.correction.figure import draw_correction as draw_correction
+from chipglow.correction.file import (
+    read_correction as read_correction,
+    write_correction as write_correction,
+)
+from chipglow.correction.known import known_zones as known_zones
+from chipglow.correction.places import place_frame as place_frame, places_of as places_of
+from chipglow.correction.zones import (
+    Motion as Motion,
+    ObservedObject as ObservedObject,
+    SampledObject as SampledObject,
+    ShapedObject as ShapedObject,
+    Zone as Zone,
+)

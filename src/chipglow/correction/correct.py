@@ -1,0 +1,453 @@
+"""From measured frames to the true temperature of each pixel, with its uncertainty."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, replace
+from math import sqrt
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.special import stdtrit
+
+from chipglow.camera import Camera, Flag, ImageFormation, Measurement
+from chipglow.correction.cells import Parts, cut_cells
+from chipglow.correction.correction import Correction, CorrectionFlag
+from chipglow.correction.noise import noise_of
+from chipglow.correction.posterior import Image, Posterior, Problem
+from chipglow.correction.sensitivity import (
+    BIAS_FACTOR,
+    Effect,
+    Knowledge,
+    OutlineFit,
+    fit_outline,
+    noise_effect,
+    smoothing_effect,
+    systematic_effects,
+    texture_effect,
+)
+from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone
+from chipglow.quantities import Array
+from chipglow.radiometry import Band
+from chipglow.scene import Raster
+from chipglow.scene.scene import raster_coordinates
+from chipglow.text import Notes
+from chipglow.uncertainty import Estimate
+
+ROOM: Final = 293.0
+"""Temperature of the surroundings in K if none is stated: the paper's laboratory."""
+
+_MODEL_ERROR: Final = 5e-4
+"""Relative standard uncertainty of the predicted image.
+
+Images of analytic fields by cells of half a pixel differ by 0.02 K to 0.2 K from those by samples
+of an eighth of a pixel: 1e-4 to 8e-4 of the radiance.
+"""
+
+_OUTLINE_ROUNDS: Final = 3
+_OUTLINE_FOUND: Final = 0.02
+"""Motion of the outlines in pixels below which they stay."""
+
+_BORDER: Final = 3
+"""Width in pixels of the border whose values depend on what is beyond the image."""
+
+_LEVEL: Final = 0.95
+_LARGEST_PITCH_ERROR: Final = 1e-3
+
+
+def correct(
+    measurement: Measurement,
+    camera: Camera,
+    zones: Sequence[Zone] | ObservedObject,
+    *,
+    psf_uncertainty: float = 0.0,
+    outline_uncertainty: float = 0.0,
+    surroundings: Estimate | None = None,
+    noise: float | None = None,
+    seed: int = 2010,
+    progress: Callable[[float], None] | None = None,
+) -> Correction:
+    """Correct measured frames for emissivity, reflection, blur and footprint.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames of a real or of a simulated camera.
+    camera : Camera
+        Point spread function, its order, fill factor and further optics. Band and pitch must be
+        those of the measurement.
+    zones : sequence of Zone, or ObservedObject
+        Emissivities and outlines of the parts of the object; where zones overlap, the later one
+        counts.
+    psf_uncertainty : float
+        Relative standard uncertainty of the width of the point spread function, in addition to
+        that of a measured one.
+    outline_uncertainty : float
+        Standard uncertainty of the position of the outlines in m. If it is positive, the position
+        is estimated from each frame.
+    surroundings : Estimate, optional
+        Temperature of the surroundings in K; 293 K without uncertainty by default.
+    noise : float, optional
+        Standard deviation of the noise in K at 600 K. By default that of the measurement's
+        detector, or estimated from the frame.
+    seed : int
+        Seed of the draws by which uncertainties are propagated.
+    progress : callable, optional
+        Called with the completed fraction. An exception raised here ends the computation.
+
+    Returns
+    -------
+    Correction
+        Temperature of each pixel with interval, contributions and flags.
+
+    Raises
+    ------
+    ValueError
+        If band or pitch differ, no emissivity is known, or a frame has no pixel within the range.
+
+    Notes
+    -----
+    The unknown is the logarithm of the blackbody radiance on cells of half a pixel, cut by the
+    outlines. It minimises ½ Σ (y − A g)² / σ² + ½ Σ w (D x)² (Gauss-Newton with preconditioned
+    conjugate gradients); A forms the image, D are second differences within zones, and their
+    weights w follow from the data around each place by expectation maximisation. The bias of the
+    prior is estimated from the solution and corrected once. Uncertainties are propagated by the
+    linearised solution: systematic errors by one change each, random fields by draws. The
+    temperature is that of the mean radiance over pixel and exposure.
+    """
+    observed = zones if isinstance(zones, ObservedObject) else _shaped(zones, measurement.raster)
+    _check(measurement, camera, observed, psf_uncertainty, outline_uncertainty)
+    known = Knowledge(
+        observed,
+        measurement.band,
+        psf_uncertainty,
+        outline_uncertainty,
+        Estimate(np.array(ROOM)) if surroundings is None else surroundings,
+    )
+    frames = [
+        _corrected(
+            measurement,
+            frame,
+            camera,
+            known,
+            noise,
+            np.random.default_rng([seed, frame]),
+            _part_of(progress, frame, len(measurement)),
+        )
+        for frame in range(len(measurement))
+    ]
+    return _joined(measurement, frames, known)
+
+
+def _shaped(zones: Sequence[Zone], pixels: Raster) -> ShapedObject:
+    return ShapedObject(tuple(zones), pixels)
+
+
+def _part_of(
+    progress: Callable[[float], None] | None, frame: int, frames: int
+) -> Callable[[float], None]:
+    if progress is None:
+        return lambda fraction: None
+    return lambda fraction: progress((frame + fraction) / frames)
+
+
+def _check(
+    measurement: Measurement,
+    camera: Camera,
+    observed: ObservedObject,
+    psf_uncertainty: float,
+    outline_uncertainty: float,
+) -> None:
+    """Raise a ValueError if the correction is not defined."""
+    seen, stated = measurement.band, camera.band
+    if not np.allclose([seen.lower, seen.upper], [stated.lower, stated.upper], rtol=1e-6):
+        raise ValueError(
+            f"correct: the camera's band is {_band(stated)}, but that of the measurement is "
+            f"{_band(seen)}"
+        )
+    pitch = measurement.raster.spacing
+    if abs(camera.pitch / pitch - 1) > _LARGEST_PITCH_ERROR:
+        raise ValueError(
+            f"correct: the camera's pitch is {1e6 * camera.pitch:.6g} um, but that of the "
+            f"measurement is {1e6 * pitch:.6g} um"
+        )
+    if camera.psf is None:
+        raise ValueError("correct: the camera has no point spread function; state camera.psf")
+    if all(zone.emissivity is None for zone in observed.zones):
+        raise ValueError("correct: no zone has a known emissivity")
+    for name, value in (
+        ("psf_uncertainty", psf_uncertainty),
+        ("outline_uncertainty", outline_uncertainty),
+    ):
+        if not (np.isfinite(value) and value >= 0):
+            raise ValueError(f"correct: {name} is {value!r}, expected 0 or more")
+
+
+def _band(band: Band) -> str:
+    return f"{1e6 * band.lower:.4g} um to {1e6 * band.upper:.4g} um"
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """The solution of one frame."""
+
+    parts: Parts
+    x: Array
+    effects: tuple[Effect, ...]
+    image: Image
+    resolution: Array
+    """Side in m of the square that one datum determines, for each part."""
+    misfit: float
+    outline: OutlineFit | None
+    motion: Motion
+    notes: Notes
+
+
+def _corrected(
+    measurement: Measurement,
+    frame: int,
+    camera: Camera,
+    known: Knowledge,
+    noise: float | None,
+    generator: np.random.Generator,
+    progress: Callable[[float], None],
+) -> _Frame:
+    """Solve one frame, and propagate the uncertainties."""
+    image, notes = _image(measurement, frame, camera, noise)
+    pixels, fit = measurement.raster, None
+    posterior = _solution(image, camera, known, pixels, generator, progress)
+    if known.outline_uncertainty:
+        fit = fit_outline(posterior, known)
+    for _ in range(_OUTLINE_ROUNDS):
+        if fit is None or not fit.moves(_OUTLINE_FOUND * pixels.spacing):
+            break
+        observed = known.observed.moved(_added(known.observed.motion, fit.motion))
+        known = replace(known, observed=observed)
+        posterior = _solution(image, camera, known, pixels, generator, progress)
+        fit = fit_outline(posterior, known)
+    progress(0.5)
+    bias = posterior.bias()
+    noise_changes, data = noise_effect(posterior, generator)
+    effects = [
+        noise_changes,
+        smoothing_effect(posterior, generator),
+        Effect("smoothing", BIAS_FACTOR * bias[None]),
+        *texture_effect(posterior, known, generator),
+        *systematic_effects(posterior, known, measurement, frame),
+    ]
+    if fit is not None:
+        effects.append(Effect("outline", fit.effects))
+    progress(1.0)
+    return _Frame(
+        posterior.problem.parts,
+        posterior.x + bias,
+        tuple(effects),
+        image,
+        posterior.problem.parts.cells.spacing / np.sqrt(data),
+        posterior.misfit,
+        fit,
+        known.observed.motion,
+        notes,
+    )
+
+
+def _added(one: Motion, other: Motion) -> Motion:
+    return Motion(one.right + other.right, one.up + other.up, one.turn + other.turn)
+
+
+def _image(
+    measurement: Measurement, frame: int, camera: Camera, noise: float | None
+) -> tuple[Image, Notes]:
+    """Return a frame as data: flagged pixels become bounds, or are missing."""
+    flags, radiance = measurement.flags[frame], measurement.radiance[frame]
+    under = flags & Flag.UNDER_RANGE > 0
+    saturated = flags & Flag.SATURATED > 0
+    missing = flags & (Flag.DEAD | Flag.REPLACED) > 0
+    usable = ~(under | saturated | missing) & np.isfinite(radiance)
+    if not usable.any():
+        raise ValueError(f"correct: frame {frame} has no pixel within the range")
+    limit = measurement.data.attrs.get("lower_limit")
+    lowest = float(radiance[usable].min())
+    least = lowest if limit is None else float(measurement.band.radiance(float(limit)))
+    # Below the range, any radiance from 0 to the limit is equally probable.
+    known = np.where(under, least / 2, radiance)
+    missing |= ~np.isfinite(known)
+    deviation, notes = noise_of(measurement, frame, usable, noise)
+    deviation = np.where(under, least / sqrt(12), deviation)
+    received, gain = _received(np.where(missing, lowest, known), camera, measurement.raster)
+    spread = np.hypot(deviation / gain, _MODEL_ERROR * np.abs(received))
+    return Image(received, spread, under & ~missing, saturated & ~missing, missing), notes
+
+
+def _received(displayed: Array, camera: Camera, pixels: Raster) -> tuple[Array, Array]:
+    """Return the radiance that the pixels received, and the gain from it to the displayed one."""
+    dark, unit = np.zeros(pixels.shape), np.ones(pixels.shape)
+    for term in camera.optics:
+        dark = term.on_pixels(dark, pixels, camera.band)
+        unit = term.on_pixels(unit, pixels, camera.band)
+    gain = unit - dark
+    return (displayed - dark) / gain, gain
+
+
+def _solution(
+    image: Image,
+    camera: Camera,
+    known: Knowledge,
+    pixels: Raster,
+    generator: np.random.Generator,
+    progress: Callable[[float], None],
+) -> Posterior:
+    parts = cut_cells(known.observed, pixels)
+    formation = ImageFormation(
+        parts.cells,
+        pixels,
+        camera.psf,
+        camera.psf_order == "detector",
+        camera.fill_factor,
+        camera.optics,
+    )
+    room = float(known.band.radiance(known.surroundings.values))
+    cells = parts.cells.rows * parts.cells.columns
+    mirrored = np.bincount(parts.cell, parts.area * (1 - parts.emissivity), cells)
+    reflected = room * formation.forward(mirrored.reshape(parts.cells.shape))
+    return Problem(image, parts, formation, reflected).solve(generator, lambda: progress(0.0))
+
+
+def _joined(measurement: Measurement, frames: Sequence[_Frame], known: Knowledge) -> Correction:
+    """Return the frames' solutions on the pixels as a dataset."""
+    pixels, band = measurement.raster, measurement.band
+    zones = known.observed.zones
+    datasets = [_on_pixels(one, measurement, number, zones) for number, one in enumerate(frames)]
+    coordinates = raster_coordinates(pixels, measurement.times)
+    data = xr.concat(datasets, "time", data_vars="all", coords="minimal").assign_coords(coordinates)
+    data.attrs = {
+        "pitch": pixels.spacing,
+        "band_lower": band.lower,
+        "band_upper": band.upper,
+        "zones": ", ".join(zone.name for zone in zones),
+    }
+    notes = sum((one.notes for one in frames), Notes())
+    data.attrs |= notes.attrs()
+    return Correction(data)
+
+
+def _on_pixels(
+    solved: _Frame, measurement: Measurement, frame: int, zones: Sequence[Zone]
+) -> xr.Dataset:
+    """Return temperatures, intervals and effects of one frame on the pixels."""
+    parts, band, shape = solved.parts, measurement.band, measurement.raster.shape
+    known = np.array([zone.emissivity is not None for zone in zones])
+    zone = _zone_of_pixels(parts, known, shape)
+    mean = _pixel_means(parts, zone.ravel())
+    black = np.exp(parts.at_centroids @ solved.x)
+    radiance = (mean @ black).reshape(shape)
+    radiance = np.where(zone < 0, np.nan, radiance)
+    temperature = band.temperature(radiance)
+    per_kelvin = np.asarray(band.slope(temperature))
+    rows, sources, freedoms = [], [], []
+    for effect in solved.effects:
+        for change in effect.changes:
+            rows.append((mean @ (black * (parts.at_centroids @ change))).reshape(shape))
+            sources.append(effect.source)
+            freedoms.append(effect.degrees_of_freedom)
+    relative = np.stack(rows) / radiance
+    uncertainty, freedom = _combined(relative, np.array(sources), np.array(freedoms))
+    factor = stdtrit(freedom, (1 + _LEVEL) / 2)
+    lower, upper = (
+        np.asarray(band.temperature(radiance * np.exp(sign * factor * uncertainty)))
+        for sign in (-1.0, 1.0)
+    )
+    flags = _flags(solved.image, zone)
+    below, above = (
+        flags & one > 0 for one in (CorrectionFlag.UPPER_BOUND, CorrectionFlag.LOWER_BOUND)
+    )
+    images: dict[str, tuple[Any, str]] = {
+        "temperature": (np.where(below | above, np.nan, temperature), "K"),
+        "measured": (measurement.radiance_temperature()[frame], "K"),
+        "standard_uncertainty": (uncertainty * radiance / per_kelvin, "K"),
+        "lower": (np.where(below, np.nan, lower), "K"),
+        "upper": (np.where(above, np.nan, upper), "K"),
+        "flags": (flags, "1"),
+        "zone": (zone.astype(np.int16), "1"),
+        "resolution": ((mean @ solved.resolution).reshape(shape), "m"),
+    }
+    variables: dict[str, tuple[Any, ...]] = {
+        name: (("y", "x"), values, {"units": unit}) for name, (values, unit) in images.items()
+    }
+    kelvins = (relative * radiance / per_kelvin).astype(np.float32)
+    variables["effect"] = ("error", "y", "x"), kelvins, {"units": "K"}
+    variables["fine_temperature"] = (
+        ("fine_y", "fine_x"),
+        _fine(parts, black, known, band),
+        {"units": "K"},
+    )
+    variables["misfit"] = (), solved.misfit, {"units": "1"}
+    motion = np.array(astuple(solved.motion))
+    spread = (
+        np.array(astuple(solved.outline.standard_uncertainty)) if solved.outline else np.zeros(3)
+    )
+    variables["outline_motion"] = "motion", motion, {"units": "m, m, rad"}
+    variables["outline_uncertainty"] = "motion", spread, {"units": "m, m, rad"}
+    coordinates = {
+        "source": ("error", np.array(sources, dtype=str)),
+        "degrees_of_freedom": ("error", np.array(freedoms)),
+        "motion": ["right", "up", "turn"],
+        "fine_x": ("fine_x", parts.cells.x, {"units": "m"}),
+        "fine_y": ("fine_y", parts.cells.y, {"units": "m"}),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def _zone_of_pixels(
+    parts: Parts, known: NDArray[np.bool_], shape: tuple[int, int]
+) -> NDArray[np.intp]:
+    """Return the zone of known emissivity with the largest area in each pixel; −1 without one."""
+    pixels = shape[0] * shape[1]
+    areas = np.zeros((known.size, pixels))
+    np.add.at(areas, (parts.zone, parts.pixel), parts.area)
+    areas[~known] = 0.0
+    return np.where(areas.max(axis=0) > 0, areas.argmax(axis=0), -1).reshape(shape)
+
+
+def _pixel_means(parts: Parts, zone: NDArray[np.intp]) -> Any:
+    """Return the sparse array (pixel, part) of means by area over each pixel's zone."""
+    own = np.flatnonzero(zone[parts.pixel] == parts.zone)
+    sums = np.bincount(parts.pixel[own], parts.area[own], zone.size)
+    weights = parts.area[own] / sums[parts.pixel[own]]
+    return sparse.csr_array((weights, (parts.pixel[own], own)), shape=(zone.size, parts.size))
+
+
+def _combined(effects: Array, sources: NDArray[np.str_], freedoms: Array) -> tuple[Array, Array]:
+    """Return the standard uncertainty and its degrees of freedom (JCGM 100:2008, G.4.1)."""
+    squares = effects**2
+    total, fourth = squares.sum(axis=0), np.zeros(effects.shape[1:])
+    for source in dict.fromkeys(sources.tolist()):
+        own = (sources == source) & np.isfinite(freedoms)
+        if own.any():
+            fourth += squares[own].sum(axis=0) ** 2 / freedoms[own][0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(total), np.where(fourth > 0, total**2 / fourth, np.inf)
+
+
+def _flags(image: Image, zone: NDArray[np.intp]) -> NDArray[np.uint8]:
+    border = np.ones(zone.shape, np.bool_)
+    border[_BORDER:-_BORDER, _BORDER:-_BORDER] = False
+    held = {
+        CorrectionFlag.UPPER_BOUND: image.under_range,
+        CorrectionFlag.LOWER_BOUND: image.lower_bound,
+        CorrectionFlag.INTERPOLATED: image.missing,
+        CorrectionFlag.NOT_DETERMINED: zone < 0,
+        CorrectionFlag.BORDER: border,
+    }
+    flags = [np.where(mask, flag, 0) for flag, mask in held.items()]
+    return np.asarray(np.sum(flags, axis=0), np.uint8)
+
+
+def _fine(parts: Parts, black: Array, known: NDArray[np.bool_], band: Band) -> Array:
+    """Return the temperature in K of the largest part of known emissivity in each cell."""
+    order = np.argsort(np.where(known[parts.zone], parts.area, -1.0))
+    found = np.full(parts.cells.rows * parts.cells.columns, np.nan)
+    determined = order[known[parts.zone[order]]]
+    found[parts.cell[determined]] = band.temperature(black[determined])
+    return found.reshape(parts.cells.shape).astype(np.float32)

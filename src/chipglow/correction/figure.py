@@ -1,0 +1,42 @@
+"""Figure of a correction: measured and corrected temperature, and half-width of the interval."""
+
+from typing import Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from chipglow.camera import Measurement
+from chipglow.correction.correction import Correction
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import ImagePanel
+from chipglow.quantities import ZERO_CELSIUS
+
+_PANEL_WIDTH: Final = 2.2
+_AROUND: Final = 0.85
+_LARGEST_PERCENTILE: Final = 98.0
+"""Upper end of the scale of half-widths: pixels near the range limit are far wider."""
+
+
+def draw_correction(correction: Correction, measurement: Measurement, frame: int = 0) -> Figure:
+    """Draw one frame as measured and as corrected on one scale, and the interval's half-width."""
+    raster = correction.raster
+    measured = measurement.celsius(frame)
+    data = correction.data.isel(time=frame)
+    corrected = data["temperature"].values - ZERO_CELSIUS
+    half_width = np.where(
+        np.isfinite(corrected), (data["upper"].values - data["lower"].values) / 2, np.nan
+    )
+    heat = scales.ends(np.concatenate([measured, corrected]), 0.5, 99.5)
+    widths = (0.0, float(np.nanpercentile(half_width, _LARGEST_PERCENTILE)))
+    panels = (
+        ImagePanel("measured", "radiance temperature / °C", measured, heat, scales.HEAT),
+        ImagePanel("corrected", "true temperature / °C", corrected, heat, scales.HEAT),
+        ImagePanel("half-width of the 95 % interval", "K", half_width, widths),
+    )
+    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
+    with drawing.style():
+        figure = drawing.new_figure(height)
+        for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
+            panel.draw(figure, axes, raster)
+            axes.label_outer()
+    return figure

@@ -1,0 +1,254 @@
+"""The most probable radiance of the parts, and draws from its distribution (Gauss-Newton, CG)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg, splu
+
+from chipglow.camera import ImageFormation
+from chipglow.correction.cells import CELLS_PER_PIXEL, Parts
+from chipglow.correction.prior import Curvature
+from chipglow.quantities import Array
+
+_LARGEST_STEP: Final = 0.7
+"""Largest change of the logarithm of radiance in one step: a factor of two."""
+
+_CONVERGED: Final = 3e-3
+"""Change of the logarithm of radiance, 0.3 %, below which the steps end: 0.2 K at 1000 K."""
+
+_MOST_STEPS: Final = 8
+_STEP_TOLERANCE: Final = 1e-2
+_DRAW_TOLERANCE: Final = 3e-2
+"""Relative residuals of steps and of draws: a step is repeated, and 3 % of a draw of an error is
+far below the scatter of a standard deviation from a few draws."""
+
+_RIDGE: Final = 1e-8
+"""Weak weight of all values, so that parts without data and without neighbours are determined."""
+
+_START_CURVATURE: Final = 0.02
+"""Standard deviation of curvatures before they are known: 2 % of the radiance."""
+
+_ROUNDS: Final = 3
+"""Rounds in which the weights of the prior follow from the solution and its uncertainty."""
+
+_DRAWS_PER_ROUND: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """The measured radiance of the pixels, (y, x), as data."""
+
+    radiance: Array
+    """In W/(m² sr)."""
+    noise: Array
+    """Standard deviation in W/(m² sr)."""
+    under_range: NDArray[np.bool_]
+    """Pixels below the range; their radiance and noise are those of a uniform distribution."""
+    lower_bound: NDArray[np.bool_]
+    """Saturated pixels: their radiance is at least the stated one."""
+    missing: NDArray[np.bool_]
+    """Pixels without data."""
+
+    def weights(self, model: Array) -> Array:
+        """Return the weights of the pixels, 0 where a bound holds or data are missing."""
+        holds = self.lower_bound & (model >= self.radiance)
+        return np.where(holds | self.missing, 0.0, 1 / self.noise**2)
+
+
+@dataclass(eq=False)
+class Problem:
+    """The radiance of parts from an image: ½ Σ (y − A g)² / σ² + ½ Σ w (D x)², g = a ε exp(C x).
+
+    x is the logarithm of the blackbody radiance of each zone at the centres of its cells, C the
+    interpolation to the centroids of the parts, a ε the parts' area and emissivity, A the formation
+    of the image, D the curvatures within zones. `reflected` is the image of the reflected radiance.
+    """
+
+    image: Image
+    parts: Parts
+    formation: ImageFormation
+    reflected: Array
+    curvature: Curvature = field(init=False)
+    weights: Array = field(init=False)
+    """Weights w of the curvatures."""
+
+    def __post_init__(self) -> None:
+        self.curvature = Curvature.of(self.parts)
+        self.weights = self.curvature.weights(_START_CURVATURE**2, self.parts)
+
+    @cached_property
+    def shine(self) -> Array:
+        """Area times emissivity of the parts."""
+        return np.asarray(self.parts.area * self.parts.emissivity)
+
+    def radiance(self, x: Array) -> Array:
+        """Return the mean blackbody radiance of the parts in W/(m² sr)."""
+        return np.asarray(np.exp(self.parts.at_centroids @ x))
+
+    def model(self, x: Array) -> Array:
+        """Return the image that a solution predicts."""
+        return Posterior(self, x).predicted
+
+    def solve(self, generator: np.random.Generator, check: Callable[[], None]) -> "Posterior":
+        """Return the solution, with weights of the prior that follow from the data.
+
+        The variance of the curvatures is their mean square around each place, which includes their
+        uncertainty (expectation maximisation of the evidence, with a few draws for it).
+        """
+        x = self._start()
+        posterior = self._maximum(x, _MOST_STEPS, check)
+        for _ in range(_ROUNDS):
+            draws = [posterior.draw(generator) for _ in range(_DRAWS_PER_ROUND)]
+            check()
+            values = (self.curvature.matrix @ draw for draw in draws)
+            uncertain = sum(value**2 for value in values) / _DRAWS_PER_ROUND
+            squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
+            self.weights = self.curvature.weights(squares, self.parts)
+            posterior = self._maximum(posterior.x, 2, check)
+        return posterior
+
+    def _start(self) -> Array:
+        """Return the solution without blur: each cell has the radiance of its pixel."""
+        parts, image = self.parts, self.image
+        own = np.where(image.missing, np.nan, image.radiance - self.reflected)
+        own = np.where(np.isnan(own), np.nanmedian(own), own)
+        mixed = np.bincount(parts.cell, self.shine, parts.cells.rows * parts.cells.columns)
+        radiance = own.ravel()[parts.pixel] / mixed[parts.cell]
+        least = 1e-3 * np.abs(np.median(radiance))
+        return np.asarray(np.log(np.maximum(radiance, least)))
+
+    def _maximum(self, x: Array, steps: int, check: Callable[[], None]) -> "Posterior":
+        """Return the most probable solution with the present weights of the prior."""
+        posterior = Posterior(self, x)
+        factor = posterior.factor()
+        for _ in range(steps):
+            check()
+            posterior.preconditioner = factor
+            change = posterior.solved(posterior.gradient, _STEP_TOLERANCE)
+            change = change.clip(-_LARGEST_STEP, _LARGEST_STEP)
+            posterior = Posterior(self, posterior.x + change)
+            if np.abs(change).max() < _CONVERGED:
+                break
+        posterior.preconditioner = factor
+        return posterior
+
+
+class Posterior:
+    """The distribution of a solution, linearised: a normal one with the inverse of its Hessian."""
+
+    def __init__(self, problem: Problem, x: Array) -> None:
+        self.problem, self.x = problem, x
+        self.sent = problem.shine * problem.radiance(x)
+        """Radiance that the parts send, and its change with its logarithm."""
+        self.centroids = problem.parts.at_centroids
+        self.spread = problem.parts.spread(x)
+        self.predicted = self.seen(self.sent) + problem.reflected
+        self.pixel_weights = problem.image.weights(self.predicted)
+        self.prior_weights = problem.weights
+        self.preconditioner: Any = None
+        """Factors of a similar Hessian by `factor`, which serve several steps."""
+
+    @property
+    def residual(self) -> Array:
+        """Measured minus predicted radiance, (y, x)."""
+        return np.asarray(self.problem.image.radiance - self.predicted)
+
+    @property
+    def misfit(self) -> float:
+        """Mean square of the residuals in units of the noise."""
+        counted = self.pixel_weights > 0
+        squares = self.residual[counted] ** 2 * self.pixel_weights[counted]
+        return float(squares.mean()) if counted.any() else 0.0
+
+    @property
+    def gradient(self) -> Array:
+        matrix = self.problem.curvature.matrix
+        prior = matrix.T @ (self.prior_weights * (matrix @ self.x))
+        return np.asarray(self.response(self.residual) - prior)
+
+    def response(self, image: Array) -> Array:
+        """Return the right side of `solved` for a change of the measured radiance."""
+        return self._sent_back(self.pixel_weights * image)
+
+    def changed(self, image: Array) -> Array:
+        """Return the change of the solution with a change of the measured radiance, (part,)."""
+        return self.solved(self.response(image), _DRAW_TOLERANCE)
+
+    def solved(self, right: Array, tolerance: float) -> Array:
+        """Solve with the Hessian by preconditioned conjugate gradients."""
+        size = self.x.size
+        hessian = LinearOperator((size, size), self._product)
+        preconditioner = LinearOperator((size, size), self.preconditioner.solve)
+        solution, _ = cg(hessian, right, rtol=tolerance, maxiter=200, M=preconditioner)
+        return np.asarray(solution, np.float64)
+
+    def noise_response(self, generator: np.random.Generator) -> Array:
+        """Return the right side of `solved` for a draw of the noise."""
+        noise = generator.standard_normal(self.pixel_weights.shape)
+        return self._sent_back(np.sqrt(self.pixel_weights) * noise)
+
+    def prior_response(self, generator: np.random.Generator) -> Array:
+        """Return the right side of `solved` for a draw of the curvatures."""
+        curvatures = generator.standard_normal(self.prior_weights.size)
+        matrix = self.problem.curvature.matrix
+        return np.asarray(matrix.T @ (np.sqrt(self.prior_weights) * curvatures))
+
+    def draw(self, generator: np.random.Generator) -> Array:
+        """Return a draw of the solution's error (perturbation of data and prior), (part,)."""
+        return self.draw_of(self.noise_response(generator) + self.prior_response(generator))
+
+    def draw_of(self, right: Array) -> Array:
+        """Return the change of the solution for a drawn right side."""
+        return self.solved(right, _DRAW_TOLERANCE)
+
+    def bias(self) -> Array:
+        """Return the decrease of the solution by the prior, estimated from the solution, (part,).
+
+        Added once, it halves the order of the bias (iterated regularisation; Engl, Hanke and
+        Neubauer, Regularization of Inverse Problems, 5.1).
+        """
+        matrix = self.problem.curvature.matrix
+        return self.solved(matrix.T @ (self.prior_weights * (matrix @ self.x)), _STEP_TOLERANCE)
+
+    def _sent_back(self, image: Array) -> Array:
+        """Return the adjoint of the linearised image."""
+        returned = self.spread.T @ self.problem.formation.adjoint(image).ravel()
+        return np.asarray(self.centroids.T @ (self.sent * returned))
+
+    def seen(self, sent: Array) -> Array:
+        """Return the image of the radiance that the parts send."""
+        return self.problem.formation.forward(self._light(sent))
+
+    @property
+    def light(self) -> Array:
+        """Radiance that the cells send, (row, column)."""
+        return self._light(self.sent)
+
+    def _light(self, sent: Array) -> Array:
+        return np.asarray(self.spread @ sent).reshape(self.problem.parts.cells.shape)
+
+    def _product(self, change: Array) -> Array:
+        matrix = self.problem.curvature.matrix
+        data = self.response(self.seen(self.sent * (self.centroids @ change)))
+        prior = matrix.T @ (self.prior_weights * (matrix @ change))
+        return np.asarray(data + prior + _RIDGE * change)
+
+    def factor(self) -> Any:
+        """Return factors of the Hessian without blur."""
+        matrix, parts = self.problem.curvature.matrix, self.problem.parts
+        weight = self.pixel_weights.ravel()[parts.pixel]
+        # A detail of two pixels or more has this part of its energy in the image of its cells.
+        data = weight * self.sent**2 / parts.area / (2 * CELLS_PER_PIXEL**2)
+        prior = matrix.T @ sparse.diags_array(self.prior_weights) @ matrix
+        whole = sparse.csc_array(prior + sparse.diags_array(data + _RIDGE))
+        return splu(
+            whole,
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )

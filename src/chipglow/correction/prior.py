@@ -1,0 +1,93 @@
+"""The prior: the logarithm of radiance is smooth within a zone, and free across outlines."""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.ndimage import gaussian_filter
+
+from chipglow.camera.optics.psf import FWHM_PER_SIGMA
+from chipglow.correction.cells import Parts
+from chipglow.quantities import Array
+
+_NEIGHBOURHOOD: Final = 5.0
+"""Full width at half maximum, in cells, of the window over which the roughness is averaged.
+
+About two pixels: wide enough for 25 curvatures in each mean, narrow enough to tell a shear band of
+a few pixels from its surroundings.
+"""
+
+_LEAST_VARIANCE: Final = 1e-12
+"""Smallest variance of a curvature: 1e-6 of the radiance from cell to cell, far below noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curvature:
+    """Second differences of the parts' values within zones: along rows, columns and mixed.
+
+    The sum of their squares is the discrete bending energy, which does not depend on the direction
+    of the axes.
+    """
+
+    matrix: Any
+    """Sparse array (difference, part)."""
+    part: NDArray[np.intp]
+    """The part in the middle of each difference."""
+
+    @classmethod
+    def of(cls, parts: Parts) -> "Curvature":
+        rows: list[tuple[NDArray[np.intp], Array]] = []
+        for index in parts.index:
+            for lines in (index, index.T):
+                rows.append(
+                    _known(np.stack([lines[1:-1], lines[:-2], lines[2:]]), (-2.0, 1.0, 1.0))
+                )
+            corners = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+            mixed = sqrt(2.0)
+            rows.append(_known(np.stack(corners), (mixed, -mixed, -mixed, mixed)))
+        blocks = [_sparse(members, weights, parts.size) for members, weights in rows]
+        middle = np.concatenate([members[0] for members, _ in rows])
+        return cls(sparse.vstack(blocks).tocsr(), middle)
+
+    def weights(self, squares: Array | float, parts: Parts) -> Array:
+        """Return the inverse of the mean squares around each difference, within its zone.
+
+        In the smoother half of each zone, the median of the zone counts: where there is no detail,
+        the data cannot show that there is less than that.
+        """
+        squares = np.broadcast_to(squares, self.part.shape)
+        variance = np.empty(self.part.size)
+        zones = parts.zone[self.part]
+        for zone in range(len(parts.index)):
+            own = np.flatnonzero(zones == zone)
+            if own.size:
+                around = local_mean(squares[own], parts.cell[self.part[own]], parts.cells.shape)
+                variance[own] = np.maximum(around, np.median(around))
+        return np.asarray(1 / np.maximum(variance, _LEAST_VARIANCE))
+
+
+def _known(members: NDArray[np.intp], weights: tuple[float, ...]) -> tuple[NDArray[np.intp], Array]:
+    """Return the differences whose members all exist, (member, difference), and their weights."""
+    members = members.reshape(len(weights), -1)
+    return members[:, (members >= 0).all(axis=0)], np.array(weights)
+
+
+def _sparse(members: NDArray[np.intp], weights: Array, parts: int) -> Any:
+    count = members.shape[1]
+    rows = np.tile(np.arange(count), len(weights))
+    values = np.repeat(weights, count)
+    return sparse.csr_array((values, (rows, members.ravel())), shape=(count, parts))
+
+
+def local_mean(values: Array, cell: NDArray[np.intp], shape: tuple[int, int]) -> Array:
+    """Return the mean of values in cells over a window around each."""
+    size = shape[0] * shape[1]
+    total, count = (
+        np.bincount(cell, weights, size).reshape(shape) for weights in (values, np.ones(cell.size))
+    )
+    width = _NEIGHBOURHOOD / FWHM_PER_SIGMA
+    around = [gaussian_filter(one, width, mode="constant") for one in (total, count)]
+    return np.asarray((around[0] / np.maximum(around[1], _LEAST_VARIANCE)).ravel()[cell])

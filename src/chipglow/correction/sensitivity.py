@@ -1,0 +1,299 @@
+"""What the corrected radiance owes to each source of uncertainty: changes of the solution."""
+
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass, replace
+from math import inf
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+from chipglow.camera import ImageFormation, MeasuredPSF, Measurement, PointSpreadFunction
+from chipglow.camera.optics.psf import FWHM_PER_SIGMA
+from chipglow.correction.cells import Parts, cut_cells
+from chipglow.correction.posterior import Posterior
+from chipglow.correction.prior import local_mean
+from chipglow.correction.zones import Motion, ObservedObject
+from chipglow.quantities import Array
+from chipglow.radiometry import Band
+from chipglow.uncertainty import Estimate
+
+DRAWS: Final = 12
+"""Draws of each random field: a standard uncertainty from 12 draws has a relative one of 20 %,
+which Student's factor of 12 degrees of freedom contains."""
+
+BIAS_FACTOR: Final = 2.0
+"""Standard uncertainty of smoothing in units of the estimated bias of the solution.
+
+The bias is estimated from the solution itself, which is smoother than the truth. With this factor
+the intervals at outlines held 95 % on the scenes of ``benchmarks/correction.py`` for tuning.
+"""
+
+_WIDTH_STEP: Final = 0.01
+"""Relative change of the width of the point spread function for derivatives."""
+
+_OUTLINE_STEP: Final = 0.25
+"""Displacement of the outlines in pixels for derivatives: wider than the 1/16 of a look-up."""
+
+_PSF_DRAWS: Final = 6
+
+_LEAST_DATA: Final = 1e-4
+"""Least number of data for a part: below it, a detail would be larger than 100 cells."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """Changes of the parts' values (error, part) by errors of one standard uncertainty each."""
+
+    source: str
+    changes: Array
+    degrees_of_freedom: float = inf
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """What is known of camera, object and surroundings, with standard uncertainties."""
+
+    observed: ObservedObject
+    band: Band
+    psf_uncertainty: float
+    """Relative standard uncertainty of the width of the point spread function."""
+    outline_uncertainty: float
+    """Standard uncertainty of the position of the outlines in m, in each direction."""
+    surroundings: Estimate
+    """Temperature of the surroundings in K."""
+
+
+def noise_effect(posterior: Posterior, generator: np.random.Generator) -> tuple[Effect, Array]:
+    """Return the effect of the noise, by draws, and the data that determine each part.
+
+    The number of data is the diagonal of the resolution matrix H⁻¹ Gᵀ W G, estimated by the same
+    draws and averaged over neighbours.
+    """
+    right_sides = [posterior.noise_response(generator) for _ in range(DRAWS)]
+    effect = _drawn("noise", posterior, right_sides)
+    products = np.stack(right_sides) * effect.changes * np.sqrt(DRAWS)
+    parts = posterior.problem.parts
+    data = local_mean(products.mean(axis=0), parts.cell, parts.cells.shape)
+    return effect, np.maximum(data, _LEAST_DATA)
+
+
+def smoothing_effect(posterior: Posterior, generator: np.random.Generator) -> Effect:
+    """Return the effect of the unknown curvatures, by draws of the prior."""
+    curvatures = [posterior.prior_response(generator) for _ in range(DRAWS)]
+    return _drawn("smoothing", posterior, curvatures)
+
+
+def _drawn(source: str, posterior: Posterior, right_sides: list[Array]) -> Effect:
+    changes = np.stack([posterior.draw_of(right) for right in right_sides])
+    return Effect(source, changes / np.sqrt(len(right_sides)), len(right_sides))
+
+
+def systematic_effects(
+    posterior: Posterior, known: Knowledge, measurement: Measurement, frame: int
+) -> Iterator[Effect]:
+    """Yield the effects of systematic errors: of emissivity, point spread function and others."""
+    images = {
+        "emissivity": list(_emissivity_images(posterior, known)),
+        "psf": list(_psf_images(posterior, known)),
+        "calibration": _calibration_images(measurement, frame),
+        "surroundings": list(_surroundings_images(posterior, known)),
+        "border": [_border_image(posterior)],
+        "range": _range_images(posterior),
+    }
+    for source, changes in images.items():
+        if changes:
+            yield Effect(source, np.stack([posterior.changed(image) for image in changes]))
+
+
+def texture_effect(
+    posterior: Posterior, known: Knowledge, generator: np.random.Generator
+) -> Iterator[Effect]:
+    """Yield the effect of the texture of the emissivity, by draws of a field of its grain."""
+    zones = known.observed.zones
+    if not any(zone.texture for zone in zones):
+        return
+    parts = posterior.problem.parts
+    draws = []
+    for _ in range(DRAWS):
+        relative = np.zeros(parts.size)
+        for number, zone in enumerate(zones):
+            own = np.flatnonzero(parts.zone == number)
+            if zone.texture and own.size:
+                field = _grainy_field(zone.grain, parts, generator)
+                relative[own] = zone.texture * field[parts.cell[own]] / parts.emissivity[own]
+        draws.append(posterior.changed(posterior.seen(posterior.sent * relative)))
+    yield Effect("texture", np.stack(draws) / np.sqrt(DRAWS), DRAWS)
+
+
+def _grainy_field(grain: float, parts: Parts, generator: np.random.Generator) -> Array:
+    """Return a random field on the cells, of mean 0, standard deviation 1 and a length in m."""
+    width = grain / parts.cells.spacing / FWHM_PER_SIGMA
+    field = gaussian_filter(generator.standard_normal(parts.cells.shape), width, mode="wrap")
+    return np.asarray(field / field.std()).ravel()
+
+
+def _emissivity_images(posterior: Posterior, known: Knowledge) -> Iterator[Array]:
+    """Yield the change of the image by the common error of each zone's emissivity."""
+    parts = posterior.problem.parts
+    reflected = float(known.band.radiance(known.surroundings.values))
+    for number, zone in enumerate(known.observed.zones):
+        if zone.uncertainty and (parts.zone == number).any():
+            relative = np.where(parts.zone == number, zone.uncertainty / parts.emissivity, 0.0)
+            own = posterior.sent - parts.area * parts.emissivity * reflected
+            yield posterior.seen(own * relative)
+
+
+def _psf_images(posterior: Posterior, known: Knowledge) -> Iterator[Array]:
+    """Yield changes of the image by the width and the stated components of the PSF."""
+    formation = posterior.problem.formation
+    psf = formation.psf
+    if psf is None:
+        return
+    if known.psf_uncertainty:
+        wide, narrow = (
+            _image_with(posterior, _stretched(psf, 1 + sign * _WIDTH_STEP, formation))
+            for sign in (1, -1)
+        )
+        yield (wide - narrow) * known.psf_uncertainty / (2 * _WIDTH_STEP)
+    if isinstance(psf, MeasuredPSF) and psf.components:
+        generator = np.random.default_rng(0)
+        plain = _image_with(posterior, replace(psf, components=()))
+        for _ in range(_PSF_DRAWS):
+            error = sum(
+                component.effects @ generator.standard_normal(component.cause.errors)
+                for component in psf.components
+            )
+            weights = psf.weights + np.reshape(error, psf.weights.shape) / np.sqrt(_PSF_DRAWS)
+            changed = MeasuredPSF(np.maximum(weights, 0.0), psf.spacing, includes=psf.includes)
+            yield _image_with(posterior, changed) - plain
+
+
+def _stretched(
+    psf: PointSpreadFunction, factor: float, formation: ImageFormation
+) -> PointSpreadFunction:
+    """Return a point spread function with all lengths multiplied by a factor."""
+    spacing = formation.samples.spacing / 4
+    return MeasuredPSF(psf.kernel(spacing), spacing * factor, includes=psf.includes)
+
+
+def _image_with(posterior: Posterior, psf: PointSpreadFunction) -> Array:
+    formation = replace(posterior.problem.formation, psf=psf)
+    return formation.forward(posterior.light)
+
+
+def _calibration_images(measurement: Measurement, frame: int) -> list[Array]:
+    errors = measurement.calibration_errors
+    if errors is None:
+        return []
+    return list(errors.at(np.nan_to_num(measurement.radiance[frame])))
+
+
+def _surroundings_images(posterior: Posterior, known: Knowledge) -> Iterator[Array]:
+    uncertainty = float(known.surroundings.standard_uncertainty)
+    if uncertainty:
+        slope = float(known.band.slope(known.surroundings.values))
+        parts = posterior.problem.parts
+        yield posterior.seen(parts.area * (1 - parts.emissivity)) * slope * uncertainty
+
+
+def _range_images(posterior: Posterior) -> list[Array]:
+    """Return the change if all pixels below the range are brighter by a standard deviation."""
+    image = posterior.problem.image
+    return [np.where(image.under_range, image.noise, 0.0)] if image.under_range.any() else []
+
+
+def _border_image(posterior: Posterior) -> Array:
+    """Return the change if the radiance beyond the image resembles what each pixel sees in it.
+
+    The solution takes it as that of the edge, as cameras do.
+    """
+    formation = posterior.problem.formation
+    within = replace(formation, beyond="nothing")
+    fraction = within.forward(np.ones(formation.samples.shape))
+    return within.forward(posterior.light) / fraction - formation.forward(posterior.light)
+
+
+@dataclass(frozen=True, eq=False)
+class OutlineFit:
+    """The motion of the outlines, from their present position, that the image shows."""
+
+    motion: Motion
+    effects: Array
+    """Changes of the parts' values by what remains uncertain of it, (3, part)."""
+    standard_uncertainty: Motion
+
+    def moves(self, least: float) -> bool:
+        """Return whether the outlines move by a length in m or more."""
+        return max(abs(self.motion.right), abs(self.motion.up)) >= least
+
+
+def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
+    """Estimate the motion of the outlines together with the radiance, linearised.
+
+    The image shows the position where the radiance changes across an outline. Where it does not,
+    the stated uncertainty remains.
+    """
+    parts, turn_radius = posterior.problem.parts, _turn_radius(posterior.problem.parts)
+    images, responses = [], []
+    for direction in np.eye(3):
+        image = _motion_image(posterior, known.observed, direction, turn_radius)
+        images.append(image)
+        responses.append(posterior.changed(image))
+    weights = posterior.pixel_weights
+    information = np.eye(3) / known.outline_uncertainty**2
+    unexplained = [
+        image - posterior.seen(posterior.sent * (parts.at_centroids @ response))
+        for image, response in zip(images, responses, strict=True)
+    ]
+    information += [[(weights * one * other).sum() for other in unexplained] for one in images]
+    information = (information + information.T) / 2
+    scale = np.array([1.0, 1.0, 1 / turn_radius])
+    stated = np.array(astuple(known.observed.motion)) / scale
+    slope = np.array([(weights * image * posterior.residual).sum() for image in images])
+    slope -= stated / known.outline_uncertainty**2
+    motion = np.linalg.solve(information, slope)
+    root = np.linalg.cholesky(np.linalg.inv(information))
+    spread = np.sqrt(np.diag(np.linalg.inv(information))) * scale
+    changes = -root.T @ np.stack(responses)
+    return OutlineFit(Motion(*(motion * scale)), changes, Motion(*spread))
+
+
+def _turn_radius(parts: Parts) -> float:
+    """Return the distance in m at which a turn is as large as a shift: a quarter of the image."""
+    return max(parts.pixels.shape) * parts.pixels.spacing / 4
+
+
+def _motion_image(
+    posterior: Posterior, observed: ObservedObject, direction: Array, turn_radius: float
+) -> Array:
+    """Return the change of the image with a motion of the outlines, per m."""
+    step = _OUTLINE_STEP * posterior.problem.parts.pixels.spacing
+    images = []
+    for sign in (1.0, -1.0):
+        shift = sign * step * direction
+        right, up, turn = astuple(observed.motion)
+        moved = Motion(right + shift[0], up + shift[1], turn + shift[2] / turn_radius)
+        images.append(_image_of_moved(posterior, observed.moved(moved)))
+    return np.asarray((images[0] - images[1]) / (2 * step))
+
+
+def _image_of_moved(posterior: Posterior, observed: ObservedObject) -> Array:
+    """Return the image of moved zones whose fields stay and continue into new cells."""
+    problem = posterior.problem
+    parts = cut_cells(observed, problem.parts.pixels)
+    x = np.empty(parts.size)
+    for number in np.unique(parts.zone):
+        own = parts.zone == number
+        x[own] = _continued(posterior.x, problem.parts.index, int(number))[parts.cell[own]]
+    light = parts.spread(x) @ (parts.area * parts.emissivity * np.exp(parts.at_centroids @ x))
+    return problem.formation.forward(light.reshape(parts.cells.shape))
+
+
+def _continued(x: Array, index: NDArray[np.intp], zone: int) -> Array:
+    """Return the values of a zone at all cells, those of the nearest cell beyond the zone."""
+    if zone >= len(index) or (index[zone] < 0).all():
+        return np.full(index[0].size, float(np.median(x)))
+    nearest = distance_transform_edt(index[zone] < 0, return_distances=False, return_indices=True)
+    return np.asarray(x[index[zone][tuple(nearest)]]).ravel()
