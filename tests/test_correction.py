@@ -1,0 +1,347 @@
+"""The true temperature of every pixel: solution, intervals, flags and refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
+from chipglow.camera import Flag, ImageFormation
+from chipglow.correction import (
+    CorrectionFlag,
+    Zone,
+    correct,
+    known_zones,
+    read_correction,
+    write_correction,
+)
+from chipglow.correction.cells import cut_cells
+from chipglow.correction.posterior import Image, Problem
+from chipglow.correction.zones import Motion, ShapedObject
+from chipglow.laboratory.emissivity import EmissivityLine
+from chipglow.scene import Polygon, Region
+
+PITCH = 6e-6
+SAMPLES = 8
+"""Samples along a pixel of the images that stand for measured ones."""
+
+BAND = Band(3.8e-6, 5.1e-6)
+CAMERA = Camera(pitch=PITCH, psf=AnnularAperturePSF(), psf_order="optics", lower_limit=None)
+DARK = Estimate(np.array(200.0))
+"""Surroundings that hardly radiate."""
+
+EDGE = 0.6
+"""Position of the outline between chip and tool, of the width of the image."""
+
+
+def half_plane(pixels, position, lean=0.2):
+    """Return the part of an image to the right of a line that leans, as a region in m."""
+    left, right, bottom, top = pixels.extent
+    x = left + position * (right - left)
+    far = right + (right - left)
+    corners = (x, bottom), (far, bottom), (far, top), (x + lean * (top - bottom), top)
+    return Region("tool", Polygon(corners), unit="m")
+
+
+def scene(count=24, position=EDGE):
+    """Return temperature and emissivity on samples, and the pixels: a hot chip beside a tool."""
+    pixels = Raster(0.0, count * PITCH, PITCH, count, count)
+    samples = Raster(0.0, count * PITCH, PITCH / SAMPLES, count * SAMPLES, count * SAMPLES)
+    x, y = np.meshgrid(samples.x, samples.y)
+    tool = half_plane(pixels, position).shape.holds(x, y)
+    across = (x - y) / (count * PITCH)
+    band = 150.0 * np.exp(-(((across + 0.1) * count / 3) ** 2))
+    kelvins = np.where(tool, 820.0 - 150.0 * x / (count * PITCH), 900.0 + 80.0 * across + band)
+    return kelvins, np.where(tool, 0.58, 0.42), samples, pixels
+
+
+def measured(kelvins, emissivity, samples, pixels, netd=0.5, seed=4, **settings):
+    """Return the measurement of a scene, with noise in K at 600 K."""
+    light = CAMERA.image_formation(samples).forward(emissivity * BAND.radiance(kelvins))
+    noise = netd * float(BAND.slope(600.0))
+    light = light + np.random.default_rng(seed).normal(0.0, noise, light.shape)
+    return Measurement.from_radiance(light[None], BAND, np.zeros(1), pixels, **settings)
+
+
+def zones(pixels, position=EDGE, **chip):
+    return [Zone("chip", 0.42, **chip), Zone("tool", 0.58, half_plane(pixels, position))]
+
+
+def pixel_truth(kelvins, emissivity, zone):
+    """Return the temperature of the mean radiance over each pixel's part of its zone."""
+    radiance, truth = BAND.radiance(kelvins), np.full(zone.shape, np.nan)
+    for number, value in enumerate((0.42, 0.58)):
+        own = emissivity == value
+        sums, count = (
+            np.where(own, one, 0.0).reshape(zone.shape[0], SAMPLES, zone.shape[1], SAMPLES)
+            for one in (radiance, 1.0)
+        )
+        mean = sums.sum((1, 3)) / np.maximum(count.sum((1, 3)), 1)
+        truth = np.where(zone == number, mean, truth)
+    return BAND.temperature(truth)
+
+
+@pytest.fixture(scope="module")
+def chip_and_tool():
+    """Return the corrected image of chip and tool, its truth, and the measurement."""
+    kelvins, emissivity, samples, pixels = scene()
+    image = measured(kelvins, emissivity, samples, pixels)
+    result = correct(image, CAMERA, zones(pixels), surroundings=DARK, noise=0.5)
+    truth = pixel_truth(kelvins, emissivity, result.data["zone"][0].values)
+    return result, truth, image
+
+
+def inside(image, width=3):
+    mask = np.zeros(image.shape, bool)
+    mask[width:-width, width:-width] = True
+    return mask
+
+
+def test_a_uniform_object_is_unchanged_within_the_noise():
+    pixels = Raster(0.0, 20 * PITCH, PITCH, 20, 20)
+    light = np.full((1, 20, 20), 0.5 * float(BAND.radiance(800.0)))
+    noise = 0.5 * float(BAND.slope(600.0))
+    light += np.random.default_rng(2).normal(0.0, noise, light.shape)
+    image = Measurement.from_radiance(light, BAND, np.zeros(1), pixels)
+    result = correct(image, CAMERA, [Zone("plate", 0.5)], surroundings=DARK, noise=0.5)
+    error = result.data["temperature"][0].values - 800.0
+    # Noise of one pixel: 0.5 K at 600 K is this much true temperature at 800 K.
+    single = noise / 0.5 / float(BAND.slope(800.0))
+    assert np.sqrt((error**2).mean()) < single
+    # The mean of 400 pixels scatters by a twentieth of that; four standard deviations.
+    assert abs(error.mean()) < 4 * single / 20
+
+
+def test_blur_across_the_outline_is_taken_back(chip_and_tool):
+    result, truth, image = chip_and_tool
+    zone = result.data["zone"][0].values
+    emissivity = np.where(zone == 1, 0.58, 0.42)
+    alone = BAND.temperature(image.radiance[0] / emissivity) - truth
+    error = result.data["temperature"][0].values - truth
+    beside = np.zeros(zone.shape, bool)
+    beside[:, 1:] |= zone[:, 1:] != zone[:, :-1]
+    beside[:, :-1] |= zone[:, 1:] != zone[:, :-1]
+    beside &= inside(zone)
+    assert np.sqrt((alone[beside] ** 2).mean()) > 15.0  # there is an error to take back
+    assert np.sqrt((error[beside] ** 2).mean()) < 0.35 * np.sqrt((alone[beside] ** 2).mean())
+    rest = inside(zone) & ~beside
+    assert np.sqrt((error[rest] ** 2).mean()) < np.sqrt((alone[rest] ** 2).mean())
+
+
+def test_intervals_hold_the_truth(chip_and_tool):
+    result, truth, _ = chip_and_tool
+    lower, upper = (result.data[name][0].values for name in ("lower", "upper"))
+    held = ((lower <= truth) & (truth <= upper))[inside(truth)]
+    # 95 % are promised; errors of neighbours are correlated, so that 18 x 18 pixels are about
+    # 80 independent ones, whose fraction scatters by 2.4 %: three standard deviations.
+    assert held.mean() > 0.95 - 3 * 0.024
+
+
+def test_the_solution_is_that_of_a_dense_newton_method():
+    """The same objective, with dense matrices and finite differences, has the same minimum."""
+    kelvins, emissivity, samples, pixels = scene(8)
+    image = measured(kelvins, emissivity, samples, pixels)
+    parts = cut_cells(ShapedObject(tuple(zones(pixels)), pixels), pixels)
+    formation = ImageFormation(parts.cells, pixels, CAMERA.psf, False, 1.0)
+    noise = np.full(pixels.shape, 0.5 * float(BAND.slope(600.0)))
+    nothing = np.zeros(pixels.shape, bool)
+    data = Image(image.radiance[0], noise, nothing, nothing, nothing)
+    problem = Problem(data, parts, formation, np.zeros(pixels.shape))
+    posterior = problem.solve(np.random.default_rng(1), lambda: None)
+    weights, curvature = posterior.prior_weights, problem.curvature.matrix.toarray()
+    shine, centroids = parts.area * parts.emissivity, parts.at_centroids.toarray()
+    columns = [
+        formation.forward(cell.reshape(parts.cells.shape)).ravel()
+        for cell in np.eye(parts.cells.rows * parts.cells.columns)
+    ]
+    matrix = np.stack(columns, axis=1)
+
+    x = posterior.x.copy()
+    for _ in range(30):
+        sent = shine * np.exp(centroids @ x)
+        seen = matrix @ parts.spread(x).toarray()
+        jacobian = (seen * sent) @ centroids / noise.ravel()[:, None]
+        residual = (image.radiance[0].ravel() - seen @ sent) / noise.ravel()
+        hessian = jacobian.T @ jacobian + curvature.T @ (weights[:, None] * curvature)
+        step = np.linalg.solve(
+            hessian, jacobian.T @ residual - curvature.T @ (weights * (curvature @ x))
+        )
+        x = x + step
+        if np.abs(step).max() < 1e-12:
+            break
+    spread = np.sqrt(np.diag(np.linalg.inv(hessian)))
+    # Steps end at a change of 0.3 %; that is within a fifth of each standard uncertainty here.
+    assert (np.abs(posterior.x - x) < 0.2 * spread).all()
+
+    draws = np.stack([posterior.draw(np.random.default_rng(n)) for n in range(200)])
+    ratio = np.sqrt((draws**2).mean(axis=0)) / spread
+    # A standard deviation of 200 draws scatters by 5 %; the largest of 300 values by 4 of these.
+    assert np.abs(ratio - 1).max() < 4 * 0.05 + 0.05
+
+
+def test_contributions_sum_to_the_standard_uncertainty():
+    kelvins, emissivity, samples, pixels = scene(16)
+    image = measured(kelvins, emissivity, samples, pixels)
+    known = zones(pixels, uncertainty=0.02, texture=0.01)
+    result = correct(image, CAMERA, known, surroundings=DARK, noise=0.5, psf_uncertainty=0.03)
+    assert {"noise", "smoothing", "emissivity", "texture", "psf"} <= set(result.sources)
+    squares = sum(result.contribution(source) ** 2 for source in result.sources)
+    stated = result.data["standard_uncertainty"][0].values
+    # Effects are stored with 24 bits.
+    np.testing.assert_allclose(np.sqrt(squares), stated, rtol=1e-5)
+
+
+def test_an_emissivity_error_contributes_as_equation_2_says():
+    pixels = Raster(0.0, 16 * PITCH, PITCH, 16, 16)
+    light = np.full((1, 16, 16), 0.5 * float(BAND.radiance(900.0)))
+    image = Measurement.from_radiance(light, BAND, np.zeros(1), pixels)
+    result = correct(image, CAMERA, [Zone("plate", 0.5, None, 0.025)], surroundings=DARK, noise=0.1)
+    expected = 0.05 * float(BAND.radiance(900.0)) / float(BAND.slope(900.0))
+    # The solution is linearised and its draws are solved to 3 %.
+    np.testing.assert_allclose(result.contribution("emissivity"), expected, rtol=0.03)
+
+
+def test_the_outline_is_found():
+    kelvins, emissivity, samples, pixels = scene()
+    image = measured(kelvins, emissivity, samples, pixels)
+    off = 0.4 * PITCH
+    moved = zones(pixels, EDGE + off / (24 * PITCH))
+    result = correct(
+        image, CAMERA, moved, surroundings=DARK, noise=0.5, outline_uncertainty=0.5 * PITCH
+    )
+    normal = np.array([1.0, -0.2]) / np.hypot(1.0, 0.2)
+    found = result.data["outline_motion"][0].values[:2] @ normal
+    assert abs(found + off * normal[0]) < 0.05 * PITCH
+
+
+def test_pixels_out_of_range_have_one_bound():
+    kelvins, emissivity, samples, pixels = scene()
+    plain = measured(kelvins, emissivity, samples, pixels)
+    flags = np.zeros((1, *pixels.shape), np.uint8)
+    flags[0, 5:8, 5:8] = Flag.SATURATED
+    flags[0, 12, 12] = Flag.DEAD
+    limit = float(np.quantile(plain.radiance_temperature(), 0.1))
+    image = Measurement.from_radiance(
+        plain.radiance, BAND, np.zeros(1), pixels, lower_limit=limit, flags=flags
+    )
+    result = correct(image, CAMERA, zones(pixels), surroundings=DARK, noise=0.5)
+    data, found = result.data.isel(time=0), result.data["flags"][0].values
+    above, below = (
+        found & one > 0 for one in (CorrectionFlag.LOWER_BOUND, CorrectionFlag.UPPER_BOUND)
+    )
+    assert above[5:8, 5:8].all() and above.sum() == 9
+    assert below.any()
+    assert np.isnan(data["temperature"].values[above | below]).all()
+    assert np.isfinite(data["lower"].values[above]).all()
+    assert np.isnan(data["upper"].values[above]).all()
+    assert np.isfinite(data["upper"].values[below]).all()
+    assert np.isnan(data["lower"].values[below]).all()
+    assert found[12, 12] & CorrectionFlag.INTERPOLATED
+    assert np.isfinite(data["temperature"].values[12, 12])
+
+
+def test_places_of_a_result(chip_and_tool, tmp_path):
+    result, _, _ = chip_and_tool
+    point = result.at((8 * PITCH, 12 * PITCH))
+    row = 24 - 12
+    assert float(point.values) == result.data["temperature"][0].values[row, 8]
+    stated = result.data["standard_uncertainty"][0].values[row, 8]
+    assert float(point.standard_uncertainty) == pytest.approx(stated, rel=1e-5)
+    budget = result.budget((8 * PITCH, 12 * PITCH))
+    assert list(budget["standard_uncertainty"]) == sorted(
+        budget["standard_uncertainty"], reverse=True
+    )
+    region = result.at(Region("square", Polygon.rectangle((4.0, 4.0), (8.0, 8.0))))
+    assert float(region.standard_uncertainty) < stated  # the noise of 16 pixels averages
+    with pytest.raises(ValueError, match="outside the image"):
+        result.at((-PITCH, 0.0))
+    write_correction(result, tmp_path / "corrected.nc")
+    again = read_correction(tmp_path / "corrected.nc")
+    assert again.data.equals(result.data)
+    assert len(result.to_frame()) == 24 * 24
+    assert "Correction" in repr(result)
+
+
+def test_the_same_seed_gives_the_same_result(chip_and_tool):
+    result, _, image = chip_and_tool
+    again = correct(image, CAMERA, zones(image.raster), surroundings=DARK, noise=0.5)
+    assert again.data.equals(result.data)
+
+
+def test_zones_of_the_laboratory():
+    pixels = Raster(0.0, 24 * PITCH, PITCH, 24, 24)
+    part = half_plane(pixels, EDGE)
+    lines = {
+        "tool": EmissivityLine.constant(0.58, 0.02),
+        "chip": EmissivityLine.constant(0.42, 0.03),
+    }
+    chip, tool = known_zones(lines, [part], elsewhere="chip")
+    assert (chip.emissivity, chip.uncertainty, chip.shape) == (0.42, pytest.approx(0.03), None)
+    assert (tool.emissivity, tool.uncertainty, tool.shape) == (0.58, pytest.approx(0.02), part)
+    outside, _ = known_zones(lines, [part])
+    assert outside.emissivity is None
+    with pytest.raises(ValueError, match="'band' has no emissivity"):
+        known_zones(lines, [part], elsewhere="band")
+
+
+def test_outside_the_known_zones_nothing_is_determined():
+    kelvins, emissivity, samples, pixels = scene()
+    image = measured(kelvins, emissivity, samples, pixels)
+    chip, tool = zones(pixels)
+    result = correct(image, CAMERA, [replace(chip, emissivity=None), tool], surroundings=DARK)
+    unknown = result.data["flags"][0].values & CorrectionFlag.NOT_DETERMINED > 0
+    assert unknown.any() and not unknown.all()
+    assert np.isnan(result.data["temperature"][0].values[unknown]).all()
+    assert np.isfinite(result.data["temperature"][0].values[~unknown]).all()
+
+
+def test_a_moved_object_is_looked_up_where_it_came_from():
+    pixels = Raster(0.0, 24 * PITCH, PITCH, 24, 24)
+    stated = ShapedObject(tuple(zones(pixels)), pixels)
+    generator = np.random.default_rng(5)
+    x, y = generator.uniform(0.0, 24 * PITCH, (2, 200))
+    motion = Motion(3e-6, -2e-6, 0.1)
+    centre = np.array(stated.centre)
+    turn = np.array([[np.cos(0.1), -np.sin(0.1)], [np.sin(0.1), np.cos(0.1)]])
+    moved = (np.stack([x, y], axis=1) - centre) @ turn.T + centre + [3e-6, -2e-6]
+    labels, _ = stated.look_up(x, y)
+    found, _ = stated.moved(motion).look_up(*moved.T)
+    assert (found == labels).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"camera": replace(CAMERA, psf=None)}, "no point spread function"),
+        ({"camera": CAMERA.in_band(Band(8e-6, 12e-6))}, "band is 8 um to 12 um, but"),
+        ({"camera": replace(CAMERA, pitch=5e-6)}, "pitch is 5 um, but"),
+        ({"zones": [Zone("plate", None)]}, "no zone has a known emissivity"),
+        ({"psf_uncertainty": -1.0}, "psf_uncertainty is -1.0"),
+        ({"outline_uncertainty": np.nan}, "outline_uncertainty is nan"),
+    ],
+)
+def test_refusals(change, message):
+    pixels = Raster(0.0, 8 * PITCH, PITCH, 8, 8)
+    image = Measurement.from_radiance(np.full((1, 8, 8), 20.0), BAND, np.zeros(1), pixels)
+    arguments = {"camera": CAMERA, "zones": [Zone("plate", 0.5)]} | change
+    with pytest.raises(ValueError, match=message):
+        correct(image, **arguments)
+
+
+def test_an_image_below_the_range_is_refused():
+    pixels = Raster(0.0, 8 * PITCH, PITCH, 8, 8)
+    image = Measurement.from_radiance(
+        np.full((1, 8, 8), 20.0), BAND, np.zeros(1), pixels, lower_limit=2000.0
+    )
+    with pytest.raises(ValueError, match="frame 0 has no pixel within the range"):
+        correct(image, CAMERA, [Zone("plate", 0.5)])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"emissivity": 0.0}, {"emissivity": 1.2}, {"emissivity": 0.5, "uncertainty": -0.1},
+     {"emissivity": 0.5, "texture": 1.0}, {"emissivity": 0.5, "grain": 0.0}],
+)  # fmt: skip
+def test_zones_out_of_limits_are_refused(settings):
+    with pytest.raises(ValueError, match="zone plate"):
+        Zone("plate", **settings)
