@@ -171,7 +171,7 @@ def test_values_answer_the_message_that_caused_them_not_a_later_one(page_view):
 
 def test_the_error_of_the_true_temperature_has_emissivity_as_a_part_of_its_own(model):
     state = model.controls.changed(
-        model.controls.initial, {"analysis.reference": "true", "error_image": "emissivity"}
+        model.controls.initial, {"analysis.reference": "true-maximum", "error_image": "emissivity"}
     )
     picture = model.picture(state)
     numbers = model.numbers(picture)
@@ -494,7 +494,7 @@ def test_parts_sum_to_the_error_and_vanish_with_their_effects(opened):
     scene, start = opened.scene, opened.controls.initial.study.start
     camera = Study(camera={"psf": "none", "lower_limit": "none"}).camera.build()
     exposure = camera.expose(scene, CHIP_1, start)
-    for reference in ("maximum", "mean", "centre", "true"):
+    for reference in ("maximum", "mean", "centre", "true-maximum", "true-mean", "true-centre"):
         parts = error_parts(camera, exposure, reference)
         whole = parts.emissivity + parts.motion + parts.footprint + parts.psf + parts.detector
         # Sums of differences of the same five images.
@@ -511,7 +511,7 @@ def test_parts_sum_to_the_error_and_vanish_with_their_effects(opened):
     assert not np.nan_to_num(plain.texture).any()
     still = replace(exposure, peak_radiance=exposure.mean_radiance.astype(np.float32))
     assert not np.nan_to_num(error_parts(camera, still).motion).any()
-    true = error_parts(camera, camera.expose(scene, UniformSurface(1.0), start), "true")
+    true = error_parts(camera, camera.expose(scene, UniformSurface(1.0), start), "true-maximum")
     # A blackbody's radiance temperature is its own, but for rounding.
     assert np.nanmax(np.abs(true.emissivity)) < 0.1
 

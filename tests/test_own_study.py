@@ -20,7 +20,7 @@ from chipglow.study.camera_section import CAMERAS
 from chipglow.study.fitting import left_to_the_paper
 from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import CHIP_1, CHIP_2, Dispersion, HagenRubens, Origin
-from chipglow.text import Notes
+from chipglow.text import DescriptionError, Notes
 
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
@@ -231,9 +231,14 @@ def test_what_is_too_coarse_is_said():
     assert fit(Study(), fine).notes == Notes()
 
 
-def test_the_reference_true_needs_no_quotes(tmp_path):
-    (tmp_path / "s.yaml").write_text("analysis: {reference: true}\n")
-    assert load_study(tmp_path / "s.yaml").analysis.reference == "true"
+def test_a_true_temperature_as_reference_states_which(tmp_path):
+    file = tmp_path / "s.yaml"
+    for kind in ("true-maximum", "true-mean", "true-centre"):
+        file.write_text(f"analysis: {{reference: {kind}}}\n")
+        assert load_study(file).analysis.reference == kind
+    file.write_text("analysis: {reference: true}\n")
+    with pytest.raises(DescriptionError, match="reference: True, expected .*'true-maximum'"):
+        load_study(file)
 
 
 def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():
