@@ -237,7 +237,7 @@ def test_a_true_temperature_as_reference_states_which(tmp_path):
         file.write_text(f"analysis: {{reference: {kind}}}\n")
         assert load_study(file).analysis.reference == kind
     file.write_text("analysis: {reference: true}\n")
-    with pytest.raises(DescriptionError, match="reference: True, expected .*'true-maximum'"):
+    with pytest.raises(DescriptionError, match=r"reference: True, expected .*'true-maximum'"):
         load_study(file)
 
 

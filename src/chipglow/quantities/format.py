@@ -17,8 +17,13 @@ def uncertain_text(value: float, uncertainty: float) -> str:
     """Return a number and its standard uncertainty, which has two significant digits."""
     if not isfinite(uncertainty) or uncertainty <= 0:
         return f"{value:.4g}"
-    decimals = min(max(0, 1 - floor(log10(uncertainty))), 9)
+    decimals = uncertain_decimals(uncertainty)
     return f"{value:.{decimals}f} ± {uncertainty:.{decimals}f}"
+
+
+def uncertain_decimals(uncertainty: float) -> int:
+    """Return the number of decimals with which two digits of a standard uncertainty are shown."""
+    return min(max(0, 1 - floor(log10(uncertainty))), 9)
 
 
 def rounded_text(value: float, unit: str = "") -> str:
