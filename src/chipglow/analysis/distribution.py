@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit, logit, stdtr, stdtrit
 
+from chipglow.quantities import Brief
+
 PIXEL_PHASE: Final = "pixel phase"
 """Position of the pixels on the scene: a known population, of which every value is as likely."""
 
@@ -41,8 +43,8 @@ class VarianceComponent(NamedTuple):
     fraction: float
 
 
-@dataclass(frozen=True, eq=False)
-class Distribution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Distribution(Brief):
     """One finite number for each combination of its causes, which are the axes of the values.
 
     `missing` are causes of scatter of which only one value was drawn; `limits` are those between

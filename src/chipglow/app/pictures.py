@@ -28,7 +28,7 @@ from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.sweep import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
@@ -52,8 +52,8 @@ _ROLLING: Final = (*_EXPOSURE, "camera.pitch", "camera.offset")
 """Beginnings of the paths of controls that change surface and exposure."""
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
+@dataclass(frozen=True, eq=False, repr=False)
+class Panel(Brief):
     """An image as a figure shows it, NaN where it is grey."""
 
     name: str
@@ -64,8 +64,8 @@ class Panel:
     colours: str
 
 
-@dataclass(frozen=True, eq=False)
-class Picture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Picture(Brief):
     """Images over the pixels in K and lines in µm and °C at a state; `quick` marks coarse ones."""
 
     state: State
@@ -88,8 +88,8 @@ class Picture:
         return None if limit is None else limit - KELVIN
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drawn(Brief):
     """Measured lines in °C, shape (draw, n), and error at the cursor over phases and textures."""
 
     state: State

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Check, Sums
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Raster, Scene, is_gap
@@ -21,8 +21,8 @@ _SPARSE: Final = 1e-3
 """Ratio of exposure to frame spacing below which a changing scene causes a warning."""
 
 
-@dataclass(frozen=True, eq=False)
-class Exposure:
+@dataclass(frozen=True, eq=False, repr=False)
+class Exposure(Brief):
     """A scene's radiance during one integration time; arrays in W/(m² sr), shape (y, x)."""
 
     start: float
