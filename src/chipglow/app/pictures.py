@@ -365,7 +365,7 @@ class MeasurementModel:
         if reference is not None:
             images["reference"] = reference[index].values
             images["case_1"] = measured - images["reference"]
-            label = REFERENCES.get(reference.attrs.get("reference"), "reference")
+            label = REFERENCES.get(str(reference.attrs.get("reference")), "reference")
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
         panels = {"measured": _measured_panel(data, raster)}
         if reference is not None:
