@@ -181,7 +181,7 @@ def test_defaults_that_are_not_the_papers_are_said_to_be_chipglows():
 
 def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
-    assert all(row.paper is None for row in result_rows(chip_analysis, titanium))
+    assert all(row.published is None for row in result_rows(chip_analysis, titanium))
     write_report(chip_analysis, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     told = page[page.index("<main>") : page.index("<script>")]
@@ -189,10 +189,10 @@ def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()
-    assert any(row.paper is not None for row in result_rows(chip_analysis, Study.quick()))
+    assert any(row.published is not None for row in result_rows(chip_analysis, Study.quick()))
     # Nor beside what somebody analyses without a study, nor if one thing of it is another.
     for study in (None, Study(camera={"integration_time": "20 us"})):
-        assert all(row.paper is None for row in result_rows(chip_analysis, study))
+        assert all(row.published is None for row in result_rows(chip_analysis, study))
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():

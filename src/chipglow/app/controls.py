@@ -355,7 +355,7 @@ class Controls:
 
 
 def shown_study(study: Study, **shown: Any) -> ShownStudy:
-    """Return a study with what is shown of it."""
+    """Return a study with settings of the page, such as the start of the exposure."""
     return ShownStudy(**{name: getattr(study, name) for name in study.given}, **shown)
 
 

@@ -33,7 +33,7 @@ MOST_UPLOADED: Final = 512 * 1024**2
 _MOST_OPEN: Final = 8
 
 SHOWN: Final = ("start", "scene_image", "error_image")
-"""Settings of what is shown that are no settings of a study."""
+"""Settings of the page that a study does not have."""
 
 SHOWN_LINE: Final = "# Shown in chipglow app: "
 
@@ -46,7 +46,7 @@ def scene_model(
 ) -> SceneModel:
     """Open a scene at its developed shear band, else in its middle; a ValueError if too short.
 
-    A study that the app saved has its own cursor and lines, and `shown` its exposure and images.
+    A study that the app saved contains cursor and lines; `shown` are its exposure and images.
     """
     if "plastic_strain" not in scene.fields and study.surface == Study().surface:
         study = unchecked(study, surface=UniformSurface(0.5))

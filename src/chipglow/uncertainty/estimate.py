@@ -17,7 +17,7 @@ from chipglow.quantities import Array, Brief, brief
 from chipglow.uncertainty.component import Cause, Component, Distribution
 
 _MOST_FREEDOM: Final = 1e6
-"""Degrees of freedom from which on Student's factor of 95 % is the normal one within 2e-6."""
+"""Above this number, Student's factor of 95 % differs from the normal one by less than 3e-6."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
