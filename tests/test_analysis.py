@@ -60,6 +60,9 @@ def exposure_of(radiance, peak=None, raster=GRID, temperature=None):
         peak_radiance=np.asarray(peak, np.float32),
         peak_temperature=np.asarray(temperature, np.float32),
         centre_radiance=radiance,
+        mean_temperature=np.asarray(temperature, np.float64),
+        material_fraction=np.isfinite(temperature).astype(float),
+        centre_temperature=np.asarray(temperature, np.float32),
     )
 
 
@@ -102,7 +105,7 @@ def test_a_rounded_pitch_adds_no_samples_to_a_pixel(rounding, phase, seed):
     offset = phase * 2e-6 / 3
     camera = Camera(pitch=6e-6, shape=(20, 30), offset=(offset, offset), psf=None)
     own = values[phase : phase + 180, phase : phase + 270].reshape(20, 9, 30, 9)
-    found = reference_temperature(camera, exposure, "true")
+    found = reference_temperature(camera, exposure, "true-maximum")
     # float32: 1e-4 K at 1200 K.
     np.testing.assert_allclose(found, own.max(axis=(1, 3)), atol=1e-3)
 
@@ -125,8 +128,20 @@ def test_references_by_hand():
     # float32 radiance: 1e-5 K.
     np.testing.assert_allclose(reference["maximum"], [950.0, 870.0], atol=1e-3)
     np.testing.assert_allclose(reference["centre"], [800.0, 870.0], atol=1e-3)
-    true = reference_temperature(camera, exposure, "true")[0]
-    np.testing.assert_allclose(true, [1050.0, 970.0])
+    true = {
+        kind: reference_temperature(camera, exposure, f"true-{kind}")[0]
+        for kind in ("maximum", "mean", "centre")
+    }
+    np.testing.assert_allclose(true["maximum"], [1050.0, 970.0])
+    np.testing.assert_allclose(true["centre"], [900.0, 970.0])
+    # Of nine samples one is 150 K hotter; the other pixel has one that is 70 K hotter.
+    np.testing.assert_allclose(true["mean"], [900.0 + 150.0 / 9, 900.0 + 70.0 / 9])
+    # With material in a third of the exposure the hot sample counts a third of the others: 1 of 25.
+    present = np.ones(raster.shape)
+    present[0, 0] = 1 / 3
+    brief = replace(exposure, material_fraction=present)
+    found = reference_temperature(camera, brief, "true-mean")[0, 0]
+    assert found == pytest.approx(900.0 + 150.0 / 25)
     with pytest.raises(ValueError, match="unknown 'median'"):
         reference_temperature(camera, exposure, "median")
 

@@ -118,7 +118,7 @@ def local(url):
 def ready(page, status=EXACT):
     """Wait for the exact picture and its numbers."""
     page.locator("#status", has_text=status).wait_for()
-    page.get_by_role("table", name="Parts of the error").wait_for()
+    page.get_by_role("table", name=re.compile("^Parts of the error")).wait_for()
 
 
 def number(page, row):
@@ -216,9 +216,11 @@ def test_what_cannot_be_shown_is_disabled_with_its_reason(page):
     assert texture.get_attribute("label") == "Error by texture: 0, the emissivity has none"
     control(page, "camera.psf").select_option("none")
     page.locator("#status", has_text="Error by PSF is 0 everywhere: no PSF.").wait_for()
-    emissivity = page.get_by_role("table", name="Parts of the error").get_by_text("Emissivity")
+    emissivity = page.get_by_role("table", name=re.compile("^Parts of the error")).get_by_text(
+        "Emissivity"
+    )
     assert emissivity.count() == 0
-    control(page, "analysis.reference").select_option("true")
+    control(page, "analysis.reference").select_option("true-maximum")
     emissivity.wait_for()
 
 
@@ -303,13 +305,43 @@ def test_downloads_hold_what_is_shown(visit, tmp_path, model):
     sheet = tmp_path / "chipglow.png"
     started.value.save_as(sheet)
     assert Image.open(sheet).convert("L").getextrema()[0] < 50 < sheet.stat().st_size / 1000
-    # What was saved is opened again, and it has no controls of a camera.
-    page.locator("input[type=file]").set_input_files(saved)
-    page.wait_for_url("**open=*")
-    page.get_by_text(saved.name, exact=True).wait_for()
+    # What was saved is opened again: a measurement has no controls of a camera.
+    reopen(page, saved)
+    number(page, "error = measured − reference").wait_for()
+    assert page.locator("#figure-error").is_visible()
+    assert page.get_by_label("Pixel pitch").count() == 0
+    reopen(page, file)
+    assert control(page, "camera.pitch").input_value() == "5"
+    assert control(page, "start").input_value() == "394"
+    texts = {"camera.pitch": "5 um", "start": "394 us"}
+    assert expected(model, texts) in number(page, "measured").inner_text()
+
+
+def reopen(page, file):
+    page.locator("input[type=file]").set_input_files(file)
+    page.get_by_text(file.name, exact=True).and_(page.locator(".name")).wait_for()
     page.locator("#status", has_text=EXACT).wait_for()
     number(page, "measured").wait_for()
-    assert page.get_by_label("Pixel pitch").count() == 0
+
+
+def test_messages_are_visible_and_the_exposure_is_one_that_the_scene_allows(visit):
+    page = visit(width=1400)
+    slider = page.get_by_role("slider", name="Exposure", exact=True)
+    assert [slider.get_attribute(name) for name in ("min", "max")] == ["1", "11"]
+    turn(page, "Exposure", "90")
+    status = page.locator("#status", has_text="Exposure: 413 µs to 503 µs is not within the scene")
+    status.wait_for()
+    box = status.bounding_box()
+    assert box["y"] > 0 and box["y"] + box["height"] <= page.viewport_size["height"]
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Figure").click()
+    sheet = np.asarray(Image.open(started.value.path()).convert("L"))
+    # The settings are below the figures: dark text, in lines of 16 pixels, on light ground.
+    below = sheet[-56:]
+    assert below.min() < 80 and np.median(below) > 240
+    turn(page, "Exposure begins", "394")
+    page.wait_for_url("**start=394*")
+    playwright.expect(slider).to_have_attribute("max", "30", timeout=PATIENCE)
 
 
 def test_a_wrong_file_is_one_clear_error(page, tmp_path):

@@ -170,7 +170,7 @@ def study_of(plate, **inputs):
         scene=str(plate),
         surface={"kind": "uniform", "emissivity": 0.6},
         camera={"psf": {"kind": "gaussian", "fwhm": "8 um"}, "lower_limit": None},
-        analysis={"reference": "true", "points": {"middle": ("0 um", "0 um")}},
+        analysis={"reference": "true-maximum", "points": {"middle": ("0 um", "0 um")}},
         uncertainty={"inputs": inputs},
     )
 
@@ -290,7 +290,7 @@ def test_settings_of_the_cut_act_by_a_surrogate(plate, monkeypatch):
     study = Study(
         surface={"kind": "uniform", "emissivity": 0.6},
         camera={"psf": {"kind": "gaussian", "fwhm": "8 um"}, "lower_limit": None},
-        analysis={"reference": "true", "points": {"middle": ("0 um", "0 um")}},
+        analysis={"reference": "true-maximum", "points": {"middle": ("0 um", "0 um")}},
         uncertainty={"inputs": {"cutting.friction.coefficient": {"standard": 0.05}}},
     )
     found = study_budget(study, ("middle",), trials=1000, samples=2, scenes=12)
@@ -318,7 +318,7 @@ def test_the_command_prints_and_writes_the_budget(plate, tmp_path):
 scene: {plate}
 surface: {{kind: uniform, emissivity: 0.6}}
 camera: {{psf: {{kind: gaussian, fwhm: 8 um}}, lower_limit: none}}
-analysis: {{reference: true, points: {{middle: [0 um, 0 um]}}}}
+analysis: {{reference: true-maximum, points: {{middle: [0 um, 0 um]}}}}
 uncertainty:
   inputs:
     surface.emissivity: {{standard: 2 %, source: heated chips}}

@@ -145,6 +145,27 @@ def test_peaks_and_centre():
     np.testing.assert_array_equal(exposure.peak_temperature, temperature.max(axis=0))
 
 
+def test_true_temperatures_are_those_of_the_material_while_it_is_there():
+    generator = np.random.default_rng(8)
+    kelvins = generator.uniform(300, 1500, (5, 18, 18)).astype(np.float32)
+    material = generator.integers(0, 2, kelvins.shape).astype(np.uint8)
+    material[:, 0, 0], material[:, 0, 1] = 0, 1
+    scene, exposed = make_scene(kelvins, material=material), slice(0, 4)
+    # Half of the first and of the last of four frames.
+    weights = np.array([0.5, 1.0, 1.0, 0.5])[:, None, None] / 3
+    exposure = Camera(integration_time=3 * STEP).expose(scene, BLACK, 0.5 * STEP)
+    there = material[exposed] == 1
+    fraction = (weights * there).sum(axis=0)
+    np.testing.assert_allclose(exposure.material_fraction, fraction, rtol=1e-12)
+    known = np.where(there, kelvins[exposed], 0.0)
+    with np.errstate(invalid="ignore"):
+        mean = (weights * known).sum(axis=0) / fraction
+    np.testing.assert_allclose(exposure.mean_temperature, mean, rtol=1e-12)
+    np.testing.assert_array_equal(
+        exposure.centre_temperature, np.where(there[2], kelvins[2], np.nan)
+    )
+
+
 def test_no_emissivity_is_not_no_material():
     scene = make_scene(np.full((1, 18, 18), 900.0), material=0)
     solid = make_scene(np.full((1, 18, 18), 900.0))

@@ -42,7 +42,10 @@ def exposure(start=0.0):
     radiance = np.asarray(BAND.radiance(np.where(x > 0, 650.0, 600.0)))
     single = radiance.astype(np.float32)
     kelvins = np.full(SCENE.shape, 650.0, np.float32)
-    return cam.Exposure(start, 10e-6, SCENE, radiance, single, kelvins, radiance)
+    whole, material = kelvins.astype(np.float64), np.ones(SCENE.shape)
+    return cam.Exposure(
+        start, 10e-6, SCENE, radiance, single, kelvins, radiance, whole, material, kelvins
+    )
 
 
 @settings(max_examples=30)

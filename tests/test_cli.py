@@ -127,8 +127,10 @@ def test_run_writes_a_report_and_prints_the_comparison(finished):
     assert "Warning: The edge radius, 20 um, is 1 cell, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
-    assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
-    assert citation["references"][0]["title"] in last
+    year, version = citation["date-released"].year, citation["version"]
+    assert last.startswith(f"Cite as: The chipglow developers ({year}): chipglow {version}, ")
+    paper = citation["references"][0]
+    assert f"({paper['year']}): {paper['title']}. {paper['collection-title']}." in last
     names = {path.name for path in (work / "results").iterdir()}
     written = "report.html summary.json summary.schema.json results.nc study.yaml figures"
     assert names >= set(written.split())

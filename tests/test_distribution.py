@@ -58,7 +58,7 @@ def test_fractions_sum_to_one(seed, shape):
         ((3, 5, 9), (8.0, 3.0, 6.0), 4.0),
         ((3, 5, 9), (2.0, 2.0, 10.0), 1.0),
         ((3, 5, 9), (10.0, 1.0, 1.0), 1.0),
-        ((2, 2, 4), (3.0, 3.0, 3.0), 3.0),
+        ((3, 3, 4), (3.0, 3.0, 3.0), 3.0),
     ],
 )
 def test_the_interval_holds_one_more_draw_as_often_as_it_says(shape, deviations, together):
@@ -78,6 +78,23 @@ def test_the_interval_holds_one_more_draw_as_often_as_it_says(shape, deviations,
     # other causes leave in the means of one, and by the degrees of freedom of few draws.
     assert COVERAGE - 0.017 <= held / repeats <= 0.995
     assert COVERAGE - 0.017 <= held_mean / repeats <= 0.9975
+
+
+@pytest.mark.parametrize(
+    ("shape", "few"),
+    [
+        ((2, 2, 16), {"segment": 2, "texture": 2}),
+        ((2, 5, 16), {"segment": 2}),
+        ((3, 2, 16), {"texture": 2}),
+        ((3, 1, 2), {}),  # a surface without texture, two of all phases
+        ((3, 3, 1), {}),
+    ],
+)
+def test_two_values_of_a_random_cause_support_no_interval(shape, few):
+    values = drawn(np.random.default_rng(2), shape, (1.0, 1.0, 5.0), 30.0)
+    found = Distribution(values, CAUSES)
+    assert found.too_few == few
+    assert np.isinf([*found.interval, found.expanded_uncertainty]).all() == bool(few)
 
 
 def test_three_draws_of_what_decides_count_as_three():

@@ -38,6 +38,7 @@ from chipglow.laboratory.measurement import (
     measurement_text,
     uniform_counts,
 )
+from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import ToolGeometry
 from chipglow.text import DescriptionError
@@ -247,6 +248,24 @@ def test_the_measurement_holds_the_truth_within_its_uncertainty(laboratory):
     dead = DETECTOR.terms[1].mask(SHAPE, DETECTOR.seed)
     assert dead.any()
     np.testing.assert_array_equal((measured.flags[0] & Flag.REPLACED) != 0, dead)
+
+
+def test_pixels_that_are_replaced_are_not_called_saturated():
+    stuck = np.zeros((6, 8), bool)
+    stuck[[2, 4], [3, 6]] = True
+    signal = np.full((2, 6, 8), 900, np.uint16)
+    signal[:, stuck] = 2**14 - 1
+    recording = Recording(signal, "radiance", np.arange(2.0), "camera", band=BAND, pitch=6e-6)
+
+    def doubts(signal, bad):
+        made = calibrate_recording(replace(recording, signal=signal), bad_pixels=bad)
+        return [text for text in made.notes.warnings if "may be saturated" in text]
+
+    assert doubts(signal, stuck) == []
+    assert len(doubts(signal, None)) == 1
+    signal[:, 0, 0] = 2**14 - 1
+    (text,) = doubts(signal, stuck)
+    assert text.startswith("2 values are 16383")  # of one pixel in two frames
 
 
 def test_a_camera_file_alone_with_settings(laboratory):

@@ -20,7 +20,7 @@ from chipglow.study.camera_section import CAMERAS
 from chipglow.study.fitting import left_to_the_paper
 from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import CHIP_1, CHIP_2, Dispersion, HagenRubens, Origin
-from chipglow.text import Notes
+from chipglow.text import DescriptionError, Notes
 
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
@@ -181,7 +181,7 @@ def test_defaults_that_are_not_the_papers_are_said_to_be_chipglows():
 
 def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_path):
     titanium = Study(**TITANIUM)
-    assert all(row.paper is None for row in result_rows(chip_analysis, titanium))
+    assert all(row.published is None for row in result_rows(chip_analysis, titanium))
     write_report(chip_analysis, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     told = page[page.index("<main>") : page.index("<script>")]
@@ -189,10 +189,10 @@ def test_the_paper_stands_beside_its_own_study_only(chip_analysis, undrawn, tmp_
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()
-    assert any(row.paper is not None for row in result_rows(chip_analysis, Study.quick()))
+    assert any(row.published is not None for row in result_rows(chip_analysis, Study.quick()))
     # Nor beside what somebody analyses without a study, nor if one thing of it is another.
     for study in (None, Study(camera={"integration_time": "20 us"})):
-        assert all(row.paper is None for row in result_rows(chip_analysis, study))
+        assert all(row.published is None for row in result_rows(chip_analysis, study))
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():
@@ -231,9 +231,14 @@ def test_what_is_too_coarse_is_said():
     assert fit(Study(), fine).notes == Notes()
 
 
-def test_the_reference_true_needs_no_quotes(tmp_path):
-    (tmp_path / "s.yaml").write_text("analysis: {reference: true}\n")
-    assert load_study(tmp_path / "s.yaml").analysis.reference == "true"
+def test_a_true_temperature_as_reference_states_which(tmp_path):
+    file = tmp_path / "s.yaml"
+    for kind in ("true-maximum", "true-mean", "true-centre"):
+        file.write_text(f"analysis: {{reference: {kind}}}\n")
+        assert load_study(file).analysis.reference == kind
+    file.write_text("analysis: {reference: true}\n")
+    with pytest.raises(DescriptionError, match=r"reference: True, expected .*'true-maximum'"):
+        load_study(file)
 
 
 def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():

@@ -17,11 +17,11 @@ from PIL import Image
 from chipglow.analysis import Distribution, one_draw, with_errors
 from chipglow.io import open_scene
 from chipglow.report import Row, result_rows, results_frame, write_report
-from chipglow.report.answer import answer
+from chipglow.report.answer import answer, error_text
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
 from chipglow.report.player import exposure_player
-from chipglow.report.rows import all_rows
+from chipglow.report.rows import all_rows, spread_text
 from chipglow.report.summary import summary
 from chipglow.scene import SceneError
 from chipglow.study import Study
@@ -317,13 +317,17 @@ def test_a_period_of_three_intervals_is_judged_with_students_factor():
     row = Row(
         "segment_period_us", "Period", "µs", float(intervals.mean()),
         uncertainty=float(uncertainty),
-        freedom=2, published=PaperValue(90.0, ""),
+        freedom=2, published=PaperValue(90.0, 0.0, ""),
     )  # fmt: skip
     # A one-sample t test: t = 2.31, p = 0.15.
     assert (intervals.mean() - 90) / uncertainty == pytest.approx(2.31, abs=0.01)
     assert row.differs is False
     assert replace(row, freedom=1).differs is None
     assert replace(row, freedom=200).differs is True
+    # About 90: 85 to 95, which meets 99.1 ± 8.1 and 99.1 ± 5 but not 99.1 ± 4.
+    about = replace(row, freedom=200, published=PaperValue(90.0, 5.0, ""))
+    assert about.differs is False
+    assert replace(about, uncertainty=2.0).differs is True
 
 
 def test_one_phase_or_one_texture_leaves_no_interval_and_names_the_cause(result):
@@ -331,7 +335,7 @@ def test_one_phase_or_one_texture_leaves_no_interval_and_names_the_cause(result)
     data["undrawn"] = data.undrawn.where(data.undrawn != "", "texture, pixel phase")
     facts = Facts(replace(result, data=data), PAPERS)
     (sentence, *_) = sentences_of(facts)
-    assert "no interval: only one texture and one pixel phase was drawn" in sentence
+    assert "no interval: only 1 texture and 1 pixel phase)" in sentence
     row = next(row for row in result_rows(facts.analysis, PAPERS) if row.key == "rake_error_degC")
     assert (row.cells["interval"], row.differs) == ("–", None)
     assert "±" not in row.cells["mean"]
@@ -414,7 +418,7 @@ def test_results_in_the_place_of_a_scene_are_named_with_what_to_do_next(folder, 
 
 def test_the_comparison_holds_what_the_paper_states(result):
     rows = {row.key: row for row in result_rows(result, PAPERS)}
-    paper = {key: row.paper for key, row in rows.items() if row.paper is not None}
+    paper = {key: row.published.value for key, row in rows.items() if row.published}
     assert paper == {
         "rake_error_degC": -42.0,
         "rake_psf_fraction_percent": 45.0,
@@ -442,37 +446,88 @@ def test_the_comparison_holds_what_the_paper_states(result):
 
 
 def test_numbers_are_printed_with_sign_unit_and_dash():
-    paper = PaperValue(-42.0, "abstract")
+    paper = PaperValue(-42.0, 0.5, "abstract")
     row = Row("error_degC", "Error", "°C", -35.4, uncertainty=1.6, freedom=30, published=paper)
     names = ("paper", "mean", "interval", "one-draw", "differs")
 
     def cells(row):
         return tuple(row.cells[name] for name in names)
 
-    assert cells(row) == ("−42 °C", "−35 ± 3 °C", "–", "–", "yes")
-    assert replace(row, uncertainty=3.4).differs is False
+    assert cells(row) == ("−42 ± 0.5 °C", "−35 ± 3 °C", "–", "–", "yes")
+    # 2.04 × 3.0 = 6.1 from −35.4 is −41.5: the paper's −42 may be −41.5.
+    assert replace(row, uncertainty=2.9).differs is True
+    assert replace(row, uncertainty=3.0).differs is False
     assert replace(row, freedom=None).cells["mean"] == "−35 °C (sd 2 K)"
     rate = Row("rate_per_s", "Rate", "1/s", 123456.0, -3)
     assert cells(rate) == ("–", "123 000 1/s", "–", "–", "–")
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
     drawn = replace(row, here=draws.mean, draws=draws, one_draw=-30.0, uncertainty=None)
     # Four pixel phases are all that there are: quantiles of 2.5 % and 97.5 % between them.
-    assert cells(drawn) == ("−42 °C", "−41 ± 0 °C", "−50 to −31 °C", "−30 °C", "no")
+    assert cells(drawn) == ("−42 ± 0.5 °C", "−41 °C", "−50 to −31 °C", "−30 °C", "no")
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "decimals", "text"),
+    [
+        (57.1, 0.0, 1, "57.1 K"),
+        (57.1, 1e-12, 1, "57.1 K"),  # the rounding of the computation
+        (57.1, 0.004, 1, "57.100 ± 0.004 K"),
+        (57.1, 0.06, 1, "57.1 ± 0.1 K"),
+        (1234.0, 300.0, -3, "1 200 ± 300 K"),
+        (57.1, np.inf, 1, "57.1 K"),
+        (np.nan, 1.0, 1, "–"),
+    ],
+)
+def test_no_uncertainty_is_printed_as_zero(value, uncertainty, decimals, text):
+    assert spread_text(value, uncertainty, "K", decimals) == text
+
+
+def test_two_segments_state_neither_uncertainty_nor_verdict():
+    values = np.linspace(-118.0, -108.0, 2 * 2 * 16).reshape(2, 2, 16)
+    draws = Distribution(values, CAUSES)
+    paper = PaperValue(-42.0, 0.5, "abstract")
+    row = Row("e_degC", "Error", "K", draws.mean, draws=draws, published=paper)
+    assert (row.cells["mean"], row.cells["interval"], row.differs) == ("−113 K", "–", None)
+    assert position(draws, paper, "K") == (
+        "Only 2 segments and 2 textures: too few to show whether the paper's value differs."
+    )
+    assert error_text(draws) == "113 K too low (no interval: only 2 segments and 2 textures)"
 
 
 def test_the_place_of_the_papers_figure_is_stated():
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
-    near, far = (position(draws, paper, "°C") for paper in (-42.0, -120.0))
-    assert "lies within the 95 %" in near and "lies outside the 95 %" in far
+    near, far, rounded = (
+        position(draws, PaperValue(*paper, ""), "°C")
+        for paper in ((-42.0, 0.5), (-120.0, 5.0), (-54.0, 5.0))
+    )
+    assert "−42 ± 0.5 °C lies within the 95 %" in near and "lies outside the 95 %" in far
+    assert "−54 ± 5 °C lies within the 95 %" in rounded  # it may be −49, the interval begins at −50
     single = Distribution(np.full((1, 1, 1), -40.0), CAUSES, missing=("texture",))
-    assert "Only one texture was drawn to show whether" in position(single, -42.0, "°C")
+    assert "Only 1 texture: too few" in position(single, PAPER["rake_error_degC"], "°C")
+
+
+def test_every_published_value_has_the_rounding_of_its_print():
+    texts = {key: value.text("") for key, value in PAPER.items()}
+    assert texts["rake_error_degC"] == texts["rake_extremum_error_degC"] == "−42 ± 0.5 "
+    assert texts["band_error_degC"] == texts["band_measured_error_degC"] == "−46 ± 0.5 "
+    assert texts["rake_psf_fraction_percent"] == "45 ± 0.5 "
+    assert texts["band_psf_fraction_percent"] == "15 ± 2.5 "
+    assert texts["band_worst_error_degC"] == "−120 ± 5 "
+    assert texts["segment_period_us"] == "90 ± 5 "
 
 
 def test_a_width_is_found_where_the_series_meets_the_value():
-    widths = np.array([4.0, 8.0, 12.0])
-    assert crossing(widths, np.array([-10.0, -30.0, -50.0]), -40.0) == pytest.approx(10.0)
-    assert crossing(widths, np.array([-10.0, -30.0, -50.0]), -10.0) == 4.0
-    assert crossing(widths, np.array([-10.0, -30.0, -50.0]), -60.0) is None
+    widths, falling = np.array([4.0, 8.0, 12.0]), np.array([-10.0, -30.0, -50.0])
+
+    def width(value, rounding, series=falling):
+        return crossing(widths, series, PaperValue(value, rounding, ""))
+
+    assert width(-40.0, 0.5) == pytest.approx(10.0)
+    assert width(-10.0, 0.5) == 4.0
+    assert width(-60.0, 0.5) is None
+    assert width(-51.0, 5.0) == 12.0  # rounded, it may be −50
+    assert width(-20.0, 5.0, np.array([-30.0, -22.0, -30.0])) == 8.0
+    assert width(-20.0, 5.0, np.array([-20.0, -20.0, -20.0])) == 4.0
 
 
 def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_path):

@@ -238,8 +238,9 @@ def test_a_pass_over_splines_is_that_over_their_samples(tmp_path, follow):
             for one in (scene, samples)
         ]
         for found, expected in zip(*passes, strict=True):
-            np.testing.assert_array_equal(found.peak_temperature, expected.peak_temperature)
-            for name in RADIANCES:
+            for name in ("peak_temperature", "material_fraction", "centre_temperature"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+            for name in ("mean_temperature", *RADIANCES):
                 # Sums of three products in another order: units of float32.
                 np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=2e-6)
 
@@ -253,7 +254,7 @@ def test_a_row_that_begins_later_is_that_of_a_later_exposure(tmp_path, surface):
         (rolling,) = expose(one, views, 0.3 * STEP, 2.2 * STEP, delays)
         for delay in set(delays.tolist()):
             (later,) = expose(one, views, 0.3 * STEP + delay, 2.2 * STEP)
-            for name in ("peak_temperature", *RADIANCES):
+            for name in ("peak_temperature", "mean_temperature", "centre_temperature", *RADIANCES):
                 of_row, all_at_once = (getattr(e, name)[delays == delay] for e in (rolling, later))
                 np.testing.assert_array_equal(of_row, all_at_once, err_msg=name)
 

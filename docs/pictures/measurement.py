@@ -31,7 +31,7 @@ def main() -> None:
     """Draw the true temperature, the measured one, and their difference."""
     scene, camera = chipglow.example_scene(), chipglow.Camera.paper()
     exposure = camera.expose(scene, chipglow.CHIP_2, start=START)
-    images = error_images(camera, exposure, reference="true")
+    images = error_images(camera, exposure, reference="true-maximum")
     frame = scene.frame(scene.frame_at(START + camera.integration_time / 2))
     true = np.where(frame.material == Material.VOID, np.nan, frame.temperature - KELVIN)
     usable = ~images.flagged.values

@@ -71,7 +71,7 @@ def _paper(summary: dict[str, dict[str, float]], key: str) -> str:
     if key not in summary["paper"]:
         return "–"
     differs = " (differs)" if summary["differs"][key] else ""
-    return _number(summary["paper"][key]) + differs
+    return f"{_number(summary['paper'][key])} ± {summary['paper_rounding'][key]:g}{differs}"
 
 
 def _spread(values: dict[str, float]) -> str:

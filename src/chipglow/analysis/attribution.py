@@ -41,7 +41,7 @@ BLUR: Final = "psf and footprint"
 MAX_EXACT: Final = 8
 """Number of effects up to which all combinations are computed."""
 
-AttributionReference: TypeAlias = Literal["true", "maximum"]
+AttributionReference: TypeAlias = Literal["true-maximum", "maximum"]
 _Coalition: TypeAlias = frozenset[str]
 _Value: TypeAlias = Callable[[_Coalition], Array]
 _KELVIN: Final = {"units": "K"}
@@ -68,10 +68,10 @@ class AttributionPlan(Part):
         AttributionReference,
         Parameter(
             "Reading without any effect: the largest true temperature in the pixel's square during "
-            "the exposure (true), or the largest radiance temperature (maximum), which contains "
-            "emissivity and reflection."
+            "the exposure (true-maximum), or the largest radiance temperature (maximum), which "
+            "contains emissivity and reflection."
         ),
-    ] = "true"
+    ] = "true-maximum"
     permutations: Annotated[
         int,
         Parameter(
@@ -91,7 +91,7 @@ def attribute(
     surface: Surface,
     start: float | None = None,
     effects: Sequence[str] = (),
-    reference: AttributionReference = "true",
+    reference: AttributionReference = "true-maximum",
     permutations: int = 64,
     seed: int = 0,
     check: Check | None = None,
@@ -111,7 +111,7 @@ def attribute(
     effects : sequence of str
         Any of `EFFECTS`, or the ``kind`` of a term of the camera's optics or detector. The
         effects that are not named form one group. By default all that the camera has.
-    reference : {"true", "maximum"}
+    reference : {"true-maximum", "maximum"}
         The reading without any effect: the largest true temperature in the pixel's square during
         the exposure; or the largest radiance temperature, which contains emissivity and reflection.
     permutations : int

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit, logit, stdtr, stdtrit
 
+from chipglow.quantities import Brief
+
 PIXEL_PHASE: Final = "pixel phase"
 """Position of the pixels on the scene: a known population, of which every value is as likely."""
 
@@ -20,13 +22,17 @@ TOGETHER: Final = "causes together"
 COVERAGE: Final = 0.95
 """Probability of `Distribution.interval` and `Distribution.expanded_uncertainty`."""
 
-_LEAST_FREEDOM: Final = 2.0
-"""Degrees of freedom from which an interval is stated: two values do not show their scatter."""
+FEWEST: Final = 3
+"""Values of each random cause from which an interval is stated: two do not show their scatter."""
 
 
 def student_factor(freedom: float) -> float:
     """Return the coverage factor for a number of degrees of freedom; infinite below two."""
-    return float(stdtrit(freedom, (1 + COVERAGE) / 2)) if freedom >= _LEAST_FREEDOM else inf
+    return _factor(freedom) if freedom >= FEWEST - 1 else inf
+
+
+def _factor(freedom: float) -> float:
+    return float(stdtrit(freedom, (1 + COVERAGE) / 2))
 
 
 class VarianceComponent(NamedTuple):
@@ -37,12 +43,13 @@ class VarianceComponent(NamedTuple):
     fraction: float
 
 
-@dataclass(frozen=True, eq=False)
-class Distribution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Distribution(Brief):
     """One finite number for each combination of its causes, which are the axes of the values.
 
     `missing` are causes of scatter of which only one value was drawn; `limits` are those between
-    which the number lies by its nature, such as 0 and infinity for a length.
+    which the number lies by its nature, such as 0 and infinity for a length. Uncertainty and
+    interval are infinite if a random cause has fewer than three values, see `too_few`.
     """
 
     values: NDArray[np.float64]
@@ -75,6 +82,13 @@ class Distribution:
     def standard_deviation(self) -> float:
         """Sample standard deviation of the draws; NaN for a single one."""
         return float(self.values.std(ddof=1)) if self.draws > 1 else nan
+
+    @property
+    def too_few(self) -> Mapping[str, int]:
+        """Causes with too few values for an interval, and how many of them were drawn."""
+        counts = zip(self.causes, self.values.shape, strict=True)
+        few = {name: n for name, n in counts if 1 < n < FEWEST and name != PIXEL_PHASE}
+        return dict.fromkeys(self.missing, 1) | few
 
     @property
     def range(self) -> tuple[float, float]:
@@ -120,22 +134,21 @@ class Distribution:
     @property
     def expanded_uncertainty(self) -> float:
         """Expanded uncertainty of the mean at a coverage of 95 %; infinite if unknown."""
-        if self.missing or self.draws == 1:
+        if self.too_few or self.draws == 1:
             return inf
         variance, freedom = self._random(of_next=False)
-        return student_factor(freedom) * sqrt(variance) if variance else 0.0
+        return _factor(freedom) * sqrt(variance) if variance else 0.0
 
-    def differs_from(self, value: float) -> bool:
+    def differs_from(self, value: float, half_width: float = 0.0) -> bool:
+        """Return whether a value ± its half-width lies outside the interval."""
         low, high = self.interval
-        return not low <= value <= high
+        return value + half_width < low or high < value - half_width
 
     @property
     def _interval(self) -> tuple[float, float]:
-        if self.missing or self.draws == 1:
+        if self.too_few or self.draws == 1:
             return -inf, inf
         variance, freedom = self._random(of_next=True)
-        if freedom < _LEAST_FREEDOM:
-            return -inf, inf
         known = PIXEL_PHASE in self.causes
         others = tuple(i for i, name in enumerate(self.causes) if name != PIXEL_PHASE)
         means = self.values.mean(axis=others).ravel() if known else np.array([self.mean])

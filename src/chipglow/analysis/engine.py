@@ -28,6 +28,7 @@ from chipglow.laboratory.chip import (
     contact_length,
     resolution_warnings,
 )
+from chipglow.quantities import Brief
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.frame import FILLED, QUALITY
 from chipglow.scene.tool_outline import tool_attributes
@@ -60,8 +61,8 @@ _LEAST_LIGHT: Final = 1e-30
 _Part = TypeVar("_Part")
 
 
-@dataclass(frozen=True, eq=False)
-class Analysis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Analysis(Brief):
     """The error of a camera against its scene.
 
     Parameters

@@ -16,6 +16,7 @@ from chipglow.laboratory.emissivity import (
     determine_emissivity,
 )
 from chipglow.laboratory.emissivity.emissivity import LABORATORY
+from chipglow.quantities import Brief
 from chipglow.scene import Area, Material, Polygon, Raster, Region, Scene, Tool, areas
 from chipglow.surface import Emissivity, FeatureSurface, Surface
 
@@ -41,8 +42,8 @@ _TOOL_MARGIN: Final = 3.0
 """Pixels at the edge of chip and tool that are not read."""
 
 
-@dataclass(frozen=True, eq=False)
-class HeatedRow:
+@dataclass(frozen=True, eq=False, repr=False)
+class HeatedRow(Brief):
     """Emissivity of a feature as put in and as determined: a row of Table 1."""
 
     feature: str
@@ -51,8 +52,8 @@ class HeatedRow:
     means: NDArray[np.float64]  # over the pixels, shape (texture,)
 
 
-@dataclass(frozen=True, eq=False)
-class HeatedObject:
+@dataclass(frozen=True, eq=False, repr=False)
+class HeatedObject(Brief):
     """A heated chip or tool, its image of the first texture and the results by region."""
 
     name: str

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache, partial
 from math import ceil, floor
-from typing import Final, Literal, TypeAlias, get_args
+from typing import Final, Literal, TypeAlias, cast, get_args
 
 import numpy as np
 import xarray as xr
@@ -22,14 +22,19 @@ Stack: TypeAlias = NDArray[np.float64]
 Effect: TypeAlias = Callable[[Camera, Exposure], tuple[Camera, Exposure]]
 """Changes the camera or what reaches it, such as to switch an effect off."""
 
-ReferenceKind: TypeAlias = Literal["maximum", "mean", "centre", "true"]
+ReferenceKind: TypeAlias = Literal[
+    "maximum", "mean", "centre", "true-maximum", "true-mean", "true-centre"
+]
 """The reference of the measured radiance temperature.
 
 ``maximum`` (the paper's): the largest radiance temperature, emissivity included, of any scene
 sample in the pixel's square during the exposure; ``mean``: that of the mean radiance over square
 and exposure; ``centre``: that of the sample under the pixel's centre in the middle of the
-exposure; ``true``: the largest true temperature in the square during the exposure.
+exposure; ``true-maximum``, ``true-mean`` and ``true-centre``: the same of the true temperature.
 """
+
+TRUE: Final = "true-"
+"""Beginning of the references that are true temperatures."""
 
 PARTS: Final = ("emissivity", "motion", "footprint", "psf", "detector")
 """Causes of the error in the order of the light; the parts that they contribute sum to it."""
@@ -60,7 +65,7 @@ def error_images(
         The camera, with its point spread function.
     exposure : Exposure
         The exposure.
-    reference : {"maximum", "mean", "centre", "true"}
+    reference : ReferenceKind
         The reference; the paper's is the maximum.
 
     Returns
@@ -89,7 +94,7 @@ def error_parts(
         The camera.
     exposure : Exposure
         The exposure.
-    reference : {"maximum", "mean", "centre", "true"}
+    reference : ReferenceKind
         The reference; the paper's is the maximum.
     untextured : Exposure, optional
         The same exposure with the surface's `Surface.without_texture`.
@@ -98,7 +103,7 @@ def error_parts(
     -------
     xarray.Dataset
         The variables of `error_images`, and parts of the error in K: ``emissivity``, radiance
-        temperature minus true temperature if the reference is the true one; ``motion``, the mean
+        temperature minus true temperature if the reference is a true one; ``motion``, the mean
         over the exposure minus the maximum, at the samples of the reference;
         ``footprint``, the mean over the pixel's area minus the reference of a scene that stands
         still; ``psf``; ``detector``. Their sum is ``case_1``. They include ``texture``, which is
@@ -177,7 +182,7 @@ class ExposureImages:
 
     def parts(self, camera: Camera, untextured: Exposure | None = None) -> xr.Dataset:
         errors, quiet = self.errors(camera), replace(camera, detector=None)
-        kind = "maximum" if self.kind == "true" else self.kind
+        kind = cast(ReferenceKind, self.kind.removeprefix(TRUE))
         mean = self.exposure.mean_radiance
         still = replace(self.exposure, peak_radiance=mean.astype(np.float32), centre_radiance=mean)
         chain = (
@@ -264,8 +269,15 @@ def reference_temperature(
     if kind == "centre":
         centre = nearest(exposure.centre_radiance, exposure.raster, pixels.centres)
         return _temperature(camera, centre)
-    if kind == "true":
+    if kind == "true-maximum":
         return largest(exposure.peak_temperature, *squares)
+    if kind == "true-mean":
+        present = exposure.material_fraction
+        heat = np.where(present > 0, exposure.mean_temperature, 0.0) * present
+        with np.errstate(invalid="ignore"):
+            return integrate(heat, *squares) / integrate(present, *squares)
+    if kind == "true-centre":
+        return nearest(exposure.centre_temperature, exposure.raster, pixels.centres).astype(float)
     raise ValueError(f"reference: unknown {kind!r}, expected one of {get_args(ReferenceKind)}")
 
 

@@ -131,7 +131,7 @@ class Looked:
                     progress((finished + step / len(looks)) / textures)
                     changed = change(camera) if change else camera
                     stack = images.stack(changed, schedule.effects)
-                    stack = np.append(stack, images.reference(camera, "true")[None], axis=0)
+                    stack = np.append(stack, images.reference(camera, "true-maximum")[None], axis=0)
                     pixels = camera.pixels(images.exposure.raster)
                     for i, place in enumerate(places):
                         indices = case, exposure, texture, phase

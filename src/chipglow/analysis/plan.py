@@ -3,8 +3,6 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from pydantic import BeforeValidator
-
 from chipglow.analysis.attribution import AttributionPlan
 from chipglow.analysis.images import ReferenceKind
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
@@ -60,13 +58,11 @@ class Plan(Part):
     ] = "chip 1"
     reference: Annotated[
         ReferenceKind,
-        # YAML reads true as a truth value.
-        BeforeValidator(lambda value: "true" if value is True else value),
         Parameter(
             "Reference of a pixel's measured temperature, in its square during the "
             "exposure: the largest radiance temperature (maximum, the paper's), that of the mean "
-            "radiance (mean), that in the middle of both (centre) or the largest true "
-            "temperature (true)."
+            "radiance (mean) or that in the middle of both (centre); or the same of the true "
+            "temperature (true-maximum, true-mean, true-centre)."
         ),
     ] = "maximum"
     psf_widths: Annotated[

@@ -10,12 +10,13 @@ import xarray as xr
 
 from chipglow.analysis.distribution import PIXEL_PHASE, Distribution
 from chipglow.analysis.images import ALL, WITHOUT_PSF, Array
+from chipglow.quantities import Brief
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
 
 
-@dataclass(frozen=True, eq=False)
-class Headline:
+@dataclass(frozen=True, eq=False, repr=False)
+class Headline(Brief):
     """One reading over all draws, in K of radiance temperature."""
 
     place: str

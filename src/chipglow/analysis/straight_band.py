@@ -67,13 +67,15 @@ def read_straight_band(camera: Camera, emissivity: float, band: StraightBand) ->
     profile = np.exp(-4 * log(2) * ((_GRID - centres) / band.width) ** 2)
     temperature = band.beside + band.rise * profile
     radiance = emissivity * camera.band.radiance(temperature)
-    mean, peak, hottest, centre = (
+    mean, peak, hottest, centre, mean_temperature, central = (
         np.interp(across, _GRID, values)
         for values in (
             radiance.mean(axis=0),
             radiance.max(axis=0),
             temperature.max(axis=0),
             radiance[_MOMENTS // 2],
+            temperature.mean(axis=0),
+            temperature[_MOMENTS // 2],
         )
     )
     exposure = Exposure(
@@ -84,6 +86,9 @@ def read_straight_band(camera: Camera, emissivity: float, band: StraightBand) ->
         peak.astype(np.float32),
         hottest.astype(np.float32),
         centre,
+        mean_temperature,
+        np.ones(raster.shape),
+        central.astype(np.float32),
     )
     reference, measured, ideal = ExposureImages(exposure).stack(camera, CASES)
     distance = np.arange(-_REACH, _REACH + 1e-7, 1e-6)

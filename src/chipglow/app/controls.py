@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from math import floor, inf
 from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
@@ -22,6 +23,7 @@ Texts: TypeAlias = Mapping[str, str]
 """Values of controls by their paths, as a link writes them; without one the initial value."""
 
 CURSOR: Final = "cursor"
+EXPOSURE: Final = "camera.integration_time"
 LINES: Final[Mapping[str, str]] = {
     "rake_line": "across the rake face",
     "band_line": "across the shear band",
@@ -47,12 +49,15 @@ ERROR_IMAGES: Final[Mapping[str, str]] = {
     "texture": "Error by texture",
 }
 
-_REFERENCES: Final = {
-    "maximum": "Radiance, maximum",
-    "mean": "Radiance, mean",
-    "centre": "Radiance, centre",
-    "true": "True temperature",
+REFERENCES: Final[Mapping[str, str]] = {
+    "maximum": "Radiance maximum",
+    "mean": "Radiance mean",
+    "centre": "Radiance centre",
+    "true-maximum": "True maximum",
+    "true-mean": "True mean",
+    "true-centre": "True centre",
 }
+"""Labels of the references: radiance or true temperature over pixel and exposure."""
 
 OWN: Final = "own numbers"
 AS_STUDY: Final = "study"
@@ -63,6 +68,9 @@ _NOISE: Final = {
     "terms": [{"kind": "netd", "netd": "0.1 K", "temperature": "300 degC"}],
 }
 """A detector with this noise and steps too fine to matter."""
+
+_EARLY: Final = 1e-6
+"""Rounding of times relative to the spacing of frames."""
 
 _SLACK: Final = 1e-7
 """Tolerance of a position outside the image in m: links round to this."""
@@ -168,7 +176,7 @@ TABLE: Final = (
     Control("camera.band.0", "Band from", "Camera", 0.8, 8.0, 0.1),
     Control("camera.band.1", "Band to", "Camera", 1.0, 14.0, 0.1),
     Control("camera.pitch", "Pixel pitch", "Camera", 1.0, 30.0, 0.5),
-    Control("camera.integration_time", "Exposure", "Camera", 1.0, 50.0, 0.5),
+    Control(EXPOSURE, "Exposure", "Camera", 1.0, 50.0, 0.5),
     Control("camera.offset_right", "Pixels right", "Camera", 0.0, 12.0, 0.5),
     Control("camera.offset_down", "Pixels down", "Camera", 0.0, 12.0, 0.5),
     Control("camera.psf", "PSF", "Optics"),
@@ -238,14 +246,12 @@ class Controls:
         words = (word for row in options.values() for word in row.values())
         studies = [study, *(changed(study, word.changes) for word in words)]
         side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
-        longest = 5e6 * study.camera.integration_time
+        exposure = 1e6 * study.camera.integration_time
         ranges: dict[str, dict[str, Any]] = {
             "start": {"stops": tuple(_starts(scene, duration))},
             "camera.pitch": {"high": min(30.0, side)},
-            "camera.integration_time": {
-                "low": longest / 50, "high": longest, "step": longest / 100
-            },
-        }  # fmt: skip
+            EXPOSURE: {"low": exposure / 10, "high": 5 * exposure, "step": exposure / 20},
+        }
         rows = {}
         for row in TABLE:
             declared = [setting_at(one, row.path) for one in studies if _has(one, row.path)]
@@ -261,7 +267,7 @@ class Controls:
         stops = tuple(rounded(1e6 * one) for one in times)
         row = replace(TABLE[0], label="Frame began", stops=stops, quantity=INSTANT)
         rows = {row.path: row for row in (row, *PLACES)}
-        return cls(shown_study(study, rounded(times[0])), rows, raster)
+        return cls(shown_study(study, start=rounded(times[0])), rows, raster)
 
     @cached_property
     def initial(self) -> State:
@@ -276,6 +282,22 @@ class Controls:
             if row.options or _has(state.study, row.setting)
         }  # fmt: skip
 
+    def ranges(self, state: State) -> dict[str, list[float]]:
+        """Return what the scene allows at a state: the stops of the start, the exposure's ends.
+
+        All are in µs; a start or an exposure that the scene does not contain is not among them.
+        """
+        if self.scene is None:
+            return {}
+        camera = state.study.camera
+        duration = camera.on(self.raster, state.study.seed).frame_duration(self.raster)
+        row = self.rows[EXPOSURE]
+        room = 1e6 * (_room(self.scene, state.study.start) - duration + camera.integration_time)
+        return {
+            "start": list(_starts(self.scene, duration)) or [rounded(1e6 * state.study.start)],
+            EXPOSURE: [row.low, max(min(row.high, row.step * floor(room / row.step)), row.low)],
+        }
+
     def changed(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values; a ValueError names the control."""
         if unknown := [path for path in texts if path not in self.rows]:
@@ -289,6 +311,7 @@ class Controls:
             for path in texts:
                 whole, _, number = (setting := self.rows[path].setting).rpartition(".")
                 message = message.removeprefix(f"{whole if number.isdigit() else setting}: ")
+            message = message.removeprefix("exposure: ").removeprefix("camera: ")
             labels = ", ".join(self.rows[path].label for path in texts)
             raise ValueError(f"{labels}: {message}") from None
         initial = self.values(self.initial)
@@ -331,9 +354,9 @@ class Controls:
             frame_weights(self.scene.times, self.scene.frame_spacing, state.study.start, duration)
 
 
-def shown_study(study: Study, start: float) -> ShownStudy:
-    """Return a study with the exposure that is shown."""
-    return ShownStudy(**{name: getattr(study, name) for name in study.given}, start=start)
+def shown_study(study: Study, **shown: Any) -> ShownStudy:
+    """Return a study with settings of the page, such as the start of the exposure."""
+    return ShownStudy(**{name: getattr(study, name) for name in study.given}, **shown)
 
 
 def _word(row: Control, texts: Texts) -> str:
@@ -375,7 +398,7 @@ def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
     words = {
         "scene_image": scene_images,
         "error_image": ERROR_IMAGES,
-        "analysis.reference": _REFERENCES,
+        "analysis.reference": REFERENCES,
         "camera.psf_order": {"detector": "Blur on the pixels", "optics": "Blur on the scene"},
     }
     options = {
@@ -406,7 +429,8 @@ def _surfaces(study: Study) -> dict[str, Option]:
     for name in surface_names(section):
         alone = {kind: {name: one[name]} if name in one else {} for kind, one in kinds.items()}
         surfaces[name] = unchecked(section, **alone)
-    surfaces[OWN] = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
+    own = {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}}
+    surfaces.setdefault(OWN, changed(section, own))  # a study that was saved here may have it
     options = {}
     for name, surface in surfaces.items():
         changes = {"surface": surface, "analysis.rake_chip": name, "analysis.band_chip": name}
@@ -414,11 +438,20 @@ def _surfaces(study: Study) -> dict[str, Option]:
     return options | uniform
 
 
+def _room(scene: Scene, start: float) -> float:
+    """Return the time in s from a start to the end of its part of the scene."""
+    times = scene.times
+    if len(times) == 1:
+        return inf
+    after = times[[block[-1] for block in scene.blocks]] + scene.frame_spacing - start
+    return float(min(after[after > 0], default=0.0) + _EARLY * scene.frame_spacing)
+
+
 def _starts(scene: Scene, duration: float) -> Iterator[float]:
     """Yield the times in µs at which an exposure can begin that ends within its part."""
     times, spacing = scene.times, scene.frame_spacing
     for block in scene.blocks:
-        end = times[block[-1]] + spacing * (1 + 1e-6)
+        end = times[block[-1]] + spacing * (1 + _EARLY)
         yield from (
             rounded(1e6 * times[i]) for i in block if len(times) == 1 or times[i] + duration <= end
         )

@@ -99,8 +99,7 @@ class Image:
 class Line:
     """A figure of the temperatures along a line; the page fills its curves, see page.js."""
 
-    def __init__(self, name: str, with_reference: bool) -> None:
-        title = f"Temperature {LINES[name]}" if with_reference else "Temperature along the line"
+    def __init__(self, name: str, title: str, with_reference: bool) -> None:
         self.figure = one = _figure(name, title, 150)
         curves = ("measured", "reference") if with_reference else ("measured",)
         source = ColumnDataSource(
@@ -155,6 +154,7 @@ class Figures:
     """All figures of a page."""
 
     def __init__(self, raster: Raster, tool: Tool | None, images: tuple[str, ...]) -> None:
+        along = LINES if "scene" in images else dict.fromkeys(LINES, "along the line")
         left, right, bottom, top = self.extent = tuple(MICRONS * edge for edge in raster.extent)
         # The wheel zooms out to three times the image at most.
         ranges = {
@@ -162,7 +162,10 @@ class Figures:
             "y_range": Range1d(bottom, top, bounds=(2 * bottom - top, 2 * top - bottom)),
         }
         self.images = {name: Image(name, ranges, name == images[0]) for name in images}
-        self.lines = {name: Line(name, len(images) > 1) for name in LINES}
+        self.lines = {
+            name: Line(name, f"Temperature {where}", len(images) > 1)
+            for name, where in along.items()
+        }
         self.all = {name: one.figure for name, one in (self.images | self.lines).items()}
         places = {
             name: ColumnDataSource({"x": [], "y": []}, name=name) for name in (*LINES, CURSOR)

@@ -8,6 +8,7 @@ from typing import Final
 from matplotlib import rc_context
 
 from chipglow.app.controls import State
+from chipglow.app.opening import SHOWN, SHOWN_LINE
 from chipglow.app.pictures import Picture, SceneModel
 from chipglow.drawing.drawing import data_url, draw_chip, style
 from chipglow.io import write_dataset
@@ -21,12 +22,17 @@ _COLOURED: Final = (
 
 
 def study_file(model: SceneModel, state: State) -> bytes:
-    """Return the study of a state as YAML; it names the open scene unless that is its cut."""
+    """Return the study of a state as YAML; it names the open scene unless that is its cut.
+
+    A comment holds what is shown, which is not part of a study: see `SHOWN`.
+    """
     shown, scene = state.study, model.file
     given = {name: getattr(shown, name) for name in Study.declared().keys() & shown.given}
-    study = unchecked(Study(), **given, scene=scene)
-    start = model.controls.values(state)["start"]
-    comment = f"# Exposure that begins at {start}:\n"
+    study = unchecked(Study(), **{**given, "scene": scene})
+    values = model.controls.values(state)
+    start = values["start"]
+    is_shown = ", ".join(f"{name}: {values[name]}" for name in SHOWN)
+    comment = f"{SHOWN_LINE}{{{is_shown}}}\n"
     if scene is not None:
         comment += f"# chipglow measure {scene} --study FILE --start '{start}' --out FILE.nc\n"
     return (comment + study_text(study)).encode()
@@ -39,8 +45,9 @@ def measurement_file(picture: Picture, model: SceneModel) -> bytes:
     if model.scene.tool is not None:
         measurement = measurement.with_tool(model.scene.tool)
     place, units = ("time", "y", "x"), {"units": "K"}
+    against = units | {"reference": picture.state.study.analysis.reference}
     data = measurement.data.assign(
-        reference_temperature=(place, picture.data["reference"].values[None], units),
+        reference_temperature=(place, picture.data["reference"].values[None], against),
         error=(place, picture.data["case_1"].values[None], units),
         error_without_psf=(place, picture.data["case_2"].values[None], units),
     )

@@ -1,6 +1,6 @@
 """Inputs of the app: a scene, a folder of results, a measurement, or the bundled scene."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from secrets import token_urlsafe
@@ -21,6 +21,8 @@ from chipglow.quantities import unchecked
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformSurface
+from chipglow.text import read_small_text, read_yaml
+from chipglow.text.yaml_file import parse_yaml
 
 QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarser one before."""
@@ -30,12 +32,22 @@ MOST_UPLOADED: Final = 512 * 1024**2
 
 _MOST_OPEN: Final = 8
 
+SHOWN: Final = ("start", "scene_image", "error_image")
+"""Settings of the page that a study does not have."""
+
+SHOWN_LINE: Final = "# Shown in chipglow app: "
+
 _Points: TypeAlias = Iterable[Any]
 """Pairs of x and y in m."""
 
 
-def scene_model(scene: Scene, study: Study, name: str, file: str | None) -> SceneModel:
-    """Open a scene at its developed shear band, else in its middle; a ValueError if too short."""
+def scene_model(
+    scene: Scene, study: Study, name: str, file: str | None, shown: Mapping[str, Any] | None = None
+) -> SceneModel:
+    """Open a scene at its developed shear band, else in its middle; a ValueError if too short.
+
+    A study that the app saved contains cursor and lines; `shown` are its exposure and images.
+    """
     if "plastic_strain" not in scene.fields and study.surface == Study().surface:
         study = unchecked(study, surface=UniformSurface(0.5))
     duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
@@ -43,8 +55,12 @@ def scene_model(scene: Scene, study: Study, name: str, file: str | None) -> Scen
     coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
     if segment := _developed(coarse, duration, study.analysis.exposures):
         start, places = segment.start, _across(segment)
-    shown = shown_study(_with_places(study, scene.raster, *places), rounded(start))
-    controls = Controls.of_scene(shown, scene, duration)
+    plan = study.analysis
+    if CURSOR in plan.points and set(LINES.values()) <= plan.lines.keys():
+        places = [[plan.points[CURSOR]], *(plan.lines[line] for line in LINES.values())]
+    shown = {"start": rounded(start), **(shown or {})}
+    opened = shown_study(_with_places(study, scene.raster, *places), **shown)
+    controls = Controls.of_scene(opened, scene, duration)
     return SceneModel(name, scene, None if coarse is scene else coarse, controls, file)
 
 
@@ -69,6 +85,8 @@ def open_any(path: Scene | str | Path | None, study: Study | None = None) -> Mod
     path = Path(path)
     if path.is_dir():
         return _results(path)
+    if _is_study(path.name):
+        return _study(path, path.name)
     if is_measurement(path):
         return measurement_model(read_measurement(path), path.name)
     return open_scene_object(open_scene(path), study, path.name)
@@ -98,7 +116,7 @@ class OpenFiles:
 
     def add(self, path: Path, name: str) -> str:
         """Open an uploaded file and return its key; the oldest of too many is removed."""
-        self._opened[path.stem] = open_uploaded(path, name)
+        self._opened[path.stem] = open_uploaded(path, name, self._opened.values())
         for old in list(self._opened)[1:-_MOST_OPEN]:
             del self._opened[old]
             (self.folder / f"{old}.nc").unlink(missing_ok=True)
@@ -108,12 +126,18 @@ class OpenFiles:
         self._folder.cleanup()
 
 
-def open_uploaded(path: Path, name: str) -> Model:
-    """Open an uploaded file by the name that its owner gave it."""
+def open_uploaded(path: Path, name: str, others: Iterable[Model] = ()) -> Model:
+    """Open an uploaded file by the name that its owner gave it.
+
+    An uploaded study shows the scene of its name among the `others` that are open, or its cut.
+    """
     try:
+        if _is_study(name):
+            return _study_of_open_scene(path, name, others)
         opened = open_any(path)
     except (ValueError, OSError) as error:
-        raise ValueError(str(error).replace(str(path), name)) from None
+        message = str(error).replace(str(path), name).replace(path.name, name)
+        raise ValueError(message) from None
     if isinstance(opened, SceneModel):
         return replace(opened, name=name, file=name)
     return replace(opened, name=name)
@@ -123,13 +147,43 @@ def _results(folder: Path) -> SceneModel:
     file = folder / "study.yaml"
     if not file.is_file():
         raise FileNotFoundError(f"{folder}: holds no study.yaml, expected a folder of results")
+    return _study(file, folder.name)
+
+
+def _is_study(name: str) -> bool:
+    return name.lower().endswith((".yaml", ".yml"))
+
+
+def _study(file: Path, name: str) -> SceneModel:
+    """Open the scene of a study."""
     study = load_study(file)
     if study.scene is None and not is_cut(study):
         raise ValueError(
-            f"{folder}: the scene of its study is not in the cache; repeat "
-            f"chipglow run {file} --out {folder}, or open a scene file"
+            f"{file}: the scene of this study is not in the cache; compute it with "
+            f"chipglow cut {file}, or open a scene file"
         )
-    return scene_model(open_scene(study.scene or cut(study)), study, folder.name, study.scene)
+    scene = open_scene(study.scene or cut(study))
+    return scene_model(scene, study, name, study.scene, _shown_of(file))
+
+
+def _shown_of(path: Path) -> dict[str, Any]:
+    """Return what a study that the app saved shows: the settings `SHOWN`; of others nothing."""
+    for line in read_small_text(path).splitlines():
+        if line.startswith(SHOWN_LINE):
+            shown = parse_yaml(line.removeprefix(SHOWN_LINE))
+            return shown if isinstance(shown, dict) and shown.keys() <= set(SHOWN) else {}
+    return {}
+
+
+def _study_of_open_scene(path: Path, name: str, others: Iterable[Model]) -> SceneModel:
+    data = read_yaml(path)
+    named = data.get("scene") if isinstance(data, dict) else None
+    if named is None:
+        return _study(path, name)
+    for other in others:
+        if isinstance(other, SceneModel) and other.file == named:
+            return scene_model(other.scene, load_study(path), name, named, _shown_of(path))
+    raise ValueError(f"{path}: its scene {named} is not open here: open that file first")
 
 
 def _with_places(study: Study, raster: Raster, *places: _Points) -> Study:
@@ -140,11 +194,10 @@ def _with_places(study: Study, raster: Raster, *places: _Points) -> Study:
         for points in places
     )
     corners = (tuple(map(tuple, line)) for line in lines)
-    plan = {
-        "points": {CURSOR: tuple(cursor)},
-        "lines": dict(zip(LINES.values(), corners, strict=True)),
-    }
-    return unchecked(study, analysis=unchecked(study.analysis, **plan))
+    plan = study.analysis
+    points = {**plan.points, CURSOR: tuple(cursor)}
+    own = {**plan.lines, **dict(zip(LINES.values(), corners, strict=True))}
+    return unchecked(study, analysis=unchecked(plan, points=points, lines=own))
 
 
 def _developed(scene: Scene, duration: float, count: int) -> Segment | None:

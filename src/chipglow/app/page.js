@@ -68,7 +68,7 @@ export function render({ view, model, el }) {
     for (const kind of slider ? ["input", "change"] : []) {
       slider.addEventListener(kind, () => {
         const at = Number(slider.value);
-        setText(entry, stops.length ? stops[at] : Number(at.toPrecision(9)));
+        setText(entry, entry.stops.length ? entry.stops[at] : Number(at.toPrecision(9)));
         change(path, field.value, kind === "change");
       });
     }
@@ -174,9 +174,14 @@ export function render({ view, model, el }) {
 
   // Messages from Python.
 
-  function showValues({ n, values, can_undo, can_redo, link }) {
+  function showValues({ n, values, ranges, can_undo, can_redo, link }) {
     for (const [path, entry] of controls) {
-      const { box, field, slider, stops } = entry, text = values[path];
+      const { box, field, slider } = entry, text = values[path];
+      if (slider && ranges[path]) {
+        if (entry.stops.length) entry.stops = ranges[path];
+        [slider.min, slider.max] = entry.stops.length ? [0, entry.stops.length - 1] : ranges[path];
+      }
+      const stops = entry.stops;
       box.hidden = text === undefined;
       if (box.hidden || entry.sent > n) continue;
       entry.text = text;
@@ -221,7 +226,25 @@ export function render({ view, model, el }) {
     Object.assign(document.createElement("a"), { href: url, download: name }).click();
   }
 
-  // One picture of all figures as they are: images in a row, lines below.
+  // Lines of text with the file, the controls and the places, each line as wide as a picture.
+  function settingLines(context, width) {
+    // The values that Python has, not what is being typed.
+    const values = [...controls.values()].filter(({ box }) => !box.hidden).map(({ box, field, text }) => {
+      const option = [...field.options ?? []].find((one) => one.value === text);
+      const unit = text ? box.querySelector(".unit")?.textContent ?? "" : "";
+      const of = box.closest(".figure")?.ariaLabel ?? "", label = box.querySelector("label").textContent;
+      return `${of} ${label}: ${option?.text ?? (text || "none")} ${unit}`.trim();
+    });
+    const lines = [];
+    for (const one of [`chipglow ${spec.version}, ${find(".name").textContent}`, ...values]) {
+      const longer = lines.length ? `${lines.at(-1)}; ${one}` : one;
+      if (lines.length && context.measureText(longer).width <= width) lines[lines.length - 1] = longer;
+      else lines.push(one);
+    }
+    return lines;
+  }
+
+  // One picture of all figures as they are, images in a row, lines below, and its settings.
   let quick = true;
   each("#sheet", "click", () => {
     if (quick) return showStatus({ text: "The exact picture is not ready; save again when it is shown.", kind: "error" });
@@ -229,12 +252,18 @@ export function render({ view, model, el }) {
     const rows = [spec.images, lines].map((row) => row.map((one) => plotOf(one).export("png").canvas));
     const sum = (row) => row.reduce((width, one) => width + one.width, 0);
     const tall = rows.map((row) => Math.max(...row.map((one) => one.height)));
-    const sheet = Object.assign(document.createElement("canvas"), {
-      width: Math.max(...rows.map(sum)), height: tall[0] + tall[1] });
-    const context = sheet.getContext("2d");
-    context.fillStyle = getComputedStyle(page).backgroundColor;
+    const sheet = document.createElement("canvas"), context = sheet.getContext("2d");
+    const width = Math.max(...rows.map(sum)), height = tall[0] + tall[1];
+    const pixels = devicePixelRatio, margin = 8 * pixels, spacing = 16 * pixels, font = `${12 * pixels}px sans-serif`;
+    context.font = font;
+    const settings = settingLines(context, width - 2 * margin);
+    Object.assign(sheet, { width, height: height + settings.length * spacing + 2 * margin });
+    const { backgroundColor, color } = getComputedStyle(page);
+    context.fillStyle = backgroundColor;
     context.fillRect(0, 0, sheet.width, sheet.height);
     rows.forEach((row, i) => row.forEach((one, j) => context.drawImage(one, sum(row.slice(0, j)), i * tall[0])));
+    Object.assign(context, { font, fillStyle: color, textBaseline: "top" });
+    settings.forEach((line, i) => context.fillText(line, margin, height + margin + i * spacing));
     saveDownload({ name: "chipglow.png", url: sheet.toDataURL() });
     showStatus({ text: "chipglow.png is saved.", kind: "" });
   });

@@ -4,21 +4,31 @@ from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from math import ceil, nan, sqrt
-from typing import Any, ClassVar, Final, TypeAlias, TypeVar
+from typing import Any, ClassVar, Final, TypeAlias, TypeVar, cast, get_args
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace, attribute
+from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.distribution import PIXEL_PHASE
+from chipglow.analysis.images import TRUE
 from chipglow.analysis.looks import Schedule, View, look
-from chipglow.app.controls import CURSOR, ERROR_IMAGES, LINES, SCENE_IMAGES, Controls, State
+from chipglow.app.controls import (
+    CURSOR,
+    ERROR_IMAGES,
+    LINES,
+    REFERENCES,
+    SCENE_IMAGES,
+    Controls,
+    State,
+)
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.sweep import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
@@ -26,6 +36,9 @@ from chipglow.surface import Surface
 
 _Exposed: TypeAlias = tuple[ExposureImages, Exposure | None]
 _Result = TypeVar("_Result")
+
+REFERENCE: Final = "reference_temperature"
+"""Variable of a measurement that the app saved: the reference of its pixels in K."""
 
 DISPLAYED: Final = 100_000
 """Samples of the image of the scene on the page."""
@@ -39,8 +52,8 @@ _ROLLING: Final = (*_EXPOSURE, "camera.pitch", "camera.offset")
 """Beginnings of the paths of controls that change surface and exposure."""
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
+@dataclass(frozen=True, eq=False, repr=False)
+class Panel(Brief):
     """An image as a figure shows it, NaN where it is grey."""
 
     name: str
@@ -51,8 +64,8 @@ class Panel:
     colours: str
 
 
-@dataclass(frozen=True, eq=False)
-class Picture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Picture(Brief):
     """Images over the pixels in K and lines in µm and °C at a state; `quick` marks coarse ones."""
 
     state: State
@@ -66,6 +79,7 @@ class Picture:
     exposure: Exposure | None = None
     parts: Callable[[], xr.Dataset] | None = None  # computes the `error_parts`
     absent: Mapping[str, str] = field(default_factory=dict)  # why error images are 0 everywhere
+    reference: str = ""  # label of the reference
 
     @property
     def lower_limit(self) -> float | None:
@@ -74,8 +88,8 @@ class Picture:
         return None if limit is None else limit - KELVIN
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drawn(Brief):
     """Measured lines in °C, shape (draw, n), and error at the cursor over phases and textures."""
 
     state: State
@@ -92,8 +106,9 @@ class SceneModel:
     coarse: Scene | None  # with fewer samples, for a quick look before the exact picture
     controls: Controls
     file: str | None  # the scene as a saved study names it; None for the study's cut
+    images: ClassVar[tuple[str, ...]] = ("scene", "measured", "error")
     _caches: dict[str, dict[Hashable, Any]] = field(
-        init=False, default_factory=lambda: defaultdict(dict)
+        init=False, default_factory=lambda: defaultdict(dict), repr=False
     )
 
     def is_ready(self, state: State) -> bool:
@@ -126,12 +141,12 @@ class SceneModel:
         if shown != "total":
             error = parts().get(shown, xr.zeros_like(error))
         raster, exposure = camera.pixels(scene.raster), images.exposure
-        values = _unflagged(data, error)
-        limit = round_limit(values, 99, 5.0)
+        values, reference = _unflagged(data, error), REFERENCES[state.study.analysis.reference]
+        title = _error_title(reference) if shown == "total" else ERROR_IMAGES[shown]
         panels = {
             "scene": self._scene_panel(state, exposure),
             "measured": _measured_panel(data, raster),
-            "error": Panel(ERROR_IMAGES[shown], "K", values, raster, (-limit, limit), SIGNED),
+            "error": _error_panel(title, values, raster),
         }
         if panels["scene"].unit == "°C":  # both temperatures have the same colours
             limits = panels["scene"].limits
@@ -143,6 +158,7 @@ class SceneModel:
         return Picture(
             state, raster, data, panels, _lines(state, raster, data),
             _crossings(state, scene.tool), quick, camera, exposure, parts, _absent(state, surface),
+            reference,
         )  # fmt: skip
 
     def numbers(self, picture: Picture) -> dict[str, float]:
@@ -167,15 +183,22 @@ class SceneModel:
         return numbers
 
     def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
-        """Return the contribution of each effect to the error at the cursor in K."""
+        """Return the contribution of each effect to the error at the cursor in K.
+
+        There are none out of range, and for a reference that `attribute` does not have.
+        """
         assert picture.camera and picture.exposure
         state, camera, start = picture.state, picture.camera, picture.exposure.start
+        against = cast(AttributionReference, state.study.analysis.reference)
+        flagged = nearest(picture.data["flagged"].values, picture.raster, state.cursor)
+        if against not in get_args(AttributionReference) or flagged:
+            return {}
         scene, surface = self._on(state, quick=False)
         data = self._kept(
             2,
             "contributions",
             (self._exposure_key(state), camera),
-            lambda: attribute(scene, camera, surface, start, check=check),
+            lambda: attribute(scene, camera, surface, start, reference=against, check=check),
         )
         values = (nearest(one, picture.raster, state.cursor) for one in data.contribution.values)
         return dict(zip(data.effect.values.tolist(), map(float, values), strict=True))
@@ -326,17 +349,30 @@ class MeasurementModel:
     controls: Controls
     coarse: ClassVar[None] = None
 
+    @property
+    def images(self) -> tuple[str, ...]:
+        """Names of the images."""
+        return ("measured", "error") if REFERENCE in self.measurement.data else ("measured",)
+
     def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
         """Return the frame that began nearest to the state's start."""
         measurement = self.measurement
         index, raster = self._index(state), measurement.raster
-        images = {
-            "measured": measurement.data["radiance_temperature"][index].values.astype(np.float64),
-            "flagged": ~measurement.usable[index],
-        }
+        reference, label = measurement.data.get(REFERENCE), ""
+        # The error is stated of pixels out of range too, as it is for a scene.
+        measured = measurement.radiance_temperature(flagged=reference is not None)[index]
+        images = {"measured": measured, "flagged": ~measurement.usable[index]}
+        if reference is not None:
+            images["reference"] = reference[index].values
+            images["case_1"] = measured - images["reference"]
+            label = REFERENCES.get(str(reference.attrs.get("reference")), "reference")
         data = xr.Dataset({name: (("y", "x"), image) for name, image in images.items()})
-        panels, lines = {"measured": _measured_panel(data, raster)}, _lines(state, raster, data)
-        return Picture(state, raster, data, panels, lines, _crossings(state, measurement.tool))
+        panels = {"measured": _measured_panel(data, raster)}
+        if reference is not None:
+            values = _unflagged(data, data["case_1"])
+            panels["error"] = _error_panel(_error_title(label), values, raster)
+        lines, crossings = _lines(state, raster, data), _crossings(state, measurement.tool)
+        return Picture(state, raster, data, panels, lines, crossings, reference=label)
 
     def contributions(self, picture: Picture, check: Check) -> dict[str, float]:
         """Return nothing: the true temperature of a measurement is not known."""
@@ -375,7 +411,7 @@ def _absent(state: State, surface: Surface) -> Mapping[str, str]:
     """Return the error images that are 0 everywhere, with the reason."""
     study = state.study
     reasons = {
-        "emissivity": study.analysis.reference != "true" and "part of the reference",
+        "emissivity": not study.analysis.reference.startswith(TRUE) and "part of the reference",
         "psf": study.camera.psf is None and "no PSF",
         "texture": surface.without_texture() is surface and "the emissivity has none",
     }
@@ -409,6 +445,15 @@ def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:
     values = _unflagged(data, data["measured"]) - KELVIN
     limits = ends(values, 0.0, 100.0, 10.0)
     return Panel("Measured radiance temperature", "°C", values, raster, limits, HEAT)
+
+
+def _error_title(reference: str) -> str:
+    return f"Error against {reference[0].lower()}{reference[1:]}"
+
+
+def _error_panel(title: str, values: Array, raster: Raster) -> Panel:
+    limit = round_limit(values, 99, 5.0)
+    return Panel(title, "K", values, raster, (-limit, limit), SIGNED)
 
 
 def _unflagged(data: xr.Dataset, image: xr.DataArray) -> Array:

@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from threading import RLock
 from time import perf_counter
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, get_args
 
 import numpy as np
 import panel as pn
@@ -19,14 +19,16 @@ from bokeh.document import Document
 from jinja2 import Environment, PackageLoader
 from panel.custom import Children, JSComponent
 
+from chipglow import __version__
+from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.images import PARTS
 from chipglow.app.controls import ERROR_IMAGES, Texts
-from chipglow.app.figures import TEXT, TITLES, Figures
+from chipglow.app.figures import TEXT, Figures
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
 from chipglow.drawing.scales import KELVIN
-from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_text
+from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
 
 _FOLDER: Final = Path(__file__).parent
 _log = logging.getLogger(__name__)
@@ -74,11 +76,8 @@ class View:
             self.session.restore(texts or {})
         except ValueError as error:
             self._refused = f"Link: {error}"
-        is_scene = isinstance(opened, SceneModel)
         shown = opened.scene if isinstance(opened, SceneModel) else opened.measurement
-        self.figures = Figures(
-            shown.raster, shown.tool, tuple(TITLES) if is_scene else ("measured",)
-        )
+        self.figures = Figures(shown.raster, shown.tool, opened.images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._on_painted, self._on_theme = self.session.painted, self.figures.set_theme
@@ -256,7 +255,10 @@ class View:
         template = _TEMPLATES.get_template("numbers.html")
         html = template.render(
             numbers=numbers,
+            texts=_texts(numbers),
+            reference=picture.reference,
             is_scene=bool(parts),
+            is_divided=picture.state.study.analysis.reference in get_args(AttributionReference),
             position=f"{1e6 * x:.1f}, {1e6 * y:.1f} µm".replace("-", "−"),
             percent=_bars(parts),
             contributions=contributions,
@@ -293,6 +295,7 @@ class View:
         content = {
             "n": self._handled,
             "values": {path: controls.rows[path].shown(text) for path, text in values.items()},
+            "ranges": controls.ranges(session.state),
             "can_undo": session.can_undo,
             "can_redo": session.can_redo,
             "link": {**self._link, **session.state.texts},
@@ -335,6 +338,7 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
     left, right, bottom, top = figures.extent
     spec = {
         "embedded": embedded,
+        "version": __version__,
         "most_uploaded": MOST_UPLOADED,
         "stops": {row.path: row.stops for row in rows},
         "images": list(figures.images),
@@ -354,15 +358,39 @@ def _html(opened: Model, figures: Figures, may_upload: bool, embedded: bool) -> 
     )
 
 
-def _celsius(kelvins: float, uncertainty: float = 0.0) -> str:
-    """Return a temperature, to two digits of its uncertainty if that is known."""
-    if isfinite(kelvins) and uncertainty > 0:
-        return f"{uncertain_text(kelvins - KELVIN, uncertainty)} °C"
-    return quantity_text(kelvins - KELVIN if isfinite(kelvins) else None, "°C", 1)
+def _texts(numbers: Mapping[str, float]) -> dict[str, str]:
+    """Return measured, reference and error, of which the texts differ by exactly the error's.
+
+    They have the digits of the measured temperature's uncertainty, if that is known.
+    """
+    uncertainty = numbers.get("uncertainty", 0.0)
+    is_known = isfinite(uncertainty) and uncertainty > 0
+    decimals = uncertain_decimals(uncertainty) if is_known else 1
+    celsius = {
+        name: round(numbers[name] - KELVIN, decimals)
+        for name in ("measured", "reference")
+        if name in numbers
+    }
+    texts = {name: _quantity(value, "°C", decimals) for name, value in celsius.items()}
+    if is_known and isfinite(celsius["measured"]):
+        number = _quantity(celsius["measured"], "", decimals)
+        texts["measured"] = f"{number} ± {uncertainty:.{decimals}f} °C"
+    if "reference" in celsius:
+        error = celsius["measured"] - celsius["reference"]
+        texts["error"] = _quantity(error, "K", decimals, "+")
+    return texts
+
+
+def _quantity(value: float, unit: str, decimals: int, sign: str = "") -> str:
+    return quantity_text(value if isfinite(value) else None, unit, decimals, sign)
+
+
+def _celsius(kelvins: float) -> str:
+    return _quantity(kelvins - KELVIN, "°C", 1)
 
 
 def _kelvins(kelvins: float) -> str:
-    return quantity_text(kelvins if isfinite(kelvins) else None, "K", 1, "+")
+    return _quantity(kelvins, "K", 1, "+")
 
 
 _TEMPLATES: Final = Environment(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Check, Sums
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Raster, Scene, is_gap
@@ -21,8 +21,8 @@ _SPARSE: Final = 1e-3
 """Ratio of exposure to frame spacing below which a changing scene causes a warning."""
 
 
-@dataclass(frozen=True, eq=False)
-class Exposure:
+@dataclass(frozen=True, eq=False, repr=False)
+class Exposure(Brief):
     """A scene's radiance during one integration time; arrays in W/(m² sr), shape (y, x)."""
 
     start: float
@@ -38,6 +38,12 @@ class Exposure:
     """Highest true temperature of all sub-frames in K; NaN without material."""
     centre_radiance: Array
     """Apparent radiance at the middle of the integration."""
+    mean_temperature: Array
+    """Time average of the true temperature of the material in K; NaN without material."""
+    material_fraction: Array
+    """Fraction of the integration in which there is material."""
+    centre_temperature: NDArray[np.float32]
+    """True temperature at the middle of the integration in K; NaN without material."""
     effects: Mapping[str, str] = field(default_factory=dict)
     """Attributes of a measurement about the surface, by `Surface.effects`."""
     warnings: tuple[str, ...] = ()
@@ -110,8 +116,12 @@ def expose(
             f"{np.count_nonzero(~np.isfinite(mean).all(axis=0))} samples"
         )
     hottest[hottest == 0.0] = np.nan
+    sums.middle[sums.middle == 0.0] = np.nan
+    with np.errstate(invalid="ignore"):
+        heat = sums.heat / sums.present
+    of_material = heat, sums.present, sums.middle
     return tuple(
-        Exposure(start, duration, scene.raster, radiance, peak, hottest, centre)
+        Exposure(start, duration, scene.raster, radiance, peak, hottest, centre, *of_material)
         for radiance, peak, centre in zip(mean, sums.peak, sums.centre, strict=True)
     )
 

@@ -10,15 +10,15 @@ import numpy as np
 from chipglow.camera.camera import Camera
 from chipglow.camera.exposure import Exposure, View, expose
 from chipglow.camera.measurement import Measurement
-from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities import Array, Brief, Parameter, Part
 from chipglow.quantities.units import INSTANT, Position
 from chipglow.radiometry import RatioThermometer
 from chipglow.scene import Raster, Scene
 from chipglow.surface import Surface
 
 
-@dataclass(frozen=True, eq=False)
-class RatioMeasurement:
+@dataclass(frozen=True, eq=False, repr=False)
+class RatioMeasurement(Brief):
     """Frames of two channels, pixel upon pixel, and their ratio temperature."""
 
     first: Measurement

@@ -6,7 +6,7 @@ from typing import Any, Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes
 
@@ -42,8 +42,8 @@ class PlanckConversion:
         return np.where((signal > 0) & (logarithm > 0), temperature, np.nan)
 
 
-@dataclass(frozen=True)
-class Recording:
+@dataclass(frozen=True, repr=False)
+class Recording(Brief):
     """Frames as a camera wrote them."""
 
     signal: NDArray[Any]

@@ -34,7 +34,7 @@ _STRAIN, _RATE, _X, _Y = (
     for name in ("plastic_strain", "plastic_strain_rate", "material_x", "material_y")
 )
 _MEAN: Final = 3
-_VIEWS: Final = 7
+_VIEWS: Final = 10
 """Positions of the mean and of the views in the tuple that `Sums` passes to the kernels."""
 
 Indices: TypeAlias = NDArray[np.intp]
@@ -45,7 +45,11 @@ _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": 
 
 
 class Sums:
-    """Sums over the sub-frames, shape (view, y, x) but `hottest`; see `Exposure`.
+    """Sums over the sub-frames; see `Exposure`.
+
+    `mean`, `centre` and `peak` of the radiance have the shape (view, y, x). Of the temperature,
+    with the shape (y, x), there are the maximum `hottest`, the mean `heat` in which samples without
+    material count as 0 K, the fraction `present` of the exposure with material, and `middle`.
 
     `views` are indices of surface and band, (view, 2); `tables` each band's radiance and its change
     to the next value, (band, n, 2); `environments` the radiance of each view's surroundings.
@@ -61,8 +65,11 @@ class Sums:
         check: Check | None,
     ) -> None:
         self.mean, self.centre = (np.zeros((len(views), *shape)) for _ in range(2))
-        self.peak, self.hottest = (np.zeros(size, np.float32) for size in (self.mean.shape, shape))
-        sums = self.mean, self.centre, self.peak, self.hottest
+        self.peak = np.zeros(self.mean.shape, np.float32)
+        self.hottest, self.middle = (np.zeros(shape, np.float32) for _ in range(2))
+        self.heat, self.present = (np.zeros(shape) for _ in range(2))
+        temperatures = self.hottest, self.heat, self.present, self.middle
+        sums = self.mean, self.centre, self.peak, *temperatures
         self._sums = tables, environments, np.float32(max_emissivity), *sums, views
         self._check = check
 
@@ -149,10 +156,13 @@ def _look_up(table, number, past, black):
 
 
 @njit(**_FAST)
-def _raise_temperature(temperature, kind, hottest):
+def _add_temperature(temperature, kind, weight, hottest, heat, present):
     for i in range(hottest.size):
-        there = temperature[i] if kind[i] != _VOID else np.float32(0.0)
+        is_material = kind[i] != _VOID
+        there = temperature[i] if is_material else np.float32(0.0)
         hottest[i] = max(hottest[i], there)
+        heat[i] += weight * np.float64(there)
+        present[i] += weight * is_material
 
 
 @njit(**_FAST)
@@ -179,10 +189,16 @@ def _raise_peak(apparent, peak):
 @njit(**_FAST)
 def _add_row(temperature, kind, emissivity, weight, is_middle, row, work, number, sums):
     """Add row `row` of a sub-frame, with the emissivities (surface, x), to the sums."""
-    tables, environments, max_emissivity, mean, centre, peak, hottest, views = sums
+    (
+        tables, environments, max_emissivity, mean, centre, peak, hottest, heat, present, middle,
+        views,
+    ) = sums  # fmt: skip
     past, black, apparent = work[0], work[1], work[2]
     _find(temperature, tables.shape[1] - 1, number, past)
-    _raise_temperature(temperature, kind, hottest[row])
+    _add_temperature(temperature, kind, weight, hottest[row], heat[row], present[row])
+    if is_middle:
+        for i in range(kind.size):
+            middle[row, i] = temperature[i] if kind[i] != _VOID else np.float32(0.0)
     current = -1
     for n in range(views.shape[0]):
         surface, band = views[n]

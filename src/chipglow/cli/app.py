@@ -184,7 +184,8 @@ def open_app(
         Path | None,
         opt.argument(
             "[PATH]",
-            "Scene or measurement (NetCDF), or results folder. Default: a small bundled scene.",
+            "Scene or measurement (NetCDF), study (YAML) or results folder. Default: a small "
+            "bundled scene.",
             show_default=False,
         ),
     ] = None,

@@ -18,7 +18,7 @@ from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
 from chipglow.quantities import changed
 from chipglow.report import result_rows, write_report
-from chipglow.report.paper import CITATION
+from chipglow.report.paper import CITATION, SOFTWARE
 from chipglow.study import Progress, Study, run, study_text
 from chipglow.text import Notes
 
@@ -70,7 +70,7 @@ def write_results(
         screen.values({"summary": json.loads(summary)})
     screen.file(folder / report.relative_to(temporary), "Report")
     method = f" {CITATION}" if study.is_papers else ""
-    screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}.{method}")
+    screen.say(f"Cite as: {SOFTWARE}{method}")
 
 
 def _steady(

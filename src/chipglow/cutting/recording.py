@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import OutputWindow
 from chipglow.cutting.stress import BULK, SHEAR, elastic_energy, kelvin_index
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Frame, Raster
 
 _SMOOTH: Final = 5e-6
@@ -123,8 +123,8 @@ class Recorder:
         return self._starts[-1] + self._frames - 1 if self._starts else self._last_of_window
 
 
-@dataclass(frozen=True)
-class EnergyHistory:
+@dataclass(frozen=True, repr=False)
+class EnergyHistory(Brief):
     """Energy per width of cut since the start, in J/m, at the times of the force history.
 
     Each entry has the shape (n,).

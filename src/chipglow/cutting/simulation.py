@@ -71,6 +71,7 @@ from chipglow.cutting.recording import (
     restore,
 )
 from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
+from chipglow.quantities import Brief
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distances
@@ -112,8 +113,8 @@ class SolverError(RuntimeError):
     """A simulation that went wrong: what, where and when."""
 
 
-@dataclass(frozen=True)
-class ForceHistory:
+@dataclass(frozen=True, repr=False)
+class ForceHistory(Brief):
     """Force of the tool on the workpiece per width of cut, over the whole cut."""
 
     time: NDArray[np.float64]

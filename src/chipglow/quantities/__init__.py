@@ -1,9 +1,11 @@
 """Units and their text, values as tables print them, and settings declared once."""
 
+from chipglow.quantities.brief import Brief as Brief, brief as brief
 from chipglow.quantities.format import (
     quantity_text as quantity_text,
     rounded_text as rounded_text,
     uncertain_text as uncertain_text,
+    uncertainty_text as uncertainty_text,
 )
 from chipglow.quantities.parameter import Parameter as Parameter, zero_to_one as zero_to_one
 from chipglow.quantities.part import (

@@ -2,6 +2,7 @@
 
 import re
 from math import floor, isfinite, isnan, log10
+from typing import Final
 
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
@@ -13,12 +14,28 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
     return f"{number.replace(',', ' ').replace('-', '−')} {unit}".strip()
 
 
+_FINEST: Final = 1e-9
+"""Uncertainty below which a number is exact but for the rounding of the computation."""
+
+
 def uncertain_text(value: float, uncertainty: float) -> str:
     """Return a number and its standard uncertainty, which has two significant digits."""
-    if not isfinite(uncertainty) or uncertainty <= 0:
+    if not isfinite(uncertainty) or uncertainty < _FINEST:
         return f"{value:.4g}"
-    decimals = min(max(0, 1 - floor(log10(uncertainty))), 9)
+    decimals = uncertain_decimals(uncertainty)
     return f"{value:.{decimals}f} ± {uncertainty:.{decimals}f}"
+
+
+def uncertain_decimals(uncertainty: float) -> int:
+    """Return the number of decimals with which two digits of a standard uncertainty are shown."""
+    return min(max(0, 1 - floor(log10(uncertainty))), 9)
+
+
+def uncertainty_text(uncertainty: float) -> str:
+    """Return an uncertainty, with two digits if it is below 10."""
+    if not isfinite(uncertainty) or uncertainty < _FINEST:
+        return f"{uncertainty:.0f}"
+    return f"{uncertainty:.{uncertain_decimals(uncertainty)}f}"
 
 
 def rounded_text(value: float, unit: str = "") -> str:

@@ -7,11 +7,25 @@ from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import MISSING, fields as dataclass_fields
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, reduce
 from importlib.metadata import entry_points
 from inspect import isabstract
+from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal, NotRequired, Self, TypeVar, get_args
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Final,
+    Literal,
+    NotRequired,
+    Self,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 from warnings import warn
 
 import numpy as np
@@ -80,7 +94,7 @@ class Part:
                 continue
             annotations[name] = annotation
             # The dataclass, `help` and signatures see the plain type.
-            cls.__annotations__[name] = annotation.__origin__
+            cls.__annotations__[name] = _plain(annotation)
         cls._annotations = annotations
         cls._parameters = {name: _parameter(one) for name, one in annotations.items()}
         if "__doc__" in vars(cls) and cls.__doc__ and annotations:
@@ -435,7 +449,21 @@ def _with_parameters(text: str, annotations: Mapping[str, Any]) -> str:
     return "\n".join([before + title + "\n".join(rows), after]).rstrip() + "\n"
 
 
+def _plain(annotation: Any) -> Any:
+    """Return a type without the metadata of `Annotated`, also in its arguments."""
+    if get_origin(annotation) is Annotated:
+        return _plain(annotation.__origin__)
+    inner = get_args(annotation)
+    if not inner or get_origin(annotation) is Literal:
+        return annotation
+    if get_origin(annotation) in (Union, UnionType):
+        return reduce(or_, map(_plain, inner))
+    plain = tuple(one if one is Ellipsis or isinstance(one, list) else _plain(one) for one in inner)
+    return annotation if plain == inner else get_origin(annotation)[plain]
+
+
 def _type_text(annotation: Any) -> str:
-    kind, quantity = annotation.__origin__, _parameter(annotation).quantity
-    name = kind.__name__ if isinstance(kind, type) else str(kind).replace("typing.", "")
+    kind, quantity = _plain(annotation), _parameter(annotation).quantity
+    is_plain = isinstance(kind, type) and not get_args(kind)
+    name = kind.__name__ if is_plain else str(kind).replace("typing.", "")
     return f"{name}, in {quantity.base}" if quantity else name

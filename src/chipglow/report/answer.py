@@ -9,6 +9,7 @@ from chipglow.analysis import Distribution
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
+from chipglow.report.paper import few_text
 from chipglow.report.rows import Row, draws_text, main_readings, slug, spread_text
 
 _MAX_SENTENCES: Final = 3
@@ -51,9 +52,9 @@ def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
     if fraction is not None and fraction.mean > 0:  # blur may raise the temperature beside a band
         percent = spread_text(100 * fraction.mean, 100 * fraction.expanded_uncertainty, "%", 0)
         parts.append(f"the point spread function accounts for {percent} of the error")
-    if row.paper is not None and row.differs is not None:
-        side = "outside" if row.differs else "within"
-        parts.append(f"the paper's {-row.paper:.0f} K lies {side} the interval of a single frame")
+    if row.published is not None and row.differs is not None:
+        side, value = "outside" if row.differs else "within", row.published.text("K", scale=-1.0)
+        parts.append(f"the paper's {value} lies {side} the interval of a single frame")
     if (saturated := _saturated(facts, name)) >= _MANY:
         percent = quantity_text(100 * saturated, "%", 0)
         parts.append(f"{percent} of the pixels there are saturated: a camera shows no temperature")
@@ -98,13 +99,10 @@ def error_text(error: Distribution) -> str:
     """Return how far a reading is too low or too high on average and in a single frame."""
     scale, way, other = (-1.0, "low", "high") if error.mean < 0 else (1.0, "high", "low")
     text = f"{draws_text(error, scale)} too {way}"
-    if error.missing:
-        return f"{text} (no interval: only one {' and one '.join(error.missing)} was drawn)"
-    if error.draws < 2:
-        return f"{text} (a single draw)"
     low, high = sorted(scale * end for end in error.interval)
     if not isfinite(low):
-        return f"{text} (no interval: too few {error.causes[0]}s)"
+        few = few_text(error)
+        return f"{text} (no interval: {few[0].lower()}{few[1:]})"
     least = quantity_text(abs(low), "K", 0) + (f" too {other}" if low < 0 else "")
     most = f"{quantity_text(high, 'K', 0)} too {way}"
     return f"{text} on average; in a single frame between {least} and {most}"

@@ -147,7 +147,7 @@ def _sentence(
         if abs(value) >= _LEAST
     ]
     way = "below" if error < 0 else "above"
-    truth = "true temperature" if reference == "true" else "largest radiance temperature"
+    truth = "true temperature" if reference == "true-maximum" else "largest radiance temperature"
     text = f"{subject} is {quantity_text(abs(error), 'K', 0)} {way} the {truth}"
     text += f": {', '.join(parts)}" if parts else ""
     if np.isfinite(gain) and abs(gain) >= _LEAST:

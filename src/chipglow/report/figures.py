@@ -234,8 +234,10 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
                 line: Any = {"color": colour, "marker": "o", "markersize": 3.0, "label": label}
                 axes.plot(widths, scale * values(data, one, name), **line)
             if facts.is_compared:
-                level = PAPER[f"{name}_{key}"].value
-                axes.axhline(level, color="black", linestyle="--", label="paper")
+                paper = PAPER[f"{name}_{key}"]
+                low, high = paper.value - paper.rounding, paper.value + paper.rounding
+                axes.axhspan(low, high, color=GREY, alpha=0.3, linewidth=0)
+                axes.axhline(paper.value, color="black", linestyle="--", label="paper")
             if psf is not None and draws is not None:
                 own_width, colour = psf.fwhm * 1e6, _ORDERS[order][0]
                 _draw_point(axes, own_width, scale * draws.mean, colour, "PSF of this camera")

@@ -8,15 +8,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow import __version__
 from chipglow.analysis import Distribution
 from chipglow.analysis.distribution import COVERAGE
 from chipglow.quantities.format import quantity_text
-from chipglow.report.page import environment, texts
+from chipglow.report.page import environment, template, texts
 from chipglow.surface import Emissivity
 
 Array = NDArray[np.float64]
 
 _TEXTS: Final = texts("paper")
+SOFTWARE: Final[str] = template(_TEXTS["software"]).render(version=__version__)
 CITATION: Final[str] = _TEXTS["citation"]
 BAND_KEYS: Final = ("band_error_degC", "band_worst_error_degC", "band_psf_fraction_percent")
 """Rows of the three numbers on the shear band."""
@@ -30,7 +32,13 @@ class PaperValue:
     """A published value in the unit of the report's row, and its position in the paper."""
 
     value: float
+    rounding: float
+    """Half the step to which the paper rounds it: it means `value` ± `rounding`."""
     where: str
+
+    def text(self, unit: str, scale: float = 1.0) -> str:
+        """Return the value times a scale with its rounding and unit."""
+        return f"{quantity_text(scale * self.value, '', 0)} ± {self.rounding:g} {unit}"
 
 
 PAPER: Final[Mapping[str, PaperValue]] = {
@@ -64,38 +72,46 @@ def comparison(
     sentences = [_TEXTS["rows"].get(key, "")]
     paper = PAPER.get(key)
     if paper and series is not None:
-        width, value = crossing(widths, series, paper.value), quantity_text(paper.value, unit, 0)
+        width, value = crossing(widths, series, paper), paper.text(unit)
         sentences.append(
             f"None of them gives the paper's {value}."
             if width is None
             else f"The paper's {value} is reached at {width * 1e6:.3g} µm."
         )
     if paper and draws:
-        sentences.append(position(draws, paper.value, unit))
+        sentences.append(position(draws, paper, unit))
     return " ".join(filter(None, sentences))
 
 
-def position(draws: Distribution, paper: float, unit: str) -> str:
+def position(draws: Distribution, paper: PaperValue, unit: str) -> str:
     """Return where a published value lies relative to the interval of a single frame."""
     if not isfinite(draws.interval[0]):
-        few = f"Only one {' and one '.join(draws.missing)} was" if draws.missing else "Too few were"
-        return f"{few} drawn to show whether the paper's value differs."
+        return f"{few_text(draws)}: too few to show whether the paper's value differs."
     low, high = (f"{end:.0f}".replace("-", "−") for end in draws.interval)
-    within = "outside" if draws.differs_from(paper) else "within"
+    within = "outside" if draws.differs_from(paper.value, paper.rounding) else "within"
     return (
-        f"The paper's value lies {within} the {COVERAGE * 100:.0f} % prediction interval of a "
-        f"single frame, {low} to {high} {unit}."
+        f"The paper's {paper.text(unit)} lies {within} the {COVERAGE * 100:.0f} % prediction "
+        f"interval of a single frame, {low} to {high} {unit}."
     )
 
 
-def crossing(widths: Array, series: Array, target: float) -> float | None:
-    """Return the first width at which a series reaches a value, by linear interpolation."""
-    if series.size and series[0] == target:
-        return float(widths[0])
-    above = series >= target
-    changes = np.flatnonzero(above[1:] != above[:-1])
-    if changes.size == 0:
+def few_text(draws: Distribution) -> str:
+    """Return how few values of which causes were drawn."""
+    if not draws.too_few:
+        return "A single draw"
+    counts = (f"{n} {name}{'s' * (n > 1)}" for name, n in draws.too_few.items())
+    return f"Only {' and '.join(counts)}"
+
+
+def crossing(widths: Array, series: Array, paper: PaperValue) -> float | None:
+    """Return the first width at which a series reaches a published value.
+
+    The value may be off by its rounding; between the widths the series is linear.
+    """
+    target = float(np.clip(paper.value, series.min(), series.max()))
+    if abs(target - paper.value) > paper.rounding:
         return None
-    i = int(changes[0])
-    part = (target - series[i]) / (series[i + 1] - series[i])
+    above = series - target
+    i = int(np.flatnonzero(above[1:] * above[:-1] <= 0)[0])
+    part = above[i] / (above[i] - above[i + 1]) if above[i] else 0.0
     return float(widths[i] + part * (widths[i + 1] - widths[i]))

@@ -134,6 +134,7 @@ def write_report(
         **tables(facts, rows, tool),
         "scene": study.scene if study else None,
         "is_quick": facts.is_compared and study == type(study).quick(),
+        "software": paper.SOFTWARE,
         "citation": paper.CITATION,
         "rake_missing": paper.RAKE_MISSING,
         "version": __version__,

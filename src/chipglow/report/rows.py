@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, nan
+from math import floor, inf, isfinite, log10, nan
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -26,6 +26,10 @@ _ACROSS: Final = ("rake", "band")
 """Readings of a cut where its line of the same name crosses rake face or ridge."""
 
 
+_FINEST_SPREAD: Final = 1e-6
+"""Uncertainty below which numbers are equal but for the rounding of the computation."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One quantity of the report, in its unit, and the published value, if known."""
@@ -46,18 +50,19 @@ class Row:
     parts: Mapping[str, Distribution] = field(default_factory=dict)  # contributions to an error
 
     @property
-    def paper(self) -> float | None:
-        return self.published.value if self.published else None
-
-    @property
     def differs(self) -> bool | None:
-        """Whether the published value lies outside the 95 % interval; None if unknown."""
-        if self.paper is None or self.here is None:
+        """Whether the published value ± its rounding lies outside the 95 % interval.
+
+        None if there is no interval.
+        """
+        if self.published is None or self.here is None:
             return None
+        value, rounding = self.published.value, self.published.rounding
         if self.draws is not None:
-            return self.draws.differs_from(self.paper) if isfinite(self.draws.interval[0]) else None
-        reach = self.expanded_uncertainty
-        return abs(self.here - self.paper) > reach if isfinite(reach) else None
+            has_interval = isfinite(self.draws.interval[0])
+            return self.draws.differs_from(value, rounding) if has_interval else None
+        reach = self.expanded_uncertainty + rounding
+        return abs(self.here - value) > reach if isfinite(reach) else None
 
     @property
     def expanded_uncertainty(self) -> float:
@@ -81,7 +86,7 @@ class Row:
         causes = draws.parts if draws else {}
         return {
             "quantity": self.quantity,
-            "paper": quantity_text(self.paper, self.unit, self.decimals),
+            "paper": self.published.text(self.unit) if self.published else "–",
             "mean": f"more than {mean}" if self.is_least else mean,
             "interval": f"{' to '.join(ends)} {self.unit}".strip() if isfinite(low) else "–",
             "one-draw": quantity_text(self.one_draw, self.unit, self.decimals),
@@ -116,8 +121,11 @@ def results_frame(analysis: Analysis, study: Any = None) -> pd.DataFrame:
     rows = result_rows(analysis, study)
     draws = [(row.draws.standard_deviation, *row.draws.range) if row.draws else () for row in rows]
     scatter = pd.DataFrame(draws, columns=["standard_deviation", "least", "greatest"])
-    names = ("quantity", "unit", "paper", "here", "one_draw", "uncertainty", "differs")
+    names = ("quantity", "unit", "here", "one_draw", "uncertainty", "differs")
     frame = pd.DataFrame([{name: getattr(row, name) for name in names} for row in rows])
+    published = [row.published for row in rows]
+    frame.insert(2, "paper", [one.value if one else None for one in published])
+    frame.insert(3, "paper_rounding", [one.rounding if one else None for one in published])
     return frame.join(scatter).set_index(pd.Index([row.key for row in rows], name="key"))
 
 
@@ -277,11 +285,16 @@ def _decimals(draws: Distribution) -> int:
 def spread_text(
     value: float | None, spread: float | None, unit: str, decimals: int, sign: str = ""
 ) -> str:
-    """Return a number ± its uncertainty, if known, and its unit; a dash for None or NaN."""
+    """Return a number ± its uncertainty, if known and not 0, and its unit; a dash for None or NaN.
+
+    An uncertainty that would round to 0 is shown to its first digit.
+    """
     if value is None or not isfinite(value):
         return "–"
-    if spread is None or not isfinite(spread):
+    if spread is None or not _FINEST_SPREAD <= spread < inf:
         return quantity_text(value, unit, decimals, sign)
+    if not round(spread, decimals):
+        decimals = -floor(log10(spread))
     number = quantity_text(value, "", decimals, sign)
     return f"{number} ± {quantity_text(spread, unit, decimals)}"
 

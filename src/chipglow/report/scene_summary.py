@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.drawing.scales import KELVIN, shown_frame
+from chipglow.quantities import Brief
 from chipglow.scene import FILLED, Frame, Material, Scene
 
 _SAMPLED: Final = 5
@@ -43,8 +44,8 @@ class QualitySummary(NamedTuple):
     percentile_95: float
 
 
-@dataclass(frozen=True)
-class SceneSummary:
+@dataclass(frozen=True, repr=False)
+class SceneSummary(Brief):
     """The contents of a scene in the frame `index`; `sampled` are all frames that were read."""
 
     index: int

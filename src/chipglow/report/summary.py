@@ -112,8 +112,10 @@ class Summary(_Numbered):
     """Standard uncertainty or standard deviation, see the explanation."""
     paper: dict[str, FiniteFloat] = {}
     """Published values."""
+    paper_rounding: dict[str, FiniteFloat] = {}
+    """Half the step to which each published value is rounded."""
     differs: dict[str, bool | None] = {}
-    """Whether the published value differs."""
+    """Whether the published value ± its rounding differs; null without an interval."""
     explanation: dict[str, str]
     """Cause or determination of each number."""
     steady_tool: dict[str, BothTools] = {}
@@ -134,6 +136,7 @@ def summary(
     """Return the numbers of a report."""
     results, chip = [*rows["errors"], *rows["cut"]], rows["chip"]
     drawn = {row.key: row.draws for row in results if row.draws is not None}
+    published = {row.key: row.published for row in results if row.published is not None}
     return Summary(
         camera={row.key: row.here for row in rows["camera"]},
         results={row.key: row.here for row in results},
@@ -150,8 +153,9 @@ def summary(
         one_draw={row.key: row.one_draw for row in results if row.one_draw is not None},
         chip={row.key: row.here for row in chip},
         chip_uncertainty={row.key: row.uncertainty for row in chip if row.uncertainty is not None},
-        paper={row.key: row.paper for row in results if row.paper is not None},
-        differs={row.key: row.differs for row in results if row.paper is not None},
+        paper={key: one.value for key, one in published.items()},
+        paper_rounding={key: one.rounding for key, one in published.items()},
+        differs={row.key: row.differs for row in results if row.published is not None},
         explanation={row.key: row.explanation for row in (*results, *chip, *rows["camera"])},
         steady_tool={row.key: _tools(row) for row in steady},
         provenance=dict(provenance),

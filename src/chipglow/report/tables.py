@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, nan
 from typing import Any, Final, NamedTuple
 
-from chipglow.analysis.distribution import TOGETHER
+from chipglow.analysis.distribution import FEWEST, TOGETHER
 from chipglow.report import paper
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
@@ -131,7 +131,9 @@ def _emissivities(facts: Facts) -> list[Line]:
     for row in (row for heated in (cut.heated if cut else ()) for row in heated.rows):
         published, means = paper.TABLE_1.get(row.feature), row.means
         uncertainty = float(row.found.estimate.standard_uncertainty)
-        several = (float(means.mean()), float(means.std(ddof=1))) if means.size > 1 else (nan, nan)
+        several = (nan, nan)
+        if means.size >= FEWEST:
+            several = float(means.mean()), float(means.std(ddof=1))
         cells = {
             "feature": row.feature,
             "paper": _emissivity_text(published) if published else "–",

@@ -15,6 +15,7 @@ import scipy
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.quantities import Brief
 from chipglow.scene.frame import Material
 from chipglow.scene.raster import Raster
 
@@ -31,8 +32,8 @@ _ORDER, _DISORDER, _COARSEST = 0.38, 0.46, 2.2
 _SHELLS: Final[Mapping[int, tuple[int, float]]] = {2: (12, 2.0), 3: (26, 3.0**0.5)}
 
 
-@dataclass(frozen=True)
-class Cloud:
+@dataclass(frozen=True, repr=False)
+class Cloud(Brief):
     """Points at one time."""
 
     places: NDArray[np.float64]

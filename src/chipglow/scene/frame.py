@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Brief
+
 if TYPE_CHECKING:
     from chipglow.scene.splines import SplineFrame
 
@@ -47,8 +49,8 @@ class Material(IntEnum):
     TOOL = 2
 
 
-@dataclass(frozen=True)
-class Frame:
+@dataclass(frozen=True, repr=False)
+class Frame(Brief):
     """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
 
     Fields that a scene lacks, or that were not requested, are None. A scene without material is
@@ -75,8 +77,8 @@ class Frame:
         return values
 
 
-@dataclass(frozen=True)
-class SampledFrame:
+@dataclass(frozen=True, repr=False)
+class SampledFrame(Brief):
     """Fields of a source at one time, sampled on a raster."""
 
     time: float

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
+from chipglow.quantities import Brief
 from chipglow.scene.raster import Raster, check_shape
 
 
-@dataclass(frozen=True)
-class Line:
+@dataclass(frozen=True, repr=False)
+class Line(Brief):
     """Points along a line or curve."""
 
     distance: NDArray[np.float64]

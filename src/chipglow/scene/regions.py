@@ -8,6 +8,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.quantities import Brief
 from chipglow.scene.raster import Raster
 
 Point: TypeAlias = tuple[float, float]
@@ -131,8 +132,8 @@ class Region:
                 )
 
 
-@dataclass(frozen=True, eq=False)
-class Area:
+@dataclass(frozen=True, eq=False, repr=False)
+class Area(Brief):
     """Pixels of an image that a table has a row for: a region, or all regions of a feature."""
 
     name: str

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from chipglow.analysis.single import BELOW, RANDOM, SATURATED
-from chipglow.quantities import Array, setting_at
+from chipglow.quantities import Array, Brief, setting_at
 from chipglow.scene import Scene
 from chipglow.study.budgets import errors_of, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
@@ -28,8 +28,8 @@ _FEWEST_KEPT: Final = 4
 _COVERAGE: Final = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Design:
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Brief):
     """Settings of a study with bias and uncertainty of its readings.
 
     Parameters

@@ -7,7 +7,7 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.raster import check_shape
@@ -18,8 +18,8 @@ _KNOWN: Final = 1e-9
 """Smallest weight of known pixels with which a sample is known."""
 
 
-@dataclass(frozen=True, eq=False)
-class MapSurface(Surface):
+@dataclass(frozen=True, eq=False, repr=False)
+class MapSurface(Surface, Brief):
     """Emissivity as an image that stays where it is, such as the measured one of a tool.
 
     Parameters

@@ -7,7 +7,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 import xarray as xr
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.uncertainty.component import Cause, Component
 from chipglow.uncertainty.estimate import Estimate
 from chipglow.uncertainty.inputs import Inputs
@@ -29,8 +29,8 @@ _BLOCK: Final = 500
 """Trials between two checks of stability."""
 
 
-@dataclass(frozen=True, eq=False)
-class Budget:
+@dataclass(frozen=True, eq=False, repr=False)
+class Budget(Brief):
     """Outputs of a model with their uncertainty.
 
     Parameters

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 
 Distribution: TypeAlias = Literal["normal", "rectangular", "triangular", "arcsine"]
 """Distribution of an error; a normal one with degrees of freedom is Student's."""
@@ -76,8 +76,8 @@ class Cause:
         return self.name, self.identity
 
 
-@dataclass(frozen=True, eq=False)
-class Component:
+@dataclass(frozen=True, eq=False, repr=False)
+class Component(Brief):
     """Effects of the errors of one cause on an estimate."""
 
     cause: Cause

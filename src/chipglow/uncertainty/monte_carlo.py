@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.uncertainty.draws import draw
 from chipglow.uncertainty.estimate import Estimate, as_estimate
 
@@ -17,8 +17,8 @@ _BLOCK: Final = 10_000
 """Smallest number of trials between two checks of stability (JCGM 101:2008, 7.9.4)."""
 
 
-@dataclass(frozen=True, eq=False)
-class MonteCarlo:
+@dataclass(frozen=True, eq=False, repr=False)
+class MonteCarlo(Brief):
     """Distribution of a function of estimates, for each element of its result.
 
     Parameters

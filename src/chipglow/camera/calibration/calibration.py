@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.recording import PlanckConversion
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import SECOND_RADIATION_CONSTANT
@@ -26,8 +26,8 @@ _CHECKED: Final = 101
 _NODES: Final = 513
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationErrors:
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationErrors(Brief):
     """Independent errors of a calibration, and their effects on radiance: none falls in a mean."""
 
     radiance: Array

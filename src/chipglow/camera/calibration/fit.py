@@ -11,7 +11,7 @@ from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration.calibration import FittedCalibration
 from chipglow.camera.calibration.checks import alike, drift_shift, residual_warnings
-from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities import Array, Brief, Parameter, Part
 from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 from chipglow.radiometry import Band
 
@@ -56,8 +56,8 @@ class Blackbody(Part):
 _IDEAL: Final = Blackbody()
 
 
-@dataclass(frozen=True, eq=False)
-class CalibrationFit(Generic[Kind]):
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationFit(Generic[Kind], Brief):
     """A calibration, and how well it fits its n points."""
 
     calibration: Kind

@@ -19,7 +19,7 @@ from chipglow.camera.detector.pixels import (
 )
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.quantities.units import COLDEST
 
 HALF: Final = 0.5
@@ -42,8 +42,8 @@ _FAINTEST: Final = 1e-9
 _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
 
 
-@dataclass(frozen=True, eq=False)
-class FlatFieldCalibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class FlatFieldCalibration(Brief):
     """A camera's conversion of its detector's counts to radiance.
 
     The detector's `correction` equalises the pixels. Two blackbodies of known radiance give the

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 
 LEAST_FRAMES: Final = 8
 """Number of frames from which the noise of a pixel is determined."""
@@ -28,8 +28,8 @@ LARGEST_CLUSTER: Final = 4
 _FEWEST_NEIGHBOURS: Final = 3
 
 
-@dataclass(frozen=True, eq=False)
-class NonUniformity:
+@dataclass(frozen=True, eq=False, repr=False)
+class NonUniformity(Brief):
     """Makes every pixel answer like the median pixel: gain × signal + offset, each of shape (y, x).
 
     NaN where a pixel does not answer to light.
@@ -88,8 +88,8 @@ def _check_size(name: str, found: tuple[int, ...], expected: tuple[int, ...]) ->
         raise ValueError(f"{name} of {seen} pixels, expected {wanted}")
 
 
-@dataclass(frozen=True, eq=False)
-class BadPixels:
+@dataclass(frozen=True, eq=False, repr=False)
+class BadPixels(Brief):
     """Pixels that do not answer to light as others do, each an array of bool of shape (y, x)."""
 
     stuck: NDArray[np.bool_]

@@ -24,7 +24,7 @@ from chipglow.laboratory.chip.tool_position import (
     contribution,
     tool_of,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Line, Tool, sample
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, to_xarray
@@ -72,8 +72,8 @@ class Stage(StrEnum):
     """No band is found in the frame."""
 
 
-@dataclass(frozen=True, eq=False)
-class BandProfile:
+@dataclass(frozen=True, eq=False, repr=False)
+class BandProfile(Brief):
     """Radiance temperature along the shear band in several frames."""
 
     reference: Line

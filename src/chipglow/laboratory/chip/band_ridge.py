@@ -19,7 +19,7 @@ from chipglow.laboratory.chip.ridge import (
     even_steps,
     strongest_part,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Line, Raster, Tool
 from chipglow.scene.lines import nearest
 
@@ -42,8 +42,8 @@ _NOISE_FACTOR: Final = 3.0
 _NO_RIDGE: Final = "shear band: the radiance temperature has no ridge"
 
 
-@dataclass(frozen=True)
-class ThermalImage:
+@dataclass(frozen=True, repr=False)
+class ThermalImage(Brief):
     """A frame in which every pixel has a temperature, so that slopes and bends exist."""
 
     temperature: Array

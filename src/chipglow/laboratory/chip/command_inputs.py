@@ -13,7 +13,7 @@ from chipglow.io import ToolSection
 from chipglow.io.column_file import read_polyline
 from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.tool_position import ToolUncertainty, tool_of
-from chipglow.quantities import Array, Parameter
+from chipglow.quantities import Array, Parameter, uncertainty_text
 from chipglow.quantities.units import Position
 from chipglow.scene import Tool
 from chipglow.text import Notes, load_described
@@ -83,10 +83,11 @@ def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
     offset = float(np.abs(offsets).max())
     if offset <= _CLEARLY * allowed:
         return []
+    spread = uncertainty_text(degrees(found.uncertainty.angle))
     return [
         f"The rake face that shows in the image is {1e6 * offset:.0f} um from that "
         f"of the tool file (its rake angle is {degrees(given.rake_angle):.1f} deg, the "
-        f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.uncertainty.angle):.1f} "
+        f"image's {degrees(found.tool.rake_angle):.1f} ± {spread} "
         "deg): the tip, the origin of coordinates, or which way the image is up may be wrong."
     ]
 
@@ -95,8 +96,9 @@ def _found(found: FoundTool, position: float | None) -> list[str]:
     """Describe a detected tool and the uncertainty of its position."""
     (x, y), known = (1e6 * part for part in found.tool.tip), found.uncertainty
     spread = (
-        f"± {1e6 * known.along:.0f} um along the face, ± {1e6 * known.across:.1f} um across it and "
-        f"± {degrees(known.angle):.1f} deg (standard uncertainties)"
+        f"± {uncertainty_text(1e6 * known.along)} um along the face, "
+        f"± {uncertainty_text(1e6 * known.across)} um across it and "
+        f"± {uncertainty_text(degrees(known.angle))} deg (standard uncertainties)"
     )
     used = "found, "
     if position is not None:

@@ -16,7 +16,7 @@ from chipglow.laboratory.chip.segmentation import (
     segmentation,
 )
 from chipglow.laboratory.chip.shear_band import ShearBand
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
@@ -33,8 +33,8 @@ _FORCES: Final = ("cutting_mean", "cutting_swing", "thrust_mean", "thrust_swing"
 """Metrics that a `CutHistory` states."""
 
 
-@dataclass(frozen=True)
-class ChipScan:
+@dataclass(frozen=True, repr=False)
+class ChipScan(Brief):
     """The chip as it passes one rake-normal line."""
 
     height: float
@@ -45,7 +45,7 @@ class ChipScan:
     """Thickness of the chip along the line in m, shape (n,); NaN without a height."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ChipMetrics(Segmentation):
     """Segments and more of a chip; lengths in m, times in s, forces in N/m of width.
 

@@ -29,7 +29,7 @@ from chipglow.laboratory.chip.tool_position import (
     contribution,
     tool_of,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Raster, Tool
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.text import Notes
@@ -48,8 +48,8 @@ _DIMS: Final = ("time", "depth", "along")
 _ROUNDING: Final = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class RakeGrid:
+@dataclass(frozen=True, eq=False, repr=False)
+class RakeGrid(Brief):
     """Radiance temperature in squares beside the rake face (the paper, Figure 7)."""
 
     along: Array

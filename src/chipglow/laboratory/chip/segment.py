@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipglow.camera import frame_weights
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 
@@ -56,8 +56,8 @@ def contact_temperatures(
     return float(chip.mean()) if chip.size else nan, float(inside.mean()) if inside.size else nan
 
 
-@dataclass(frozen=True)
-class Instant:
+@dataclass(frozen=True, repr=False)
+class Instant(Brief):
     """The shear band during one exposure."""
 
     start: float

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from chipglow.cutting import unresolved
 from chipglow.laboratory.chip.frames import ratio
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Scene
 from chipglow.scene.scene import FORCE_UNITS
 
@@ -26,8 +26,8 @@ LARGEST_FRACTION: Final = 0.01
 """Fraction of work or force from which inertia counts as too much."""
 
 
-@dataclass(frozen=True)
-class Segmentation:
+@dataclass(frozen=True, repr=False)
+class Segmentation(Brief):
     """Segments of a chip; standard deviations and uncertainties are NaN for a single value."""
 
     peaks: Array
@@ -89,8 +89,8 @@ def _mean_and_uncertainty(values: Array) -> tuple[float, float]:
     return mean, deviation / sqrt(max(values.size, 1))
 
 
-@dataclass(frozen=True)
-class CutHistory:
+@dataclass(frozen=True, repr=False)
+class CutHistory(Brief):
     """Forces per width in N/m and thickness in m over time in s; segments after the build-up."""
 
     time: Array

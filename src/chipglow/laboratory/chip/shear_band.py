@@ -19,7 +19,7 @@ from chipglow.laboratory.chip.ridge import (
     off_face,
     strongest_part,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Line, Raster, Tool, sample, straight_line
 
 BAND_RATE: Final = 6000.0
@@ -32,8 +32,8 @@ _WIDEST: Final = 80e-6
 _NO_RIDGE: Final = "shear band: no ridge of the plastic strain rate is off the rake face"
 
 
-@dataclass(frozen=True)
-class ShearBand:
+@dataclass(frozen=True, repr=False)
+class ShearBand(Brief):
     """A shear band as a curve, away from the cutting edge."""
 
     ridge: Line

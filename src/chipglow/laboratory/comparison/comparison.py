@@ -23,7 +23,7 @@ from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
 from chipglow.laboratory.chip.frames import FRAMES, changed, frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
-from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part, uncertainty_text
 from chipglow.quantities.units import LENGTH, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Tool, sample
 from chipglow.text import Notes
@@ -54,8 +54,8 @@ def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
         return np.abs(away.values) / (COVERAGE * away.standard_uncertainty)
 
 
-@dataclass(frozen=True)
-class Readings:
+@dataclass(frozen=True, repr=False)
+class Readings(Brief):
     """Temperatures of the measurement and of each simulation, at the same positions."""
 
     place: str
@@ -91,8 +91,8 @@ class Readings:
         return pd.concat(frames, ignore_index=True)
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Brief):
     """A measurement compared with simulations."""
 
     labels: tuple[str, ...]
@@ -159,9 +159,9 @@ def _sentence(best: pd.Series, others: pd.DataFrame) -> str:
 
 def _fit_text(fit: pd.Series) -> str:
     word = "too hot" if fit["bias_K"] > 0 else "too cold"
-    expanded = COVERAGE * fit["bias_standard_uncertainty_K"]
+    expanded = uncertainty_text(COVERAGE * fit["bias_standard_uncertainty_K"])
     return (
-        f"{abs(fit['bias_K']):.0f} K {word} (± {expanded:.0f} K), RMS {fit['rms_K']:.0f} K, "
+        f"{abs(fit['bias_K']):.0f} K {word} (± {expanded} K), RMS {fit['rms_K']:.0f} K, "
         f"{fit[AGREEING]} of {fit['values']}"
     )
 

@@ -23,7 +23,7 @@ from chipglow.laboratory.emissivity.observations import (
     with_drift,
     with_observed,
 )
-from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part
 from chipglow.quantities.units import KELVINS, TEMPERATURE_DIFFERENCE
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
@@ -98,8 +98,8 @@ class Heating(Part):
         return exact.with_component(name, spread, identity=ALL_IMAGES)
 
 
-@dataclass(frozen=True, eq=False)
-class EmissivityMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class EmissivityMap(Brief):
     """Emissivity of every pixel; made by `determine_emissivity`."""
 
     heating: Heating
@@ -215,8 +215,8 @@ class EmissivityMap:
         return float(radiance[0] - radiance[1])
 
 
-@dataclass(frozen=True, eq=False)
-class RegionEmissivity:
+@dataclass(frozen=True, eq=False, repr=False)
+class RegionEmissivity(Brief):
     """Emissivity of an area: a row of the table; made by `EmissivityMap.of`."""
 
     name: str
@@ -246,8 +246,8 @@ class RegionEmissivity:
         return EmissivityLine.measured(self.name, self.feature, self.heating, self.estimate, spread)
 
 
-@dataclass(frozen=True)
-class EmissivityLine:
+@dataclass(frozen=True, repr=False)
+class EmissivityLine(Brief):
     """Emissivity of an area as a straight line over the temperature, the simplest a constant."""
 
     name: str

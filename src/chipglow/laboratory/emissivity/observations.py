@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Area
 from chipglow.uncertainty import Cause, Component, Estimate
 
@@ -66,8 +66,8 @@ def uncertainty_columns(
     return {name: float(value) for name, value in (whole | parts).items()}
 
 
-@dataclass(frozen=True, eq=False)
-class UsedPixels:
+@dataclass(frozen=True, eq=False, repr=False)
+class UsedPixels(Brief):
     """Pixels of an area that have a value in every frame."""
 
     name: str

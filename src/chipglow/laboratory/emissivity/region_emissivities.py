@@ -17,14 +17,14 @@ from chipglow.laboratory.emissivity.emissivity import (
     emissivity_line,
 )
 from chipglow.laboratory.emissivity.observations import check_same_pixels, uncertainty_columns
-from chipglow.quantities import ZERO_CELSIUS
+from chipglow.quantities import ZERO_CELSIUS, Brief
 from chipglow.scene import Region, areas, shared_pixels
 from chipglow.surface import Origin
 from chipglow.text import Notes
 
 
-@dataclass(frozen=True, eq=False)
-class RegionEmissivities:
+@dataclass(frozen=True, eq=False, repr=False)
+class RegionEmissivities(Brief):
     """Emissivity of the regions of an image; made by `determine_emissivities`."""
 
     maps: tuple[EmissivityMap, ...]

@@ -26,7 +26,7 @@ from chipglow.laboratory.emissivity.observations import (
     used_pixels,
     with_observed,
 )
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Region, areas
@@ -60,8 +60,8 @@ def reflected_temperature(
     return Estimate(np.array(temperature)).with_component("reflected", standard_uncertainty)
 
 
-@dataclass(frozen=True, eq=False)
-class TrueTemperature:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrueTemperature(Brief):
     """True temperature of an area; made by `true_temperature`."""
 
     name: str

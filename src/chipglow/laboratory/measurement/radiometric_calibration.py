@@ -105,12 +105,14 @@ def calibrate_recording(
         _develop_frames(part, calibration, band, non_uniformity, bad_pixels)
         for part in _parts(recording)
     ]
-    radiance, flags = (position.place(np.concatenate(some)) for some in zip(*parts, strict=True))
+    developed = [np.concatenate(some) for some in zip(*parts, strict=True)]
+    is_read = developed[1] & (Flag.DEAD | Flag.REPLACED) == 0
+    radiance, flags = map(position.place, developed)
     if calibration is not None:
         lower_limit = max(lower_limit or 0.0, calibration.lowest) or None
     raster = position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch)
     errors = None if calibration is None else calibration.errors
-    attributes = _attributes(recording, calibration, position)
+    attributes = _attributes(recording, calibration, position, is_read)
     return Measurement.from_radiance(
         radiance, band, recording.times, raster, lower_limit, flags, errors, attributes
     )
@@ -243,7 +245,10 @@ def _over(
 
 
 def _attributes(
-    recording: Recording, calibration: Calibration | None, position: ImagePosition
+    recording: Recording,
+    calibration: Calibration | None,
+    position: ImagePosition,
+    is_read: NDArray[np.bool_],
 ) -> dict[str, float | str]:
     time = recording.integration_time or getattr(calibration, "integration_time", None)
     attributes: dict[str, float | str | None] = {
@@ -254,7 +259,7 @@ def _attributes(
         "range": recording.range_name or getattr(calibration, "range_name", None),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
-        **_notes(recording, calibration, position).attrs(),
+        **_notes(recording, calibration, position, is_read).attrs(),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -277,7 +282,12 @@ def _object_text(recording: Recording) -> str | None:
     )
 
 
-def _notes(recording: Recording, calibration: Calibration | None, position: ImagePosition) -> Notes:
+def _notes(
+    recording: Recording,
+    calibration: Calibration | None,
+    position: ImagePosition,
+    is_read: NDArray[np.bool_],
+) -> Notes:
     quantity, name = recording.quantity, getattr(calibration, "range_name", None)
     time = getattr(calibration, "integration_time", None)
     assumed = {
@@ -301,11 +311,14 @@ def _notes(recording: Recording, calibration: Calibration | None, position: Imag
     }
     stated = [text for text, applies in assumed.items() if applies]
     about_calibration = Notes(warnings=list(calibration.warnings if calibration else ()))
-    warnings = Notes(warnings=list(_warnings(recording, calibration)))
+    warnings = Notes(warnings=list(_warnings(recording, calibration, is_read)))
     return recording.notes + Notes(stated) + about_calibration.about("Calibration") + warnings
 
 
-def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator[str]:
+def _warnings(
+    recording: Recording, calibration: Calibration | None, is_read: NDArray[np.bool_]
+) -> Iterator[str]:
+    """Yield what may be wrong; pixels that are dead or replaced are not read."""
     if calibration is None or calibration.errors is None:
         yield "The uncertainty of the radiance from the calibration is not known."
     band = recording.band if calibration is None else calibration.band
@@ -316,8 +329,9 @@ def _warnings(recording: Recording, calibration: Calibration | None) -> Iterator
             f"The file states a band of {_band_text(stated)}, the {source} is for "
             f"{_band_text(band)}; the {source}'s is used."
         )
-    signal = recording.signal
-    if recording.saturation is None and np.issubdtype(signal.dtype, np.integer):
+    signal = recording.signal[is_read]
+    is_whole = np.issubdtype(signal.dtype, np.integer)
+    if recording.saturation is None and is_whole and signal.size:
         top = int(signal.max())
         count = np.count_nonzero(signal == top)
         if top in _FULL_SCALES and count > 1:

@@ -14,7 +14,7 @@ from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.laboratory.psf.psf_models import GaussianModel
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.text import Notes
@@ -29,8 +29,8 @@ _MANY_CLIPPED: Final = 0.02
 _WHOLE_SQUARE: Final = "The whole square of a pixel takes light (fill factor 1)."
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeImage:
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgeImage(Brief):
     """An image of an edge."""
 
     radiance: Array

@@ -41,7 +41,7 @@ from chipglow.laboratory.psf.psf_models import (
     PSFModel,
 )
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.text import Notes
 from chipglow.uncertainty import Cause, Component
 from chipglow.uncertainty.estimate import factor
@@ -73,8 +73,8 @@ _NO_WEIGHT: Final = 1e-6
 _Kernel = Callable[..., Array]
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgeResult(Brief):
     """Results of one image of an edge."""
 
     image: EdgeImage

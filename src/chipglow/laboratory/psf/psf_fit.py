@@ -24,7 +24,7 @@ from chipglow.laboratory.psf.psf_models import (
     edge_response,
     is_length,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 
 _APART: Final = pi / 18
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
@@ -32,8 +32,8 @@ _DIFFERENCE: Final = 1e-5
 _EDGE_PARAMETERS: Final = 4
 
 
-@dataclass(frozen=True, eq=False)
-class EdgePixels:
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgePixels(Brief):
     """The usable pixels of an image of an edge."""
 
     x: Array
@@ -54,8 +54,8 @@ class EdgePixels:
         return float(np.abs(self.line.distance(self.x, self.y)).max()) + 4 * self.pitch
 
 
-@dataclass(frozen=True, eq=False)
-class ApertureSignals:
+@dataclass(frozen=True, eq=False, repr=False)
+class ApertureSignals(Brief):
     """Readings of the camera at the centre of bright round apertures before one source."""
 
     diameters: Array
@@ -97,8 +97,8 @@ class FittedEdge:
     step_uncertainty: float
 
 
-@dataclass(frozen=True, eq=False)
-class ModelFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelFit(Brief):
     """A model of the optics fitted to edges and apertures."""
 
     model: PSFModel

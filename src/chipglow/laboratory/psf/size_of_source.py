@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from chipglow.camera import UNUSABLE, Flag, Measurement
 from chipglow.laboratory.psf.psf_fit import ApertureSignals
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 
 _LEAST_APERTURES: Final = 3
 _FEWEST_OUTSIDE: Final = 20
 
 
-@dataclass(frozen=True, eq=False)
-class ApertureImage:
+@dataclass(frozen=True, eq=False, repr=False)
+class ApertureImage(Brief):
     """A round aperture before a source of even radiance."""
 
     diameter: float

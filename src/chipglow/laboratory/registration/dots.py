@@ -12,7 +12,7 @@ from scipy.special import erfc
 
 from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
 from chipglow.laboratory.registration.registration import Model, PointFit, Registration, fit_points
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -42,8 +42,8 @@ _NOT_MIRRORED: Final = (
 )
 
 
-@dataclass(frozen=True)
-class Dots:
+@dataclass(frozen=True, repr=False)
+class Dots(Brief):
     """Dots of one size in an image."""
 
     pixels: Array

@@ -21,7 +21,7 @@ from chipglow.laboratory.registration.registration import (
     mapped_places,
     parameter_basis,
 )
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Raster
 from chipglow.text import Notes
 
@@ -55,8 +55,8 @@ _SETTLE: Final = {"xtol": 0.1, "ftol": 1e-3, "maxfev": 300}
 _CLIMB: Final = {"gtol": 1e-7, "maxiter": 100}
 
 
-@dataclass(frozen=True)
-class ImageFit:
+@dataclass(frozen=True, repr=False)
+class ImageFit(Brief):
     """A registration from the images themselves."""
 
     registration: Registration

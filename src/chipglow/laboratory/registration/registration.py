@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.scene import Raster
 from chipglow.scene.lines import nearest
 from chipglow.text import Notes
@@ -110,8 +110,8 @@ class Registration:
         return nearest(image, raster, self.positions(np.stack([columns, rows], axis=-1)))
 
 
-@dataclass(frozen=True)
-class PointFit:
+@dataclass(frozen=True, repr=False)
+class PointFit(Brief):
     """A registration from points that were seen in both images."""
 
     registration: Registration

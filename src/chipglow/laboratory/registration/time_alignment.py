@@ -15,7 +15,7 @@ from scipy.special import stdtr
 
 from chipglow.camera import Flag, Measurement, Recording
 from chipglow.laboratory.registration.registration import Registration
-from chipglow.quantities import Array
+from chipglow.quantities import Array, Brief
 from chipglow.text import Notes
 
 _FEWEST: Final = 6
@@ -200,8 +200,8 @@ def _rivals(offsets: Array, correlations: Array, best: int, count: int) -> Itera
         )
 
 
-@dataclass(frozen=True, eq=False)
-class RecordingAlignment:
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordingAlignment(Brief):
     """The clocks of two recordings; made by `align_recordings`."""
 
     clocks: TimeAlignment
