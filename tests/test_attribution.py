@@ -285,7 +285,8 @@ def test_contributions_at_the_readings_add_up_to_their_true_errors(chip_analysis
 def test_the_report_states_the_causes_of_each_main_error(chip_analysis):
     facts = Facts(chip_analysis)
     rake, *_ = attribution.sentences(facts)
-    assert rake.startswith("Rake face, mid-contact (chip 2): the measured temperature is ")
+    where = "Rake face, mid-contact (chip 2), in the shown exposure"
+    assert rake.startswith(f"{where}: the measured temperature is ")
     values = attribution.contributions(facts)["rake"]
     assert f"emissivity −{abs(values['emissivity']):.0f} K" in rake
     assert f"is {abs(sum(values.values())):.0f} K below the true temperature" in rake
