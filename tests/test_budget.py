@@ -439,7 +439,7 @@ def test_readings_without_a_temperature_are_stated(plate):
     study = study_of(plate, **{"surface.emissivity": {"standard": "2 %"}})
     study = changed(study, {"camera.lower_limit": "900 K"})  # 835 K are seen
     (warning,) = study_budget(study, ("middle",), 100, 2).notes.warnings
-    assert warning.startswith("middle, pixel: 100% of the place is below the lower range limit")
+    assert warning.startswith("middle, pixel: 100 % of the pixels there are below the lower")
     small = {"hot": {"circle": {"centre": ("0 um", "0 um"), "radius": "2 um"}}}
     study = changed(study, {"camera.lower_limit": None, "analysis.regions": small})
     notes = study_budget(study, ("hot",), 100, 2).notes

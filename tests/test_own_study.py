@@ -121,7 +121,23 @@ def test_a_small_array_sees_a_part_and_a_large_one_all():
     scene = Raster(left=0.0, top=0.0, spacing=1e-6, rows=300, columns=400)
     camera = {"pitch": "6 um"}
     assert Study(camera={**camera, "array": [640, 512]}).camera.on(scene).shape == (50, 66)
-    assert Study(camera={**camera, "array": [20, 10]}).camera.on(scene).shape == (10, 20)
+    # The array is in the middle of the scene unless it is placed.
+    for array, more, shape, offset in (
+        ([20, 10], {}, (10, 20), (140e-6, 120e-6)),
+        ([20, 512], {}, (50, 20), (140e-6, 0.0)),
+        ([20, 10], {"offset_right": "12 um"}, (10, 20), (12e-6, 120e-6)),
+        (None, {"offset_right": "12 um"}, None, (12e-6, 0.0)),
+        ([640, 512], {}, (50, 66), (0.0, 0.0)),
+    ):
+        section = Study(camera={**camera, "array": array, **more}).camera
+        on = section.on(scene)
+        assert on.shape == shape and on.offset == pytest.approx(offset)
+        built = section.build()
+        assert built.shape == (None if array is None else tuple(array[::-1]))
+    small = Study(camera={**camera, "array": [20, 10]}).camera
+    assert small.build().pixels(scene).shape == small.on(scene).pixels(scene).shape == (10, 20)
+    pixels = small.on(scene).pixels(scene)
+    assert (pixels.x.mean(), pixels.y.mean()) == pytest.approx((scene.x.mean(), scene.y.mean()))
 
 
 def test_a_response_file_weighs_the_band(tmp_path):

@@ -14,6 +14,7 @@ from command import chipglow
 
 from chipglow.analysis import headlines
 from chipglow.io import write_scene
+from chipglow.io.atomic import exclusive
 from chipglow.quantities import changed, setting_at
 from chipglow.report.sweep_figure import draw_sweep
 from chipglow.scene import Raster, Scene
@@ -110,6 +111,87 @@ def test_a_change_of_the_scene_or_the_seed_is_another_point(study, tmp_path):
     other.write_bytes(b"another scene")
     os.utime(other, ns=(0, 0))
     assert _key(copied, ()) != keys[0]
+
+
+def test_a_scene_without_suffix_counts_by_its_content(study, tmp_path):
+    first, second = tmp_path / "scene", tmp_path / "again"
+    first.write_bytes(Path(study.scene).read_bytes())
+    plain = changed(study, {"scene": str(first)})
+    key = _key(plain, ())
+    assert key == _key(study, ())
+    second.write_bytes(b"another" + first.read_bytes())
+    # A file of the same name, size and time.
+    status = first.stat()
+    content = bytearray(first.read_bytes())
+    content[len(content) // 2] ^= 1
+    first.write_bytes(content)
+    os.utime(first, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert first.stat().st_size == status.st_size
+    assert len({key, _key(plain, ()), _key(changed(study, {"scene": str(second)}), ())}) == 3
+
+
+def test_a_changed_scene_is_computed_again(study, tmp_path):
+    scene, vary = tmp_path / "scene", {"camera.pitch": PITCHES[:1]}
+    raster = Raster(left=-40e-6, top=40e-6, spacing=1e-6, rows=80, columns=80)
+    plain = changed(study, {"scene": str(scene)})
+    found = []
+    for kelvins in (700.0, 900.0):
+        temperature = np.full((8, *raster.shape), kelvins)
+        write_scene(
+            Scene.from_fields(raster, 1e-6 * np.arange(8), {"temperature": temperature}), scene
+        )
+        result = sweep(plain, vary, tmp_path / "out", at=("hot",), workers=0)
+        found.append(float(result.to_xarray().reference.squeeze()))
+    assert found[1] - found[0] > 100.0
+
+
+def test_another_sweep_in_a_running_ones_folder_is_refused(study, tmp_path):
+    out, vary = tmp_path / "out", {"camera.pitch": PITCHES[:1]}
+    first = sweep(study, vary, out, at=("hot",), workers=0)
+    stated = (out / "sweep.json").read_text()
+    # The folder is held as by a sweep in another process, whose end releases it.
+    refusal = "out: another sweep is running there; wait for its end"
+    with exclusive(out / "points", ""), pytest.raises(ValueError, match=refusal):
+        sweep(study, {"camera.pitch": PITCHES[1:]}, out, at=("hot",), workers=0)
+    assert (out / "sweep.json").read_text() == stated
+    second = sweep(study, {"camera.pitch": PITCHES[1:]}, out, at=("hot",), workers=0)
+    # Each sweep has its own points, whichever was the last in the folder.
+    assert [one["camera.pitch"] for one in first.settings] == [3e-6]
+    assert len(second.keys) == 2 and not second.missing and not first.missing
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"", b'{"readings": {"hot, pixel": {"refe', b"[]", b"null", b"7", b"{}", b"\xff\xfe\x00",
+        b'{"readings": []}', b'{"readings": {"hot, pixel": {}}}', b'{"failed": 3}',
+        b'{"readings": {"hot, pixel": {"reference": 1.0}}}',
+    ],
+)  # fmt: skip
+def test_a_damaged_point_is_missing_and_computed_again(study, tmp_path, content):
+    vary = {"camera.pitch": PITCHES[:1]}
+    whole = contents(sweep(study, vary, tmp_path / "out", at=("hot",), workers=0))
+    (file,) = (tmp_path / "out" / "points").iterdir()
+    file.write_bytes(content)
+    assert Sweep.open(tmp_path / "out").missing == (0,)
+    assert contents(sweep(study, vary, tmp_path / "out", at=("hot",), workers=0)) == whole
+
+
+@pytest.mark.parametrize("content", ["", '{"axes": {', "[]", "{}"])
+def test_a_damaged_description_is_named(grid, tmp_path, content):
+    (tmp_path / "sweep.json").write_text(content)
+    with pytest.raises(ValueError, match=r"sweep\.json: is damaged; run the sweep again"):
+        Sweep.open(tmp_path)
+
+
+def test_workers_that_die_while_they_start_are_one_line(monkeypatch):
+    def dies(*arguments, **options):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("distributed.LocalCluster", dies)
+    match = r"did not start .*; the computed points are kept"
+    with pytest.raises(ConnectionError, match=match), local_client(None, 2, 2):
+        pass
 
 
 def test_a_point_that_fails_is_stated_and_the_others_are_computed(study, tmp_path):

@@ -26,6 +26,10 @@ from chipglow.analysis.images import (
     error_parts as error_parts,
     reference_temperature as reference_temperature,
 )
+from chipglow.analysis.outside import (
+    outside_texts as outside_texts,
+    outside_warnings as outside_warnings,
+)
 from chipglow.analysis.places import (
     BandPlace as BandPlace,
     HottestPlace as HottestPlace,

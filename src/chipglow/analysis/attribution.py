@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from chipglow.analysis.cut import middle_start
 from chipglow.analysis.images import Array, ExposureImages, read_temperature, reference_temperature
 from chipglow.analysis.places import Place
-from chipglow.camera import Camera, Exposure
+from chipglow.camera import UNUSABLE, Camera, Exposure, range_flags
 from chipglow.camera.exposure import View, expose
 from chipglow.camera.optics.sampling import integrate, largest
 from chipglow.camera.sweep import Check
@@ -30,9 +30,13 @@ EFFECTS: Final = (
     "optics",
     "footprint",
     "detector",
-    "range limit",
+    "digitiser",
 )
-"""Effects in the order of the light, from the surface to the camera's range."""
+"""Effects in the order of the light, from the surface to the counts.
+
+``detector`` is that of the detector's terms such as noise, ``digitiser`` that of full well,
+saturation and rounding to counts.
+"""
 
 REST: Final = "other effects"
 BLUR: Final = "psf and footprint"
@@ -129,8 +133,9 @@ def attribute(
         when the effects are switched on in the order of the light; ``removal``, the reading minus
         the reading without the effect (of the PSF: the paper's case 1 − case 2). Over ``effect``
         and ``other_effect``: ``interaction``, the pairwise interaction index. A pixel below the
-        range limit reads the limit; ``lost`` pixels are below the limit or unusable, and
-        ``lost_contribution`` divides them among the effects. ``gain_half_exposure``: decrease
+        range limit reads the temperature of its radiance; ``lost`` pixels are below the limit or
+        unusable, and ``lost_contribution`` divides those whose reference is above it among the
+        effects. ``gain_half_exposure``: decrease
         of the absolute error if the exposure is halved. Sampled contributions have a
         ``standard_error``, and no interactions.
 
@@ -143,9 +148,10 @@ def attribute(
     Notes
     -----
     Switched off, an effect is ideal: emissivity 1; no surroundings; the hottest moment of the
-    exposure; no blur; the hottest sample of the pixel's square; no detector; no range limit. The
-    Shapley value of an effect is the mean change of the reading when it is switched on, over all
-    orders of the effects. All combinations have the same detector noise.
+    exposure; no blur; the hottest sample of the pixel's square; none of the detector's terms; no
+    full well, saturation or rounding to counts. The Shapley value of an effect is the mean change
+    of the reading when it is switched on, over all orders of the effects. All combinations have the
+    same detector noise.
     """
     plan = AttributionPlan(tuple(effects), reference, permutations)
     if start is None:
@@ -235,8 +241,7 @@ def _walk(value: _Value, players: Sequence[_Coalition], order: list[int]) -> Arr
 def _size(camera: Camera, exposure: Exposure, reference: AttributionReference) -> Array:
     """Return the absolute error of each pixel in K."""
     images = ExposureImages(exposure, reference)
-    measured = images.measured(camera).clip(camera.lower_limit or 0.0)
-    return np.abs(measured - images.reference(camera))
+    return np.abs(images.measured(camera) - images.reference(camera))
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,18 +308,14 @@ class _Model:
         self._read = lru_cache(None)(self._reading)
 
     def temperature(self, on: _Coalition) -> Array:
-        """Return the measured temperature in K; at least the range limit if that is on."""
+        """Return the measured temperature in K."""
         kelvins, _ = self._read(on | self.contained)
-        limit = self.camera.lower_limit if "range limit" in on else None
-        return np.where(
-            np.isnan(self.reference), np.nan, kelvins if limit is None else kelvins.clip(limit)
-        )
+        return np.where(np.isnan(self.reference), np.nan, kelvins)
 
     def lost(self, on: _Coalition) -> Array:
         """Return 1 for the pixels below the range limit or unusable, and 0 elsewhere."""
-        kelvins, unusable = self._read(on | self.contained)
-        below = kelvins < (self.camera.lower_limit or 0.0)
-        return np.where(np.isnan(self.reference), np.nan, below | unusable)
+        _, flags = self._read(on | self.contained)
+        return np.where(np.isnan(self.reference), np.nan, flags & UNUSABLE != 0)
 
     def _players(self, effects: Sequence[str]) -> dict[str, _Coalition]:
         """Return the effects of each player, in the order of the light."""
@@ -337,8 +338,8 @@ class _Model:
             "reflection": self.sources.reflects,
             "psf": psf is not None,
             "optics": bool(camera.optics),
-            "detector": camera.detector is not None,
-            "range limit": camera.lower_limit is not None,
+            "detector": camera.detector is not None and bool(camera.detector.terms),
+            "digitiser": camera.detector is not None,
         }
         groups: dict[str, _Coalition] = {}
         for name in EFFECTS:
@@ -348,11 +349,11 @@ class _Model:
                 groups[group] = groups.get(group, frozenset()) | {name}
         return groups
 
-    def _reading(self, on: _Coalition) -> tuple[Array, NDArray[np.bool_] | bool]:
-        """Return temperatures, and the pixels that the detector marks as unusable."""
-        if not on - {"range limit"} - self.contained:
-            return self.reference, False
-        image = self._image(on - {"range limit", "detector"} - self.noises)
+    def _reading(self, on: _Coalition) -> tuple[Array, NDArray[np.uint8]]:
+        """Return temperatures and flags."""
+        if not on - self.contained:
+            return self.reference, range_flags(self.reference, self.camera.lower_limit)
+        image = self._image(on - {"detector", "digitiser"} - self.noises)
         return read_temperature(self._switched(on), image, self.start)
 
     def _formed(self, on: _Coalition) -> Array:
@@ -375,7 +376,9 @@ class _Model:
         optics = tuple(one for one in camera.optics if is_on(one.kind, "optics"))
         if detector is not None:
             terms = tuple(one for one in detector.terms if is_on(one.kind, "detector"))
-            detector = replace(detector, terms=terms) if terms or "detector" in on else None
+            detector = replace(detector, terms=terms)
+            if "digitiser" not in on:
+                detector = detector.undigitised() if terms else None
         psf = camera.psf if "psf" in on else None
         order = camera.psf_order if psf else "optics"
         return replace(camera, psf=psf, psf_order=order, optics=optics, detector=detector)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import isfinite, isnan
+from math import isfinite
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -15,6 +15,7 @@ from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
 from chipglow.analysis.images import CASES, Array, Effect
 from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
+from chipglow.analysis.outside import fractions_outside, outside_warnings
 from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.reductions import headlines
@@ -55,6 +56,9 @@ _COORDINATES: Final = (
     "place", "quantity", "seen_surface", "textures", "undrawn", "line_surface", "line_textures",
 )  # fmt: skip
 _KELVIN: Final = {"units": "K"}
+_DARK_IMAGE: Final = 0.9
+"""Fraction of an image outside the range above which there is a warning; a scene may be cold."""
+
 _LEAST_LIGHT: Final = 1e-30
 """Radiance in W/(m² sr) that a camera shows where the surroundings account for all."""
 
@@ -211,10 +215,10 @@ def analyse(
         attributes |= {"rake_surface": plan.rake_chip, "band_surface": plan.band_chip}
     exposure = schedule.drawn.index(schedule.shown)
     read = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
-    variables |= _saturated(variables, measurements, schedule.shown, read)
+    variables |= _outside(schedule, looked, measurements)
     data = xr.Dataset(variables, attrs=attributes)
     data = data.set_coords([name for name in _COORDINATES if name in data])
-    warnings += _range_warnings(measurements, schedule.shown, read)
+    warnings += _range_warnings(data, measurements, schedule.shown)
     warnings += _filled_warnings(scene, schedule.starts[schedule.shown], task.duration, read)
     return Analysis(
         data=data,
@@ -443,21 +447,26 @@ def _corrected(camera: Camera, variables: Variables) -> Variables:
     }
 
 
-def _saturated(
-    variables: Variables,
-    measurements: Mapping[str, Measurement],
-    shown: int,
-    read: Sequence[tuple[str, Place]],
+def _outside(
+    schedule: Schedule, looked: Looked, measurements: Mapping[str, Measurement]
 ) -> Variables:
-    """Return the fraction of each reading's place that saturates the camera in the exposure."""
+    """Return the fractions of each reading's place outside the range, means over the exposures."""
     fractions = {}
-    for surface, place in read:
-        one = measurements[surface]
-        where = one.flags[shown] & Flag.SATURATED != 0
-        covered = place.covered(where, one.raster)
-        fractions[surface, place.name] = float(where.any()) if isnan(covered) else covered
-    keys = zip(variables["seen_surface"][1], variables["place"][1], strict=True)
-    return {"saturated": ("reading", [fractions[key] for key in keys], {"units": "1"})}
+    for number, view in enumerate(schedule.views):
+        one = measurements[view.surface]
+        measured = one.radiance_temperature(flagged=True)
+        images = np.where(np.isnan(looked.references[view.surface]), np.nan, measured)
+        for i in range(len(view.places[0])):
+            every = [
+                fractions_outside(places[i], one.flags[instant], images[instant], one.raster)
+                for instant, places in zip(schedule.drawn, view.places, strict=True)
+            ]
+            fractions[number, i] = np.mean(every, axis=0)
+    below, saturated = np.transpose([fractions[key[:2]] for key in looked.readings])
+    return {
+        "below_range": ("reading", below, {"units": "1"}),
+        "saturated": ("reading", saturated, {"units": "1"}),
+    }
 
 
 def _attribution(task: _Task, schedule: Schedule, looked: Looked) -> Variables:
@@ -557,22 +566,16 @@ def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
 
 
 def _range_warnings(
-    measurements: Mapping[str, Measurement], shown: int, read: Sequence[tuple[str, Place]]
+    data: xr.Dataset, measurements: Mapping[str, Measurement], shown: int
 ) -> Iterator[str]:
-    """Yield a sentence for each image and place that the camera hardly sees."""
+    """Yield a sentence for each image and place of which the camera shows too little."""
     for name, one in measurements.items():
-        unusable = ~one.usable[shown]
-        parts = {f"Image of {name}": (0.9, float(unusable.mean()))}
-        for surface, place in read:
-            if surface == name:
-                covered = place.covered(unusable, one.raster)
-                parts[f"{_capitalised(place.name)} ({name})"] = 0.5, covered
-        for title, (most, covered) in parts.items():
-            if covered >= most:
-                yield (
-                    f"{title}: {100 * covered:.0f} % of the pixels are outside the "
-                    "camera's range, so that a real camera does not show them."
-                )
+        flags = one.flags[shown]
+        outside = [float(np.mean(flags & f != 0)) for f in (Flag.UNDER_RANGE, Flag.SATURATED)]
+        yield from outside_warnings(f"Image of {name}", *outside, most=_DARK_IMAGE)
+    columns = (data[key].values for key in ("place", "seen_surface", "below_range", "saturated"))
+    for place, surface, below, saturated in dict.fromkeys(zip(*columns, strict=True)):
+        yield from outside_warnings(f"{_capitalised(place)} ({surface})", below, saturated)
 
 
 def _filled_warnings(
@@ -584,8 +587,9 @@ def _filled_warnings(
     first, last = (scene.frame_at(time) for time in (start, start + duration))
     flags = scene.data[QUALITY].isel(time=slice(first, last + 1)).values
     filled = (flags == FILLED).any(axis=0)
+    temperature = np.asarray(scene.field("temperature", first), np.float64)
     for place in {place.name: place for _, place in read}.values():
-        fraction = place.covered(filled, scene.raster)
+        fraction = place.covered(filled, temperature, scene.raster)
         if fraction > 0:
             yield (
                 f"{_capitalised(place.name)}: {100 * fraction:.0f} % of its samples had no "

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.camera import UNUSABLE, Camera, Exposure, PointSpreadFunction, blur
+from chipglow.camera import UNUSABLE, Camera, Exposure, PointSpreadFunction, blur, range_flags
 from chipglow.camera.optics.sampling import integrate, largest
 from chipglow.scene import Raster
 from chipglow.scene.lines import nearest
@@ -165,7 +165,7 @@ class ExposureImages:
 
     def errors(self, camera: Camera) -> xr.Dataset:
         reference, measured, ideal = self.stack(camera, CASES)
-        limit, unusable = camera.lower_limit or 0.0, self._read(camera)[1]
+        flagged = self._read(camera)[1] & UNUSABLE != 0
         images = {
             "reference": reference,
             "measured": measured,
@@ -176,7 +176,7 @@ class ExposureImages:
         pixels = camera.pixels(self.exposure.raster)
         return xr.Dataset(
             {name: (("y", "x"), image, {"units": "K"}) for name, image in images.items()}
-            | {"flagged": (("y", "x"), ~(measured >= limit) | unusable, {"units": "1"})},
+            | {"flagged": (("y", "x"), flagged | np.isnan(reference), {"units": "1"})},
             coords={name: (name, getattr(pixels, name), {"units": "m"}) for name in "yx"},
         )
 
@@ -243,17 +243,17 @@ def _formed(
 
 def _read(
     formed: Callable[[Camera], Array], start: float, camera: Camera
-) -> tuple[Array, NDArray[np.bool_] | bool]:
+) -> tuple[Array, NDArray[np.uint8]]:
     return read_temperature(camera, formed(_without_detector(camera)), start)
 
 
 def read_temperature(
     camera: Camera, radiance: Array, start: float
-) -> tuple[Array, NDArray[np.bool_] | bool]:
-    """Return measured temperatures in K, and which pixels the detector marks as unusable."""
+) -> tuple[Array, NDArray[np.uint8]]:
+    """Return measured temperatures in K, and flags as those of a measurement, (y, x)."""
     read, flags = camera.read(radiance[None], np.array([start]))
     kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
-    return kelvins, False if flags is None else flags[0] & UNUSABLE != 0
+    return kelvins, range_flags(kelvins, camera.lower_limit, None if flags is None else flags[0])
 
 
 def reference_temperature(

@@ -67,14 +67,17 @@ class Place(ABC):
         """Return points to draw it, x and y in m, shape (n, 2); None for the whole image."""
         return None
 
-    def covered(self, where: NDArray[np.bool_], raster: Raster) -> float:
-        """Return the fraction of its outline where an image is true; NaN for the whole image."""
+    def covered(self, where: NDArray[np.bool_], image: Array, raster: Raster) -> float:
+        """Return the fraction of its pixels for which `where` is true; NaN without pixels.
+
+        Pixels count where `image` is finite. This method counts along the outline.
+        """
         outline = self.outline()
         if outline is None:
             return nan
         if len(outline) > 1:
             outline = polyline(outline, raster.spacing).points
-        return float(np.nanmean(nearest(where.astype(np.float64), raster, outline)))
+        return _mean(nearest(np.where(np.isfinite(image), where, nan), raster, outline))
 
     def check_within(self, raster: Raster) -> None:
         """Raise a ValueError if a part of the place is outside the pixels."""
@@ -149,6 +152,10 @@ class RegionPlace(Place):
         inside = self.region.shape.holds(*np.meshgrid(pixels.x, pixels.y))
         return _mean_and_extremes(images[:, inside])
 
+    def covered(self, where: NDArray[np.bool_], image: Array, raster: Raster) -> float:
+        inside = self.region.shape.holds(*np.meshgrid(raster.x, raster.y))
+        return _mean(where[inside & np.isfinite(image)].astype(np.float64))
+
     def outline(self) -> NDArray[np.float64]:
         corners = self.region.shape.outline
         return np.concatenate([corners, corners[:1]])
@@ -168,6 +175,9 @@ class HottestPlace(Place):
     def read_parts(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> Array:
         row, column = np.unravel_index(np.nanargmax(images[0]), images[0].shape)
         return images[None, :, row, column]
+
+    def covered(self, where: NDArray[np.bool_], image: Array, raster: Raster) -> float:
+        return float(where.flat[np.nanargmax(image)]) if np.isfinite(image).any() else nan
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.cut import Progress
 from chipglow.analysis.engine import schedule_of
-from chipglow.analysis.images import Array, ExposureImages
+from chipglow.analysis.images import Array, ExposureImages, read_temperature
 from chipglow.analysis.looks import Schedule
+from chipglow.analysis.outside import fractions_outside
 from chipglow.analysis.places import Place
 from chipglow.analysis.plan import Plan
-from chipglow.camera import Camera, Flag
+from chipglow.camera import Camera
 from chipglow.scene import Frame, Raster, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import FeatureTrends, ModifiedSurface, Surface
@@ -130,8 +131,8 @@ class SingleReadings:
     ) -> Array:
         """Return temperatures in K and fractions of each reading, shape (reading, 4).
 
-        `draw` gives a number from 0 to 1 for each of `random`. The fractions are of the place's
-        outline, or of the window if it has none: below the lower range limit, and saturated.
+        `draw` gives a number from 0 to 1 for each of `random`. The fractions of the place's pixels
+        are those below the lower range limit, and saturated.
         """
         texture, noise = (int(draw.get(name, 0.0) * _TEXTURES) for name in (TEXTURE, NOISE))
         moved = np.multiply([draw.get(name, 0.0) for name in (ACROSS, DOWN)], camera.pitch)
@@ -145,15 +146,14 @@ class SingleReadings:
             stack, flags, pixels = self._look(window, moved, surface)
             lines = window.place.sampled(stack, pixels)
             values[window.rows, :BELOW] = window.place.read(stack, pixels, lines)
-            below = stack[MEASURED] < (camera.lower_limit or 0.0)
-            values[window.rows, BELOW] = _fraction(window.place, below, pixels)
-            values[window.rows, SATURATED] = _fraction(window.place, flags, pixels)
+            outside = fractions_outside(window.place, flags, stack[MEASURED], pixels)
+            values[window.rows, BELOW:] = outside
         return np.asarray(values[self._kept])
 
     def _look(
         self, window: _Window, camera: Camera, surface: Surface
-    ) -> tuple[Array, NDArray[np.bool_], Raster]:
-        """Return `REFERENCE` and `MEASURED` of a window, and where it is saturated."""
+    ) -> tuple[Array, NDArray[np.uint8], Raster]:
+        """Return `REFERENCE` and `MEASURED` of a window, and the flags of its pixels."""
         first, last = window.limits
         middle = window.start + (self._duration - camera.integration_time) / 2
         start = max(min(middle, last - camera.integration_time), first)
@@ -162,13 +162,10 @@ class SingleReadings:
         if window.beyond is not None and window.pixels is not None:
             light = sample(window.beyond, window.pixels, pixels.centres)
             radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
-        read, flags = camera.read(radiance[None], np.array([start]))
+        kelvins, flags = read_temperature(camera, radiance, start)
         reference = images.reference(camera)
-        measured = np.where(np.isnan(reference), np.nan, camera.band.temperature(read[0]))
-        stack = np.stack([reference, measured])
-        if flags is None:
-            return stack, np.zeros(pixels.shape, np.bool_), pixels
-        return stack, flags[0] & Flag.SATURATED != 0, pixels
+        measured = np.where(np.isnan(reference), np.nan, kelvins)
+        return np.stack([reference, measured]), flags, pixels
 
     def _windows(
         self,
@@ -213,10 +210,6 @@ class SingleReadings:
                 one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
             windows.append(one)
         return windows
-
-
-def _fraction(place: Place, where: NDArray[np.bool_], pixels: Raster) -> float:
-    return float(where.mean()) if place.outline() is None else place.covered(where, pixels)
 
 
 def _is_local(surface: Surface) -> bool:

@@ -67,6 +67,7 @@ from chipglow.camera.measurement import (
     UNUSABLE as UNUSABLE,
     Flag as Flag,
     Measurement as Measurement,
+    range_flags as range_flags,
 )
 from chipglow.camera.optics.blurs import (
     BLURS as BLURS,

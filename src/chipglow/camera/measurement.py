@@ -44,6 +44,17 @@ UNUSABLE: Final = Flag.UNDER_RANGE | Flag.SATURATED | Flag.DEAD
 """Flags of pixels without a radiance temperature."""
 
 
+def range_flags(
+    temperature: NDArray[np.floating],
+    lower_limit: float | None,
+    flags: NDArray[np.uint8] | None = None,
+) -> NDArray[np.uint8]:
+    """Return `flags` with `Flag.UNDER_RANGE` for usable pixels below a limit or NaN, in K."""
+    flags = np.zeros(temperature.shape, np.uint8) if flags is None else flags
+    below = ~(temperature >= (lower_limit or 0.0)) & (flags & UNUSABLE == 0)
+    return flags | np.where(below, Flag.UNDER_RANGE, 0).astype(np.uint8)
+
+
 class Measurement:
     """Frames of a camera.
 
@@ -93,11 +104,7 @@ class Measurement:
         Pixels below `lower_limit` in K or without radiance are flagged in addition to `flags`.
         """
         temperature = band.temperature(radiance)
-        below = ~(temperature >= (lower_limit or 0.0))
-        flags = np.zeros(radiance.shape, np.uint8) if flags is None else flags
-        flags = flags | np.where(below & (flags & UNUSABLE == 0), Flag.UNDER_RANGE, 0).astype(
-            np.uint8
-        )
+        flags = range_flags(temperature, lower_limit, flags)
         values = {
             "radiance_temperature": np.where(flags & UNUSABLE, np.nan, temperature),
             "radiance": radiance,

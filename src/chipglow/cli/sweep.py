@@ -7,6 +7,8 @@ from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import pandas as pd
 
     from chipglow.quantities import Quantity
@@ -86,7 +88,7 @@ def sweep(
     reasons = [f"point {index}: {reason}" for index, reason in failed.items()]
     data = result.to_xarray()
     finish(
-        Notes(warnings=reasons[:_MAX_FAILURES]),
+        Notes(warnings=[*reasons[:_MAX_FAILURES], *_range_warnings(frame)]),
         (out / "sweep.csv", lambda path: write_frame(frame, path)),
         (out / "sweep.nc", lambda path: write_dataset(data, path)),
         (out / "sweep.png" if len(frame) else None, figure(draw_sweep, data, quantities)),
@@ -170,6 +172,15 @@ def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]")
             for path, quantity in quantities.items()
         }
     )
+
+
+def _range_warnings(frame: "pd.DataFrame") -> "Iterator[str]":
+    """Yield a sentence for each reading whose place is outside the camera's range at some point."""
+    from chipglow.analysis import outside_warnings
+
+    largest = frame.groupby("reading", sort=False)[["below_range", "saturated"]].max()
+    for reading, below, saturated in largest.itertuples():
+        yield from outside_warnings(f"{reading}, at the worst point", below, saturated)
 
 
 def _axis(text: str) -> tuple[str, str]:

@@ -188,6 +188,31 @@ def _lock(part: Path) -> int | None:
     return None
 
 
+@contextmanager
+def exclusive(folder: Path, refusal: str) -> Iterator[None]:
+    """Hold a folder for this process while the block runs.
+
+    Raises a ValueError with the text `refusal` if it is held already. Systems and file systems
+    without locks hold nothing.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ValueError(refusal) from None
+        except OSError:  # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(descriptor)
+
+
 def hold(descriptor: int) -> bool:
     """Lock a file until it is closed or the process ends; False if someone else holds it."""
     if sys.platform == "win32":  # which keeps an open file from being deleted by itself

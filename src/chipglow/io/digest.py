@@ -79,6 +79,12 @@ def write_hdf5(path: Path, write: Callable[[HDF5Sink], object]) -> None:
             sink.check()  # the cause of what HDF5 says
 
 
+def content_digest(path: str | Path) -> str:
+    """Return the digest of a file's content, whatever its name and time."""
+    with Path(path).open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
+
+
 def is_intact(path: Path) -> bool | None:
     """Return whether a file is as it was when its digest was appended; None if it has no digest."""
     size = path.stat().st_size - _LENGTH

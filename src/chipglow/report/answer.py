@@ -5,7 +5,7 @@ from itertools import islice
 from math import isfinite
 from typing import Final, NamedTuple
 
-from chipglow.analysis import Distribution
+from chipglow.analysis import Distribution, outside_texts
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
@@ -16,7 +16,7 @@ _MAX_SENTENCES: Final = 3
 """Number of sentences; the tables hold all errors."""
 
 _MANY: Final = 0.5
-"""Fraction of saturated pixels from which on a place is called saturated."""
+"""Fraction of saturated pixels above which the advice is on saturation."""
 
 
 class Statement(NamedTuple):
@@ -55,15 +55,9 @@ def _sentence(facts: Facts, name: str, rows: dict[str, Row]) -> str:
     if row.published is not None and row.differs is not None:
         side, value = "outside" if row.differs else "within", row.published.text("K", scale=-1.0)
         parts.append(f"the paper's {value} lies {side} the interval of a single frame")
-    if (saturated := _saturated(facts, name)) >= _MANY:
-        percent = quantity_text(100 * saturated, "%", 0)
-        parts.append(f"{percent} of the pixels there are saturated: a camera shows no temperature")
+    place = facts.data.sel(reading=name)
+    parts += outside_texts(float(place.below_range), float(place.saturated))
     return "; ".join(parts) + "."
-
-
-def _saturated(facts: Facts, name: str) -> float:
-    """Return the fraction of a reading's place that saturates the camera."""
-    return float(facts.data.saturated.sel(reading=name))
 
 
 def _of_true_temperature(facts: Facts, name: str) -> str:
@@ -88,7 +82,7 @@ def changes(facts: Facts, errors: Sequence[Row]) -> list[str]:
             continue
         sign = -1 if row.here < 0 else 1
         part, draws = max(row.parts.items(), key=lambda item: sign * item[1].mean)
-        if _saturated(facts, name) >= _MANY:
+        if float(facts.data.saturated.sel(reading=name)) >= _MANY:
             part = "saturated"
         values = {"quantity": row.quantity, "here": row.here, "part": draws.mean}
         sentences.append(facts.text(texts()["changes"][part], **values))

@@ -52,7 +52,8 @@ def sentences(facts: Facts) -> Iterator[str]:
             contributions = dict(zip(data.effect.values, values, strict=True))
             place, gain = str(one.place.item()), float(one.attribution_reading_gain)
             where = f"{place[0].upper()}{place[1:]}, {one.quantity.item()}"
-            subject = f"{where} ({one.seen_surface.item()}): the measured temperature"
+            subject = f"{where} ({one.seen_surface.item()}), in the shown exposure"
+            subject += ": the measured temperature"
             kind = facts.context["attribution_reference"]
             yield _sentence(subject, float(values.sum()), contributions, gain, kind)
 

@@ -12,6 +12,7 @@ import xarray as xr
 from numba import get_num_threads, set_num_threads
 from scipy.stats import qmc
 
+from chipglow.analysis import outside_warnings
 from chipglow.analysis.single import (
     BELOW,
     EXPOSURE,
@@ -43,9 +44,6 @@ SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 _SURROGATE: Final = "scene settings between the cut ones"
 _SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-out scenes"}
 """Sources of the inputs that the study does not state, by distribution."""
-
-_MOST_BELOW: Final = 0.05
-"""Fraction of a place below the lower range limit without a warning."""
 
 _ALIKE: Final = 0.01
 """Relative difference of an image's band and pitch from the study's that is accepted."""
@@ -218,12 +216,11 @@ def study_budget(
         model = _model(read, inputs, list(surrogates.values()))
         generator = np.random.default_rng(study.seed)
         found = budget(model, known, generator, trials, samples, progress=tell)
-        below = read(known.at(np.full((1, len(known)), 0.5)))[0, :, BELOW]
+        outside = read(known.at(np.full((1, len(known)), 0.5)))[0, :, BELOW:]
     doubts = [
-        f"{name}: {part:.0%} of the place is below the lower range limit: the camera gives no "
-        "temperature there."
-        for name, part in zip(readings.names, below, strict=True)
-        if part > _MOST_BELOW
+        text
+        for name, parts in zip(readings.names, outside.tolist(), strict=True)
+        for text in outside_warnings(name, *parts)
     ]
     doubts += [
         f"{name}: in some draws the place has no pixel, or is not in the image."

@@ -78,19 +78,28 @@ class CameraSection(Part):
     array: Annotated[
         tuple[int, int] | None,
         Parameter(
-            "Columns and rows of the detector, at most as many as cover the scene; none: as many "
-            "as cover it.",
+            "Columns and rows of the detector, at most as many as cover the scene: fewer see its "
+            "centre, unless their offset is stated; none: as many as cover it.",
             least=1,
             allowed="none, or such as [640, 512]",
         ),
     ] = None
     fill_factor: Annotated[float, Camera.parameter("fill_factor")] = Camera.fill_factor
     offset_right: Annotated[
-        float, Parameter("First pixel's corner from the scene's left edge.", POSITION, least=0.0)
-    ] = 0.0
+        float | None,
+        Parameter(
+            "First pixel's corner from the scene's left edge; none: 0, or an array narrower than "
+            "the scene is centred.",
+            POSITION,
+            least=0.0,
+        ),
+    ] = None
     offset_down: Annotated[
-        float, Parameter("First pixel's corner from the scene's upper edge.", POSITION, least=0.0)
-    ] = 0.0
+        float | None,
+        Parameter(
+            "First pixel's corner from the scene's upper edge, likewise.", POSITION, least=0.0
+        ),
+    ] = None
     psf: Annotated[
         Annotated[PSFChoice, PSFS] | None,
         Parameter("Point spread function of the optics, or none."),
@@ -151,26 +160,35 @@ class CameraSection(Part):
         return camera
 
     def build(self, seed: int = 2010) -> Camera:
-        """Return the camera, with as many pixels as see the scene."""
+        """Return the camera with its array, or with as many pixels as see a scene.
+
+        `on` also places the array on a scene.
+        """
         band = Band(*self.band, None if self.response is None else read_response(self.response))
         shared = Camera.declared().keys() & self.declared().keys()
         made = {
             **{name: getattr(self, name) for name in shared},
             "band": band,
-            "offset": (self.offset_right, self.offset_down),
+            "offset": (self.offset_right or 0.0, self.offset_down or 0.0),
+            "shape": None if self.array is None else self.array[::-1],
             "psf": self._psf(band),
             "lower_limit": self._lower_limit(band),
         }
         return Camera(**made, seed=seed)
 
     def on(self, scene: Raster, seed: int = 2010) -> Camera:
-        """Return the camera on a scene, with no more pixels than its detector has."""
-        camera = self.build(seed)
+        """Return the camera on a scene, with the pixels of its array that see it, centred."""
+        camera = replace(self.build(seed), shape=None)
         if self.array is None:
             return camera
-        seen = camera.pixels(scene)
-        columns, rows = self.array
-        return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
+        whole = camera.pixels(scene)
+        columns, rows = min(self.array[0], whole.columns), min(self.array[1], whole.rows)
+        right, down = camera.offset
+        if self.offset_right is None and columns < whole.columns:
+            right = (scene.columns * scene.spacing - columns * camera.pitch) / 2
+        if self.offset_down is None and rows < whole.rows:
+            down = (scene.rows * scene.spacing - rows * camera.pitch) / 2
+        return replace(camera, shape=(rows, columns), offset=(right, down))
 
     def _lower_limit(self, band: Band) -> float | None:
         if self.lower_limit != FROM_DETECTOR:

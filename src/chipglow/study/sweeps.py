@@ -2,10 +2,10 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from hashlib import file_digest, sha256
+from functools import cache, cached_property
+from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
@@ -18,7 +18,8 @@ import yaml
 from scipy.stats import qmc
 
 from chipglow.analysis import Analysis, headlines
-from chipglow.io.atomic import atomic_path
+from chipglow.io.atomic import atomic_path, exclusive
+from chipglow.io.digest import content_digest
 from chipglow.quantities import adapter, changed, setting_at
 from chipglow.study.running import Progress, cut, is_cut, run, scene_inputs
 from chipglow.study.schema import Study
@@ -33,6 +34,10 @@ DESCRIPTION: Final = "sweep.json"
 NUMBERS: Final = ("reference", "error", "uncertainty", "psf_portion", "true_error")
 """Stored values of each reading in K; uncertainty: expanded, of the mean error."""
 
+FRACTIONS: Final = ("below_range", "saturated")
+"""Stored fractions of each reading's place below the lower range limit, and saturated."""
+
+_POINTS: Final = "points"
 _RANGE: Final = re.compile(r"([^:]+):([^:]+)(?::(\d+))?")
 _QUANTITY: Final = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
@@ -64,14 +69,22 @@ class Sweep:
     @classmethod
     def open(cls, folder: str | Path) -> "Sweep":
         """Open the sweep in a folder."""
-        folder = Path(folder)
-        stated = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
+        file = Path(folder) / DESCRIPTION
+        try:
+            return cls._stated(Path(folder), file.read_text(encoding="utf-8"))
+        except (ValueError, LookupError, TypeError):
+            raise ValueError(f"{file}: is damaged; run the sweep again") from None
+
+    @classmethod
+    def _stated(cls, folder: Path, text: str) -> "Sweep":
+        """Return the sweep that a text like that of `DESCRIPTION` states."""
+        stated = json.loads(text)
         points, keys = tuple(stated["settings"]), tuple(stated["keys"])
         return cls(folder, stated["axes"], points, keys, stated["is_grid"])
 
     @cached_property
     def records(self) -> tuple[Mapping[str, Any] | None, ...]:
-        """Content of each point's file; None if the point is missing."""
+        """Content of each point's file; None if the point is missing or its file is damaged."""
         return tuple(map(_record, (point_file(self.folder, key) for key in self.keys)))
 
     @property
@@ -89,16 +102,17 @@ class Sweep:
         """Return a table with one row per point and reading: settings in SI, and numbers in K."""
         rows = [
             {"point": i, **self.settings[i], "reading": name}
-            | {f"{number}_K": value for number, value in numbers.items()}
+            | {f"{number}_K": numbers[number] for number in NUMBERS}
+            | {name: numbers[name] for name in FRACTIONS}
             for i, readings in enumerate(self._readings)
             for name, numbers in readings.items()
         ]
-        names = [f"{number}_K" for number in NUMBERS]
+        names = [*(f"{number}_K" for number in NUMBERS), *FRACTIONS]
         frame = pd.DataFrame(rows, columns=["point", *self.axes, "reading", *names])
         return frame.astype(dict.fromkeys(names, np.float64))
 
     def to_xarray(self) -> xr.Dataset:
-        """Return `NUMBERS` in K over the varied settings and ``reading``; NaN where unknown.
+        """Return `NUMBERS` in K and `FRACTIONS` over settings and ``reading``; NaN if unknown.
 
         A grid has a dimension named by the path of each setting. Otherwise the dimension is
         ``point``, with the settings as coordinates. Settings with a unit are in SI.
@@ -107,7 +121,7 @@ class Sweep:
         values = np.array(
             [
                 [[one.get(name, {}).get(number) for name in names] for one in self._readings]
-                for number in NUMBERS
+                for number in (*NUMBERS, *FRACTIONS)
             ],
             np.float64,  # None becomes NaN
         )
@@ -118,10 +132,11 @@ class Sweep:
             dims = list(self.axes)
             coordinates = {path: list(dict.fromkeys(one)) for path, one in settings.items()}
         shape = [len(coordinates[dim]) for dim in dims] if self.is_grid else [len(self.keys)]
-        data = values.reshape(len(NUMBERS), *shape, len(names))
+        data = values.reshape(len(values), *shape, len(names))
+        units = dict.fromkeys(NUMBERS, "K") | dict.fromkeys(FRACTIONS, "1")
         variables = {
-            number: ((*dims, "reading"), one, {"units": "K"})
-            for number, one in zip(NUMBERS, data, strict=True)
+            number: ((*dims, "reading"), one, {"units": unit})
+            for (number, unit), one in zip(units.items(), data, strict=True)
         }
         return xr.Dataset(variables, coords=coordinates | {"reading": names})
 
@@ -175,9 +190,10 @@ def sweep(
     Raises
     ------
     ValueError
-        If a path or a value is impossible for all points, or the folder contains other files.
+        If a path or a value is impossible for all points, the folder contains other files, or
+        another sweep is running in it.
     ConnectionError
-        If the cluster is lost; the computed points are kept.
+        If the workers do not start or are lost; the computed points are kept.
     """
     tell, folder = progress or (lambda step, done: None), Path(out)
     axes = {path: axis(values) for path, values in vary.items()}
@@ -186,24 +202,43 @@ def sweep(
     study = changed(study, {"analysis.psf_widths": ("8 um",), "attribution": None})
     studies = studies_at(study, points)
     settings = [{path: in_si(study, path, one[path]) for path in one} for one in points]
-    keys = [_key(one, at) for one in studies]
-    _write_description(Sweep(folder, axes, tuple(settings), tuple(keys), method == "grid"))
-    tasks = {
-        key: (one, tuple(at), path)
-        for key, one in zip(keys, studies, strict=True)
-        if not _is_done(path := point_file(folder, key))
+    digest = cache(content_digest)  # each file is read once
+    keys = [_key(one, at, digest) for one in studies]
+    description = {
+        "axes": {path: list(map(str, values)) for path, values in axes.items()},
+        "settings": settings,
+        "keys": keys,
+        "is_grid": method == "grid",
     }
-    new = [one for one, *_ in tasks.values() if isinstance(one, Study) and one.scene is None]
+    text = json.dumps(description, indent=1)
+    _check_folder(folder)
+    running = f"{folder}: another sweep is running there; wait for its end or choose another folder"
+    with exclusive(folder / _POINTS, running):
+        with atomic_path(folder / DESCRIPTION) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        tasks = {
+            key: (one, tuple(at), path)
+            for key, one in zip(keys, studies, strict=True)
+            if not _is_done(path := point_file(folder, key))
+        }
+        _compute(list(tasks.values()), client, workers, tell)
+    return Sweep._stated(folder, text)
+
+
+def _compute(
+    tasks: Sequence[tuple[Study | str, tuple[str, ...], Path]],
+    client: Client | None,
+    workers: int | None,
+    tell: Progress,
+) -> None:
+    """Compute the scenes of points that are not in the cache, then the points."""
+    new = [one for one, *_ in tasks if isinstance(one, Study) and one.scene is None]
     scenes = {json.dumps(scene_inputs(one)): one for one in new}
     cuts = [(one,) for one in scenes.values() if not is_cut(one)]
     with local_client(client, workers, max(len(tasks), len(cuts))) as computing:
-        for step, function, arguments in (
-            ("cuts", _cut, cuts),
-            ("points", compute_point, list(tasks.values())),
-        ):
+        for step, function, arguments in (("cuts", _cut, cuts), ("points", compute_point, tasks)):
             for count, _ in enumerate(on_client(computing, function, arguments), 1):
                 tell(step, count / len(arguments))
-    return Sweep.open(folder)
 
 
 def axis(values: str | Sequence[Any]) -> list[Any]:
@@ -229,7 +264,7 @@ def between(first: object, last: object, part: float) -> str | float:
 
 def point_file(folder: Path, key: str) -> Path:
     """Return the file of a point."""
-    return folder / "points" / f"{key}.json"
+    return folder / _POINTS / f"{key}.json"
 
 
 def compute_point(study: Study | str, at: Sequence[str], path: Path) -> None:
@@ -260,7 +295,10 @@ def _numbers(analysis: Analysis, at: Sequence[str]) -> dict[str, Any]:
             one.psf_portion.mean,
             one.true_error.mean,
         )
-        readings[name] = dict(zip(NUMBERS, map(_finite, values), strict=True))
+        place = analysis.data.sel(reading=name)
+        fractions = (float(place[fraction]) for fraction in FRACTIONS)
+        numbers = map(_finite, (*values, *fractions))
+        readings[name] = dict(zip((*NUMBERS, *FRACTIONS), numbers, strict=True))
     return {"readings": readings}
 
 
@@ -322,7 +360,9 @@ def in_si(study: Study, path: str, value: Any) -> Any:
         return value
 
 
-def _key(study: Study | str, at: Sequence[str]) -> str:
+def _key(
+    study: Study | str, at: Sequence[str], digest: Callable[[str], str] = content_digest
+) -> str:
     """Return the digest of all that determines a point's numbers."""
     if isinstance(study, str):
         return _digest(study)
@@ -330,51 +370,55 @@ def _key(study: Study | str, at: Sequence[str]) -> str:
     del content["title"], content["wavelengths"], content["uncertainty"]
     if study.scene is None:
         content["cutting"] = scene_inputs(study)
-    return _digest([_contents(content), sorted(at), version("chipglow")])
+    return _digest([_contents(content, digest), sorted(at), version("chipglow")])
 
 
-def _contents(value: Any) -> Any:
-    """Return a value with the content of each file in place of its name."""
+def _contents(value: Any, digest: Callable[[str], str]) -> Any:
+    """Return a value with the content of each file, a full path, in place of its name."""
     if isinstance(value, Mapping):
-        return {key: _contents(one) for key, one in value.items()}
+        return {key: _contents(one, digest) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_contents(one) for one in value]
-    if isinstance(value, str) and Path(value).suffix and Path(value).is_file():
-        status = Path(value).stat()
-        return _file_digest(value, status.st_mtime_ns, status.st_size)
+        return [_contents(one, digest) for one in value]
+    if isinstance(value, str) and Path(value).is_absolute() and Path(value).is_file():
+        return digest(value)
     return value
-
-
-@lru_cache
-def _file_digest(path: str, modified: int, size: int) -> str:
-    with Path(path).open("rb") as file:
-        return file_digest(file, "sha256").hexdigest()
 
 
 def _digest(content: Any) -> str:
     return sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
 
-def _write_description(plan: Sweep) -> None:
-    folder = plan.folder
-    if folder.exists() and any(folder.iterdir()) and not (folder / DESCRIPTION).exists():
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder with other files than those of a sweep, and make that of the points."""
+    is_sweep = (folder / DESCRIPTION).exists()
+    if not is_sweep and any(one.name != _POINTS for one in folder.rglob("*")):
         raise ValueError(f"{folder}: contains no sweep; choose a new or empty folder")
-    (folder / "points").mkdir(parents=True, exist_ok=True)
-    content = {
-        "axes": {path: list(map(str, values)) for path, values in plan.axes.items()},
-        "settings": plan.settings,
-        "keys": plan.keys,
-        "is_grid": plan.is_grid,
-    }
-    with atomic_path(folder / DESCRIPTION) as temporary:
-        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    (folder / _POINTS).mkdir(parents=True, exist_ok=True)
 
 
 def _record(path: Path) -> Mapping[str, Any] | None:
-    if not path.exists():
+    """Return the content of a point's file; None if it is missing or damaged."""
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
         return None
-    record: Mapping[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return record
+    if not isinstance(record, dict):
+        return None
+    readings = record.get("readings")
+    if isinstance(readings, dict):
+        is_whole = all(map(_has_numbers, readings.values()))
+    else:
+        is_whole = isinstance(record.get("failed"), str)
+    return record if is_whole else None
+
+
+def _has_numbers(reading: Any) -> bool:
+    """Return whether a stored reading has all numbers, finite or None."""
+    return (
+        isinstance(reading, dict)
+        and reading.keys() == {*NUMBERS, *FRACTIONS}
+        and all(one is None or isinstance(one, float) for one in reading.values())
+    )
 
 
 def _is_done(path: Path) -> bool:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from itertools import islice
 from os import cpu_count
@@ -37,17 +37,24 @@ def local_client(client: Client | None, workers: int | None, most: int) -> Itera
     dask: Any = import_module("dask")
     count = min(workers or cpu_count() or 1, most)
     options = {"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES}
-    with (
-        dask.config.set(options),
-        distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            env=_THREADS,
-            dashboard_address=":0",  # any free port
-            silence_logs="ERROR",
-        ) as cluster,
-        distributed.Client(cluster) as own,
-    ):
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(options))
+        try:
+            cluster = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    env=_THREADS,
+                    dashboard_address=":0",  # any free port
+                    silence_logs="ERROR",
+                )
+            )
+            own = stack.enter_context(distributed.Client(cluster))
+        except (RuntimeError, OSError) as error:
+            raise ConnectionError(
+                f"the worker processes did not start ({error}); the computed points are kept, run "
+                "the sweep again to continue"
+            ) from None
         yield own
 
 

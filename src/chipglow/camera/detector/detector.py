@@ -1,9 +1,9 @@
 """The detector: from in-band radiance to electrons and counts, with noise and a limited range."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,8 @@ class Detector(Part):
     seed: Annotated[
         int, Parameter("Seed of the patterns and of the frames of the correction.", least=0)
     ] = 1
+    digitises: ClassVar[bool] = True
+    """Whether full well and digitiser limit and round the signal."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -126,7 +128,7 @@ class Detector(Part):
         generator: np.random.Generator | Sequence[np.random.Generator],
         point: OperationPoint | None = None,
         times: Array | None = None,
-    ) -> NDArray[np.uint32]:
+    ) -> NDArray[np.uint32] | Array:
         """Return counts of frames of in-band radiance in W/(m² sr), shape (time, y, x).
 
         `generator` makes the noise of all frames, or one each; `times` are starts of integration in
@@ -142,12 +144,14 @@ class Detector(Part):
         readout = partial(Readout, times, point, per_radiance, self.capacity, keys, self.seed)
         electrons = per_radiance * np.asarray(radiance, np.float64)
         for stage in Stage:
-            if stage == Stage.TRANSFER and self.full_well is not None:
+            if stage == Stage.TRANSFER and self.full_well is not None and self.digitises:
                 electrons = np.minimum(electrons, self.full_well)
             for term in self.terms:
                 if term.stage == stage:
                     electrons = term.apply(electrons, readout(term.kind))
         signal = self.offset + self.conversion_gain * electrons
+        if not self.digitises:
+            return signal
         return np.clip(np.rint(signal), 0, self._top).astype(np.uint32)
 
     def record(self, measurement: Measurement, generator: np.random.Generator) -> Recording:
@@ -172,6 +176,17 @@ class Detector(Part):
             pitch=measurement.raster.spacing,
         )
 
+    def undigitised(self) -> "Detector":
+        """Return the detector without the limits and rounding of full well and digitiser."""
+        return _Undigitised(**{one.name: getattr(self, one.name) for one in fields(self)})
+
     @property
     def _top(self) -> int:
         return (1 << self.bits) - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Undigitised(Detector):
+    """A detector whose signal is neither limited nor rounded."""
+
+    digitises: ClassVar[bool] = False

@@ -82,7 +82,7 @@ class FlatFieldCalibration(Brief):
             ),
         }
 
-    def radiance(self, counts: NDArray[np.uint32]) -> tuple[Array, NDArray[np.uint8]]:
+    def radiance(self, counts: NDArray[np.uint32] | Array) -> tuple[Array, NDArray[np.uint8]]:
         """Return radiance in W/(m² sr) and flags of counts (time, y, x).
 
         Radiance is NaN where a pixel is dead and not replaced by its neighbours.
@@ -162,7 +162,7 @@ def _frames(
     radiance: float,
     count: int,
     stream: str,
-) -> NDArray[np.uint32]:
+) -> NDArray[np.uint32] | Array:
     """Return frames of a flat-field source."""
     generator = np.random.default_rng([detector.seed, _STREAMS[stream]])
     return detector.counts(np.full((count, *shape), radiance), generator, point)
@@ -185,6 +185,8 @@ def flat_field_calibration(
     light = _BEYOND * full_light(detector, point)
     full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
     saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
+    if not detector.digitises:
+        saturated = np.full(shape, np.inf)
     bad = find_bad_pixels(cold, hot).unresponsive
     bad |= mean_frame(hot) >= saturated
     low, high = (
