@@ -20,7 +20,7 @@ from chipglow.io import write_measurement, write_scene
 from chipglow.quantities import changed
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene
-from chipglow.study import Study, study_budget
+from chipglow.study import Study, load_study, study_budget
 from chipglow.surface import CHIP_1, CHIP_2, UniformSurface
 from chipglow.uncertainty import Input, Inputs, budget, first_order
 from chipglow.uncertainty.budget import VALIDATED, _sobol
@@ -586,6 +586,61 @@ def test_a_study_of_another_measurement_is_refused(strip):
     ):
         (strip / "other.yaml").write_text(text.replace(old, new), encoding="utf-8")
         refused(list(map(str, arguments)), message)
+
+
+def test_impossible_parts_of_distributions_and_missing_sources_are_stated(plate, tmp_path):
+    (tmp_path / "study.yaml").write_text(
+        f"""
+scene: {plate}
+surface: {{kind: uniform, emissivity: 0.98}}
+camera: {{psf: none, lower_limit: none}}
+analysis: {{reference: true, points: {{middle: [0 um, 0 um]}}}}
+uncertainty:
+  inputs:
+    surface.emissivity: {{standard: 0.05}}
+    camera.pitch: {{half_width: 0.1 um}}
+    camera.fill_factor: {{values: [0.8, 0.9]}}
+""",
+        encoding="utf-8",
+    )
+    printed = chipglow(
+        "budget", tmp_path / "study.yaml", "--at", "middle", "--samples", 2, "--trials", 100,
+        "--out", tmp_path / "budget.csv",
+    )  # fmt: skip
+    text = (
+        "surface.emissivity: the distribution is truncated, as 34 % of it is impossible (above 1)"
+    )
+    assert printed.output.count(text) == 1
+    assert printed.output.index(text) < printed.output.index("Monte Carlo")
+    frame = pd.read_csv(tmp_path / "budget.csv").set_index("input")
+    assert frame.loc["surface.emissivity"].source == "not stated"
+    assert frame.loc["camera.pitch"].source == frame.loc["camera.fill_factor"].source
+    assert frame.loc["pixel position down"].source == "drawn at random"
+    band = Band(3.8e-6, 5.1e-6)
+    peer = stats.truncnorm(-0.98 / 0.05, 0.02 / 0.05, 0.98, 0.05)
+    low, high = (
+        band.temperature(peer.ppf(p) * band.radiance(900.0)) - 900.0 for p in (0.025, 0.975)
+    )
+    found = study_budget(load_study(tmp_path / "study.yaml"), ("middle",), trials=500, samples=2)
+    # Ends of 500 trials: the standard deviation of the lower one is 8 % of half the interval.
+    assert found.budget.monte_carlo.low[0] == pytest.approx(low, abs=0.3 * (high - low))
+    assert found.budget.monte_carlo.high[0] == pytest.approx(high, abs=0.02 * (high - low))
+
+
+def test_a_true_temperature_has_a_possible_emissivity(strip):
+    arguments = [strip / "image.nc", "--regions", strip / "regions.yaml", "--emissivity", 0.98]
+    arguments += ["--emissivity-uncertainty", 0.05, "--camera-uncertainty", "0 K"]
+    printed = chipglow("--json", "temperature", *arguments)
+    result = json.loads(printed.stdout)
+    assert any(
+        "emissivity: the distribution is truncated, as 34 % of it is impossible (above 1)" in one
+        for one in result["warnings"]
+    )
+    (row,) = result["tables"]["regions"]
+    (radiance,) = {one["radiance_temperature_K"] for one in result["tables"]["regions"]}
+    # An emissivity of 1 at most: not below the radiance temperature, but for the pixels' scatter.
+    scatter = 2 * row["standard_deviation_K"] / np.sqrt(row["pixels"])
+    assert row["low_K"] > radiance - scatter
 
 
 def test_readings_without_a_temperature_are_stated(plate):

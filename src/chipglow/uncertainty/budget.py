@@ -162,9 +162,9 @@ def first_order(
     random and discrete inputs.
 
     The variance by all random and discrete inputs is estimated from 8 draws of them at each of 64
-    draws of the others: 448 degrees of freedom. Each has the part of it that is due to its own effect,
-    half the mean square of the change when it alone is drawn again (Jansen, 1999). If such inputs
-    interact, the sum of these effects is larger than their variance together.
+    draws of the others: 448 degrees of freedom. Each input has the part that is due to its own
+    effect, half the mean square of the change when it alone is drawn again (Jansen, 1999). If
+    inputs interact, the sum of these effects is larger than their variance together.
     """
     smooth = np.array([one.has_slope for one in inputs.inputs], np.bool_)
     drawn, again = _draws(inputs, generator)

@@ -10,6 +10,9 @@ _MOST_OUTSIDE: Final = 0.5
 _STATED_OUTSIDE: Final = 1e-4
 """Impossible part that is stated: a smaller one moves no end of an interval by a printed digit."""
 
+_NAMED: Final = 0.01
+"""Part of what is impossible that is beyond a limit which messages name."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -59,5 +62,6 @@ class Limits:
     def _beyond(self, below: float, above: float) -> str:
         # An excluded limit of 0 is held as the smallest positive number.
         ends = {f"below {round(self.low, 300):.4g}": below, f"above {self.high:.4g}": above}
-        text = " or ".join(end for end, part in ends.items() if part > 0)
+        least = _NAMED * (below + above)
+        text = " or ".join(end for end, part in ends.items() if part > least)
         return f"{text} {self.unit}".strip()
