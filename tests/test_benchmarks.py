@@ -64,6 +64,7 @@ PROGRAMS = {
     ),
     "registration_libraries.py": ("--pairs 1 --only scikit-image", {"| scikit-image |": 5}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
+    "stability.py": ("--seeds 1", {"| normal | 9.9 ": 6, "| noise | 10 ": 6}),
     "sweeps.py": ("--tasks 4 --points 6 --kills 1", {"| 1 |": 4, "| 2 |": 4, "| 6 | ": 6}),
     "titanium.py": (
         f"--cell {COARSEST} 88.9-0.1",

@@ -10,6 +10,7 @@ from scipy.constants import c, h, k
 from scipy.integrate import quad
 
 from chipglow.io import write_scene
+from chipglow.quantities import changed
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, design
 
@@ -109,6 +110,38 @@ def test_settings_beyond_a_limit_are_excluded(heating):
     found = design(study_of(heating), full, ("middle",), draws=64)
     reason = "camera.detector.full_well = 100000.0: middle, pixel: 100% of it is saturated"
     assert found.reasons[1] == reason
+
+
+def test_all_settings_see_the_same_moments(tmp_path):
+    """A plate that cools and heats again: the bias by motion depends on the moment."""
+    raster = Raster(left=-20e-6, top=20e-6, spacing=2e-6, rows=20, columns=20)
+    step, curvature = 0.1e-6, 0.2e12  # s, K/s²
+    times = step * np.arange(601)
+    temperature = 900.0 + curvature / 2 * (times - 30e-6) ** 2
+    fields = np.broadcast_to(temperature[:, None, None], (len(times), *raster.shape))
+    write_scene(Scene.from_fields(raster, times, {"temperature": fields}), tmp_path / "plate.nc")
+    study = study_of(tmp_path / "plate.nc", detector=None)
+    study = changed(study, {"analysis.exposures": 3})
+    vary = {"camera.integration_time": ("1 us", "2 us", "20 us", "1 ms")}
+    found = design(study, vary, ("middle",), draws=64)
+    assert "scene: it lasts 60.1 us, expected an exposure's 1000 us" in found.reasons[4]
+    # Exposures of 20 us, the longest that fit, are spread over 60 us: their middles.
+    speed = curvature * np.abs(np.array([10e-6, 30e-6, 50e-6]) - 30e-6)
+    for number, time in ((1, 1e-6), (2, 2e-6)):
+        bias = -(speed * time / 2).mean()
+        # The start is that of a frame, whose temperature is the same for a step.
+        assert found.bias[number, 0] == pytest.approx(bias, abs=speed.mean() * step)
+
+
+def test_settings_with_impossible_draws_are_excluded(heating):
+    study = changed(
+        study_of(heating),
+        {"uncertainty": {"inputs": {"camera.integration_time": {"standard": "1 %"}}}},
+    )
+    vary = {"camera.integration_time": ("20 us", "1.66 ms")}  # of a frame period of 1.667 ms
+    found = design(study, vary, ("middle",), draws=16)
+    assert found.reasons.keys() == {2}
+    assert "a draw is impossible: camera" in found.reasons[2]
 
 
 def test_a_path_outside_of_camera_and_surface_is_refused(heating):

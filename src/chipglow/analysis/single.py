@@ -76,6 +76,10 @@ class SingleReadings:
         Places or readings; all by default.
     tell : callable
         Called with the current step and the fraction of it that is complete.
+    longest : float, optional
+        Integration time in s of the exposures that are spread over the scene, by default the
+        camera's. A shorter exposure is in the middle of one of these: cameras with the same
+        `longest` see the same moments.
 
     Raises
     ------
@@ -91,8 +95,14 @@ class SingleReadings:
         plan: Plan,
         at: Sequence[str] = (),
         tell: Progress = lambda step, part: None,
+        longest: float | None = None,
     ) -> None:
-        schedule = schedule_of(scene, surfaces, camera, plan, tell)
+        spread = camera
+        if longest is not None and longest > camera.integration_time:
+            # The frame period must be longer than the exposure, and has no effect on a single one.
+            rate = min(camera.frame_rate, 0.5 / longest)
+            spread = replace(camera, integration_time=longest, frame_rate=rate)
+        schedule = schedule_of(scene, surfaces, spread, plan, tell)
         places = [
             (n, i, p) for n, v in enumerate(schedule.views) for i, p in enumerate(v.places[0])
         ]
@@ -108,7 +118,7 @@ class SingleReadings:
         kept = {name: key for name, key in every.items() if not at or name in at or key[2] in at}
         self.names, self.places = tuple(kept), tuple(key[2] for key in kept.values())
         self._raster = scene.raster
-        self._reference, self._duration = plan.reference, camera.integration_time
+        self._reference, self._duration = plan.reference, spread.integration_time
         keys = {key[:2] for key in kept.values()}
         owners = [key[:2] for key in every.values()]
         self._kept = np.array([name in kept for name in every])
@@ -154,9 +164,7 @@ class SingleReadings:
         self, window: _Window, camera: Camera, surface: Surface
     ) -> tuple[Array, NDArray[np.uint8], Raster]:
         """Return `REFERENCE` and `MEASURED` of a window, and the flags of its pixels."""
-        first, last = window.limits
-        middle = window.start + (self._duration - camera.integration_time) / 2
-        start = max(min(middle, last - camera.integration_time), first)
+        start = self._start(camera, window.start, window.limits)
         images = ExposureImages(camera.expose(window.scene, surface, start), self._reference)
         pixels, radiance = camera.pixels(window.scene.raster), images.radiance(camera)
         if window.beyond is not None and window.pixels is not None:
@@ -166,6 +174,12 @@ class SingleReadings:
         reference = images.reference(camera)
         measured = np.where(np.isnan(reference), np.nan, kelvins)
         return np.stack([reference, measured]), flags, pixels
+
+    def _start(self, camera: Camera, start: float, limits: tuple[float, float]) -> float:
+        """Return the start of a camera's exposure in the middle of one of the spread ones."""
+        first, last = limits
+        middle = start + (self._duration - camera.integration_time) / 2
+        return max(min(middle, last - camera.integration_time), first)
 
     def _windows(
         self,
@@ -182,17 +196,18 @@ class SingleReadings:
         limits = float(scene.times[block[0]]), float(scene.times[block[-1]] + scene.frame_spacing)
         if len(scene.times) == 1:
             limits = -np.inf, np.inf
+        begin = self._start(camera, start, limits)
         used = {schedule.views[n].surface for n, _ in self._rows}
         small = [name for name in used if _is_local(surfaces[name]) and camera.line_time is None]
         whole, frames = {}, []
         if small:
             fields = [camera.prepare(surfaces[name], scene) for name in small]
-            exposed = camera.expose_fields(scene, fields, start)
+            exposed = camera.expose_fields(scene, fields, begin)
             whole = dict(
                 zip(small, (ExposureImages(one).radiance(camera) for one in exposed), strict=True)
             )
             reach = camera.integration_time / 2
-            first, last = (scene.frame_at(start + at * reach) for at in (-1.0, 3.0))
+            first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
             frames = list(scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1)))
         windows = []
         for key, rows in self._rows.items():
@@ -203,7 +218,7 @@ class SingleReadings:
             if part is not None:
                 one = replace(one, scene=_cropped(frames, scene, part))
                 moved = _on_grid(camera, scene.raster, one)
-                alone = moved.expose(one.scene, surfaces[view.surface], start)
+                alone = moved.expose(one.scene, surfaces[view.surface], begin)
                 pixels = moved.pixels(one.scene.raster)
                 image = ExposureImages(alone).radiance(moved)
                 light = nearest(whole[view.surface], camera.pixels(scene.raster), pixels.centres)

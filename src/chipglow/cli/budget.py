@@ -39,8 +39,10 @@ def budget(
     from chipglow.laboratory.result_file import write_frame
     from chipglow.report.budget_figure import draw_budget
     from chipglow.study import load_study, study_budget
+    from chipglow.text import Notes
 
     loaded = load_study(study)
+    current().notes(Notes(loaded.uncertainty.build(loaded).truncated))
     with progress_bars() as progress:
         result = study_budget(loaded, tuple(at or ()), trials, samples, scenes, progress)
     _print(result)
@@ -53,6 +55,8 @@ def budget(
 
 def _print(result: "StudyBudget") -> None:
     import pandas as pd
+
+    from chipglow.uncertainty.budget import VALIDATED
 
     screen, budget, summary = current(), result.to_frame(), result.summary()
     screen.table(
@@ -86,8 +90,18 @@ def _print(result: "StudyBudget") -> None:
         },
     )
     trials = result.budget.monte_carlo
-    how = "stable to one digit of u" if trials.is_stable else "not stable: use more --trials"
-    screen.say(f"{trials.trials} trials, {how}.", {"trials": trials.trials})
+    how, remedy = (
+        ("stable", "") if trials.is_stable.all() else ("not stable", "; use more --trials")
+    )
+    screen.say(
+        f"{trials.trials} trials: mean, u and the ends of the interval are {how} within "
+        f"{trials.tolerance:.0%} of u with 95 % confidence{remedy}.",
+        {"trials": trials.trials},
+    )
+    screen.say(
+        f"GUM validated: both ends of its interval, error ± U, are within {VALIDATED:.0%} of u of "
+        "Monte Carlo's."
+    )
     for reading, one in result.surrogates.items():
         screen.say(
             f"{reading}: the settings of the scene act as a {one.form}; scenes left out of the fit "

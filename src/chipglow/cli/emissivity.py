@@ -210,7 +210,7 @@ def _correct(
 
     screen = current()
     with progress_bars() as progress:
-        estimates, found = corrected_temperatures(result, image, load_study(study), progress)
+        estimates, notes = corrected_temperatures(result, image, load_study(study), progress)
     rows = list(estimates.values())
     frame["corrected_temperature_K"] = [float(one.values) for one in rows]
     frame["corrected_uncertainty_K"] = [float(one.standard_uncertainty) for one in rows]
@@ -236,7 +236,7 @@ def _correct(
     ).dropna()
     screen.heading()
     screen.table("budget", parts.sort_values(["region", "contribution_K"], ascending=[True, False]))
-    return found.notes.about(str(study))
+    return notes.about(str(study))
 
 
 def _emissivities(

@@ -122,7 +122,8 @@ class Screen:
         self.heading(text.get().removesuffix("\n"))
 
     def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: TextIO) -> None:
-        for sentence in sentences:
+        # What was said before a computation is not said again after it.
+        for sentence in [one for one in sentences if one not in self._record[key]]:
             self._record[key].append(sentence)
             self.heading(f"{head}: {sentence}", stream)
 

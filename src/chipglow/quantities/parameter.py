@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
+from math import inf, isfinite, nextafter
 from types import NoneType, UnionType
 from typing import Any, Final, Literal, Union, get_args, get_origin
 
@@ -62,6 +62,15 @@ class Parameter:
     def limits(self) -> str:
         """The limits in words, in the unit of descriptions."""
         return self._limits(self._text)
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """The smallest and the largest number within the limits, in SI units."""
+        low = [] if self.over is None else [nextafter(self.over, inf)]
+        high = [] if self.under is None else [nextafter(self.under, -inf)]
+        low += [] if self.least is None else [self.least]
+        high += [] if self.most is None else [self.most]
+        return max(low, default=-inf), min(high, default=inf)
 
     def number(self, value: object) -> float:
         """Return the SI number of a value as descriptions write it; a ValueError if impossible."""

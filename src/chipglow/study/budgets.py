@@ -1,7 +1,8 @@
 """The uncertainty budget of a study: of the error of single readings, scene included."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final
@@ -26,7 +27,7 @@ from chipglow.analysis.single import (
 from chipglow.camera import Camera, Measurement
 from chipglow.io import open_scene
 from chipglow.laboratory.emissivity import RegionTemperatures
-from chipglow.quantities import Array, changed, setting_at
+from chipglow.quantities import Array, changed
 from chipglow.quantities.units import LENGTH
 from chipglow.scene import Scene
 from chipglow.study.fitting import fit, surfaces_on
@@ -34,19 +35,22 @@ from chipglow.study.running import Progress, cut, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes
-from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget
-from chipglow.uncertainty.budget import LEAST_TRIALS, check_trials
+from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget, first_order
+from chipglow.uncertainty.budget import VALIDATED, check_numbers
 from chipglow.uncertainty.surrogate import Surrogate
 
 SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 """Groups of inputs, unless the study names others."""
 
 _SURROGATE: Final = "scene settings between the cut ones"
-_SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-out scenes"}
-"""Sources of the inputs that the study does not state, by distribution."""
+_EXTREME: Final = 1e-6
+"""Probability of the values beyond those that are tried before anything is computed."""
 
 _ALIKE: Final = 0.01
 """Relative difference of an image's band and pitch from the study's that is accepted."""
+
+_SCENES: Final = 16
+"""Scenes to cut, unless stated."""
 
 _NOMINAL_DRAWS: Final = 32
 """Draws of the random inputs over which the error of a cut scene is a mean."""
@@ -94,22 +98,29 @@ class StudyBudget:
                 "monte_carlo_standard_uncertainty_K": trials.standard_uncertainty,
                 "low_K": trials.low,
                 "high_K": trials.high,
-                "validated": trials.validates(estimate),
+                "validated": self._validated(),
             }
         )
+
+    def _validated(self) -> list[str]:
+        """Return whether Monte Carlo validates the GUM's intervals, if its trials are enough."""
+        trials = self.budget.monte_carlo
+        agrees = trials.validates(self.budget.estimate, VALIDATED)
+        verdicts = np.where(trials.is_stable, np.where(agrees, "yes", "no"), "undecided")
+        return [str(one) for one in verdicts]
 
     def to_frame(self) -> pd.DataFrame:
         """Return the budget in the form of the GUM: a row for each reading and input."""
         inputs, estimate = self.budget.inputs, self.budget.estimate
         lines = {part.name: part for part in inputs.inputs}
+        freedoms = {one.cause.name: one.cause.degrees_of_freedom for one in estimate.components}
         rows = []
         for output, reading in enumerate(self.readings):
             total = estimate.standard_uncertainty[output] ** 2
             for name in estimate.names:
                 parts = [lines[one] for one in name.split(", ")]
                 one, is_set = parts[0], len(parts) == 1 and parts[0].has_slope
-                stated = self.study.uncertainty.inputs
-                sources = [stated[part.name].source for part in parts if part.name in stated]
+                sources = dict.fromkeys(self._source(part.name) for part in parts)
                 is_student = one.distribution == "normal" and np.isfinite(one.degrees_of_freedom)
                 contribution = float(estimate.contribution(name)[output])
                 slope = self.budget.sensitivity[inputs.names.index(one.name), output]
@@ -121,12 +132,12 @@ class StudyBudget:
                         "distribution": "t" if is_student else one.distribution,
                         "value": one.value if is_set else np.nan,
                         "standard_uncertainty": one.standard_uncertainty if is_set else np.nan,
-                        "unit": self._unit(one.name) if is_set else "",
+                        "unit": one.unit if is_set else "",
                         "sensitivity": slope if is_set else np.nan,
-                        "degrees_of_freedom": one.degrees_of_freedom,
+                        "degrees_of_freedom": freedoms[name],
                         "contribution_K": contribution,
                         "variance_percent": 100 * contribution**2 / total if total else 0.0,
-                        "source": "; ".join(dict.fromkeys(sources)) or _SOURCES[one.distribution],
+                        "source": "; ".join(sources),
                     }
                 )
         return pd.DataFrame(rows)
@@ -142,11 +153,10 @@ class StudyBudget:
         frame = (100 * self.indices()).to_dataframe(["reading", "group"]).reset_index()
         return frame.rename(columns=lambda name: name.replace("_order", "_order_percent"))
 
-    def _unit(self, path: str) -> str:
-        if path not in self.study.uncertainty.inputs:
-            return "1"
-        quantity = setting_at(self.study, path).parameter.quantity
-        return quantity.base if quantity else "1"
+    def _source(self, name: str) -> str:
+        if name in self.study.uncertainty.inputs:
+            return self.study.uncertainty.inputs[name].source or "not stated"
+        return "predictions of left-out scenes" if name == _SURROGATE else "drawn at random"
 
 
 def study_budget(
@@ -154,7 +164,7 @@ def study_budget(
     at: Sequence[str] = (),
     trials: int = 3000,
     samples: int = 256,
-    scenes: int = 16,
+    scenes: int = _SCENES,
     progress: Progress | None = None,
 ) -> StudyBudget:
     """Return the uncertainty budget of the errors of single readings.
@@ -182,16 +192,66 @@ def study_budget(
     Raises
     ------
     ValueError
-        If an input is no number of the study, or the scene is a file and a setting of the cut is
-        an input.
+        If an input is no number of the study or takes impossible values, or the scene is a file
+        and a setting of the cut is an input.
 
     Notes
     -----
+    A distribution that reaches beyond the limits of its setting is truncated there
+    (`chipglow.uncertainty.Limits`).
+
     The effect of the cut's settings is a surrogate: of the mean errors on scenes at a Latin
     hypercube of their distributions. Its cross-validated error is an input.
     """
     tell = progress or silent
-    check_trials(trials)
+    check_numbers(trials, samples)
+    with _prepared(study, at, scenes, progress) as ready:
+        generator = np.random.default_rng(study.seed)
+        found = budget(ready.model, ready.inputs, generator, trials, samples, progress=tell)
+        notes = ready.doubts(found.monte_carlo.mean)
+    names, places = ready.readings.names, ready.readings.places
+    return StudyBudget(names, places, found, study, notes, ready.surrogates)
+
+
+@dataclass(frozen=True, eq=False)
+class _Ready:
+    """A study's inputs and the function of them, before the propagation."""
+
+    readings: SingleReadings
+    inputs: Inputs
+    read: Callable[[Array], Array]
+    surrogates: Mapping[str, Surrogate]
+    notes: Notes
+
+    @property
+    def model(self) -> Callable[[Array], Array]:
+        """The function from values of the inputs to the errors of the readings in K."""
+        return _model(self.read, self.inputs.inputs, list(self.surrogates.values()))
+
+    def doubts(self, means: Array) -> Notes:
+        """Return the notes with warnings of readings without a temperature; means of errors."""
+        names = self.readings.names
+        middle = self.inputs.at(np.full((1, len(self.inputs)), 0.5))
+        outside = self.read(middle)[0, :, BELOW:]
+        doubts = [
+            text
+            for name, parts in zip(names, outside.tolist(), strict=True)
+            for text in outside_warnings(name, *parts)
+        ]
+        doubts += [
+            f"{name}: in some draws the place has no pixel, or is not in the image."
+            for name, value in zip(names, means, strict=True)
+            if not np.isfinite(value)
+        ]
+        return self.notes + Notes(warnings=doubts)
+
+
+@contextmanager
+def _prepared(
+    study: Study, at: Sequence[str], scenes: int, progress: Progress | None
+) -> Iterator[_Ready]:
+    """Yield the inputs of a study and the function of them, all that can be checked checked."""
+    tell = progress or silent
     stated = study.uncertainty.build(study)
     is_cut = [one.name.startswith("cutting.") for one in stated.inputs]
     if any(is_cut) and study.scene is not None:
@@ -199,6 +259,7 @@ def study_budget(
             f"uncertainty.inputs: {stated.names[is_cut.index(True)]}: the scene is a file, "
             "expected a study that cuts (without scene)"
         )
+    check_draws(study, stated)
     with fitted_study(study, progress, False) as fitted:
         readings = readings_of(study, fitted.scene, at, tell)
         inputs = [
@@ -206,34 +267,32 @@ def study_budget(
         ]
         groups = {EXPOSURE: SCENE, TEXTURE: SURFACE}
         inputs += [Input(name, group=groups.get(name, CAMERA)) for name in readings.random]
-        surrogates, notes = dict[str, Surrogate](), fitted.notes
+        surrogates, notes = dict[str, Surrogate](), fitted.notes + Notes(stated.truncated)
         if any(is_cut):
             surrogates, lost = _surrogates(study, stated, scenes, readings.names, at, tell)
             notes = notes + lost
             inputs.append(Input(_SURROGATE, 0.0, 1.0, "normal", group=SCENE))
         known = Inputs(inputs, stated.correlations)
         read = reader(study, fitted.scene, readings, known.names)
-        model = _model(read, inputs, list(surrogates.values()))
-        generator = np.random.default_rng(study.seed)
-        found = budget(model, known, generator, trials, samples, progress=tell)
-        outside = read(known.at(np.full((1, len(known)), 0.5)))[0, :, BELOW:]
-    doubts = [
-        text
-        for name, parts in zip(readings.names, outside.tolist(), strict=True)
-        for text in outside_warnings(name, *parts)
-    ]
-    doubts += [
-        f"{name}: in some draws the place has no pixel, or is not in the image."
-        for name, value in zip(readings.names, found.monte_carlo.mean, strict=True)
-        if not np.isfinite(value)
-    ]
-    notes = notes + Notes(warnings=doubts)
-    return StudyBudget(readings.names, readings.places, found, study, notes, surrogates)
+        yield _Ready(readings, known, read, surrogates, notes)
+
+
+def check_draws(study: Study, inputs: Inputs) -> None:
+    """Raise a ValueError if an input takes values with which the study is impossible.
+
+    Limits of single settings truncate the distributions; here settings contradict each other.
+    """
+    stated = study.stated()
+    for one in [part for part in inputs.inputs if part.name in study.uncertainty.inputs]:
+        ends = one.at(np.array([_EXTREME, 1 - _EXTREME])).tolist()
+        name = one.name.partition(".")[0]
+        for value in one.values or ends:
+            _section(getattr(study, name), f"{name}.", {one.name: value}, stated.get(name))
 
 
 def corrected_temperatures(
     measured: RegionTemperatures, image: Measurement, study: Study, progress: Progress | None = None
-) -> tuple[dict[str, Estimate], StudyBudget]:
+) -> tuple[dict[str, Estimate], Notes]:
     """Correct measured temperatures by the errors of a study of the same measurement.
 
     The error is that against the mean radiance of a place (``reference: mean``).
@@ -254,8 +313,8 @@ def corrected_temperatures(
     estimates : dict
         Mean temperature of each region in K, with the components of both budgets. The study's noise
         is left out: the measurement states its own.
-    result : StudyBudget
-        The budget of the errors.
+    notes : Notes
+        Assumptions and warnings of the budget of the errors, to first order.
 
     Raises
     ------
@@ -273,13 +332,15 @@ def corrected_temperatures(
             raise ValueError("{}: {} in the image, {} in the study".format(name, *texts))
     study = changed(study, {"analysis.reference": "mean"})
     rows = {row.name: row for row in measured.rows}
-    result = study_budget(study, tuple(rows), LEAST_TRIALS, 2, progress=progress)
+    with _prepared(study, tuple(rows), _SCENES, progress) as ready:
+        errors, _ = first_order(ready.model, ready.inputs, np.random.default_rng(study.seed))
+        notes = ready.doubts(errors.values)
     estimates = {}
     for name, row in rows.items():
-        names = zip(result.readings, result.places, strict=True)
+        names = zip(ready.readings.names, ready.readings.places, strict=True)
         number = next(n for n, known in enumerate(names) if name in known)
-        estimates[name] = row.estimate - row.gain * result.budget.estimate[number].without(NOISE)
-    return estimates, result
+        estimates[name] = row.estimate - row.gain * errors[number].without(NOISE)
+    return estimates, notes
 
 
 def errors_of(numbers: Array) -> Array:
@@ -287,9 +348,15 @@ def errors_of(numbers: Array) -> Array:
     return np.asarray(numbers[..., MEASURED] - numbers[..., REFERENCE])
 
 
-def readings_of(study: Study, scene: Scene, at: Sequence[str], tell: Progress) -> SingleReadings:
+def readings_of(
+    study: Study,
+    scene: Scene,
+    at: Sequence[str],
+    tell: Progress = silent,
+    longest: float | None = None,
+) -> SingleReadings:
     """Return the readings of single exposures of a scene by a study's camera."""
-    return SingleReadings(scene, *_seen(study, scene), study.plan, at, tell)
+    return SingleReadings(scene, *_seen(study, scene), study.plan, at, tell, longest)
 
 
 def _seen(
@@ -315,7 +382,7 @@ def _section(
     except ValueError as reason:
         raise ValueError(
             f"uncertainty.inputs: a draw is impossible: {prefix}{reason}; state a smaller or a "
-            "bounded uncertainty"
+            "bounded uncertainty (half_width)"
         ) from None
 
 
@@ -386,7 +453,7 @@ def _surrogates(
         one = changed(study, {stated.names[i]: float(value[i]) for i in rows})
         scene = fit(one, open_scene(cut(one))).scene
         try:
-            readings = readings_of(one, scene, at, silent)
+            readings = readings_of(one, scene, at)
         except ValueError:  # the scene shows no shear band or no contact
             continue
         surfaces, camera = _seen(one, scene)

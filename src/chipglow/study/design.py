@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from chipglow.analysis.single import BELOW, RANDOM, SATURATED
 from chipglow.quantities import Array, Brief, setting_at
 from chipglow.scene import Scene
-from chipglow.study.budgets import errors_of, reader, readings_of
+from chipglow.study.budgets import check_draws, errors_of, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.study.sweeps import Method, axis, in_si, point_text, points_of, studies_at
@@ -154,6 +154,9 @@ def design(
 
     Notes
     -----
+    All settings see the same moments, the middles of exposures of the longest integration time that
+    the scene allows, with the same draws. Distributions are truncated as in `study_budget`.
+
     Successive halving (Karnin et al., 2013) by quarters: all settings have the same few draws, the
     first of a Sobol sequence; the best quarter (4 or more, and the study's own) has four times as
     many, and so on. The Pareto front passes first, then the sum of bias and uncertainty decides.
@@ -184,7 +187,7 @@ def design(
                 tell(f"round {number + 1} of {len(counts)}", done / len(kept))
                 search.extend(one, count)
             tell(f"round {number + 1} of {len(counts)}", 1.0)
-        notes = fitted.notes
+        notes = fitted.notes + Notes(_inputs(study).truncated)
     if any(path.startswith("cutting.") for path in study.uncertainty.inputs):
         notes = notes + Notes(["The scene is exact: uncertain settings of the cut are left out."])
     return search.result([settings[n] for n in unique], below, saturated, notes)
@@ -201,6 +204,7 @@ class _Search:
         self.reasons = {n: one for n, one in enumerate(self.studies) if isinstance(one, str)}
         self.names: tuple[str, ...] = ()
         self.numbers: dict[int, Array] = {}
+        self.longest = self._longest()
 
     def extend(self, number: int, draws: int) -> None:
         """Read at a setting until it has this many draws."""
@@ -208,19 +212,38 @@ class _Search:
         if isinstance(study, str):
             return
         try:
-            readings = readings_of(study, self.scene, self.at, silent)
             inputs = _inputs(study)
+            check_draws(study, inputs)
+            readings = readings_of(study, self.scene, self.at, longest=self.longest)
+            earlier = self.numbers.get(number, np.zeros((0, len(readings.names), SATURATED + 1)))
+            sequence = qmc.Sobol(len(inputs), seed=np.random.default_rng(self.seed))
+            numbers = sequence.random_base2((draws - 1).bit_length())
+            rows = inputs.at(numbers[len(earlier) : draws])
             read = reader(study, self.scene, readings, inputs.names)
+            self.numbers[number] = np.concatenate([earlier, read(rows)])
         except ValueError as error:
             if not number:  # the study itself
                 raise
             self.reasons[number] = f"{self.labels[number]}: {error}"
             return
         self.names = readings.names
-        earlier = self.numbers.get(number, np.zeros((0, len(self.names), SATURATED + 1)))
-        sequence = qmc.Sobol(len(inputs), seed=np.random.default_rng(self.seed))
-        rows = inputs.at(sequence.random(draws)[len(earlier) :])
-        self.numbers[number] = np.concatenate([earlier, read(rows)])
+
+    def _longest(self) -> float | None:
+        """Return the longest integration time for which the scene shows all places."""
+        own, *others = self.studies
+        if isinstance(own, str):
+            return None
+        names = readings_of(own, self.scene, self.at).names
+        times = {one.camera.integration_time for one in others if not isinstance(one, str)}
+        for time in sorted(times, reverse=True):
+            if time <= own.camera.integration_time:
+                break
+            try:
+                if readings_of(own, self.scene, self.at, longest=time).names == names:
+                    return time
+            except ValueError:  # the scene is shorter
+                continue
+        return own.camera.integration_time
 
     def kept(self, count: int, below: float, saturated: float) -> list[int]:
         """Return the numbers of the best settings, and the study's own; at first all."""
@@ -261,7 +284,7 @@ def _inputs(study: Study) -> Inputs:
     stated = study.uncertainty.build(study)
     optical = [one for one in stated.inputs if not one.name.startswith("cutting.")]
     names = {one.name for one in optical}
-    pairs = {pair: value for pair, value in stated.correlations.items() if names.issuperset(pair)}
+    pairs = [pair for pair in stated.correlations if names.issuperset(pair[:2])]
     return Inputs([*optical, *map(Input, RANDOM)], pairs)
 
 

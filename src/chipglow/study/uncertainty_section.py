@@ -6,8 +6,10 @@ from statistics import pstdev
 from typing import Annotated, Any, Final
 
 from chipglow.quantities import Parameter, Part, setting_at
+from chipglow.quantities.units import is_bare_number
 from chipglow.uncertainty import Input, Inputs
 from chipglow.uncertainty.component import HALF_WIDTHS, Distribution
+from chipglow.uncertainty.inputs import InputDistribution
 
 _SECTIONS: Final = ("camera", "surface", "cutting")
 
@@ -51,6 +53,15 @@ class InputSection(Part):
             )
         if self.values and self.distribution:
             raise ValueError("distribution: cannot be combined with values")
+        if self.degrees_of_freedom and self.distribution_used != "normal":
+            raise ValueError("degrees_of_freedom: requires a standard uncertainty that is normal")
+
+    @property
+    def distribution_used(self) -> InputDistribution:
+        """Distribution; if it is not stated, normal, rectangular or discrete."""
+        if self.values:
+            return "discrete"
+        return self.distribution or ("normal" if self.half_width is None else "rectangular")
 
 
 @dataclass(frozen=True)
@@ -94,40 +105,56 @@ class UncertaintySection(Part):
             try:
                 built.append(_input(path, one, float(setting.value), setting.parameter))
             except ValueError as error:
-                raise ValueError(f"uncertainty.inputs: {path}: {error}") from None
+                text = str(error).removeprefix(f"{path}: ")
+                raise ValueError(f"uncertainty.inputs: {path}: {text}") from None
         try:
-            return Inputs(built, {(a, b): value for a, b, value in self.correlations})
+            return Inputs(built, self.correlations)
         except ValueError as error:
             raise ValueError(f"uncertainty.{error}") from None
 
 
 def _input(path: str, one: InputSection, value: float, parameter: Parameter) -> Input:
-    given: dict[str, Any] = {"name": path, "value": value, "group": one.group or path.split(".")[0]}
+    given: dict[str, Any] = {
+        "name": path,
+        "value": value,
+        "distribution": one.distribution_used,
+        "group": one.group or path.split(".")[0],
+        "unit": parameter.quantity.base if parameter.quantity else "1",
+    }
     if one.values:
         values = tuple(parameter.number(each) for each in one.values)
-        return Input(
-            **given, standard_uncertainty=pstdev(values), distribution="discrete", values=values
-        )
-    distribution = one.distribution or ("normal" if one.half_width is None else "rectangular")
+        return Input(**given, standard_uncertainty=pstdev(values), values=values)
     stated = one.standard if one.half_width is None else one.half_width
     width = _size(stated, value, parameter)
+    if one.half_width is not None:
+        width /= HALF_WIDTHS[one.distribution_used]
+    low, high = parameter.extent
+    freedom = one.degrees_of_freedom or inf
     return Input(
-        **given,
-        standard_uncertainty=width if one.half_width is None else width / HALF_WIDTHS[distribution],
-        distribution=distribution,
-        degrees_of_freedom=one.degrees_of_freedom or inf,
+        **given, standard_uncertainty=width, degrees_of_freedom=freedom, low=low, high=high
     )
 
 
 def _size(stated: object, value: float, parameter: Parameter) -> float:
     """Return a positive width in SI, of a text in the setting's unit or relative to its value."""
-    text = str(stated).strip()
+    text, quantity = str(stated).strip(), parameter.quantity
     if text.endswith("%"):
-        size = abs(value) * float(text[:-1]) / 100
-    elif parameter.quantity is not None:
-        size = replace(parameter.quantity, positive=False, is_difference=True).parse(stated)
+        if quantity is not None and quantity.base == "K" and not quantity.is_difference:
+            raise ValueError(
+                f"{text!r} of a temperature depends on its unit, expected a difference such as 2 K"
+            )
+        size = abs(value) * _number(text[:-1], text, "a percentage such as 3 %") / 100
+    elif quantity is not None:
+        size = replace(quantity, positive=False, is_difference=True).parse(stated)
     else:
-        size = float(text)
+        size = _number(text, text, "a number without a unit, or a percentage such as 3 %")
     if not 0 < size < inf:
-        raise ValueError(f"{text!r}, expected more than 0")
+        zero = f" of {value:g}" if text.endswith("%") and not value else ""
+        raise ValueError(f"{text!r}{zero}, expected more than 0")
     return size
+
+
+def _number(text: str, whole: str, expected: str) -> float:
+    if not is_bare_number(text):
+        raise ValueError(f"{whole!r}, expected {expected}")
+    return float(text.replace("−", "-"))

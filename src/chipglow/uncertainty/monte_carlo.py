@@ -1,20 +1,36 @@
 """Propagation of distributions by Monte Carlo, which validates the propagation to first order."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtri, stdtrit
 
 from chipglow.quantities import Array, Brief
 from chipglow.uncertainty.draws import draw
 from chipglow.uncertainty.estimate import Estimate, as_estimate
+from chipglow.uncertainty.limits import Limits
 
 _BLOCK: Final = 10_000
-"""Smallest number of trials between two checks of stability (JCGM 101:2008, 7.9.4)."""
+"""Trials of a block (JCGM 101:2008, 7.9.4)."""
+
+_BLOCKS: Final = 20
+"""Blocks from whose scatter the number of trials follows."""
+
+_SUMMARIES: Final = 4
+"""Results that are to be stable together: mean, standard uncertainty and both ends."""
+
+_CONFIDENCE: Final = 0.95
+
+VALIDATED: Final = 0.05
+"""Largest difference of the ends of two intervals that agree, in standard uncertainties.
+
+Half a unit in the second significant digit is 0.5 % to 5 % of a number: the verdict would jump
+between 9.9 and 10.
+"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,12 +45,15 @@ class MonteCarlo(Brief):
         Ends of the probabilistically symmetric coverage interval.
     level : float
         Coverage probability of the interval.
-    digits : int
-        Significant digits of the standard uncertainty to which the results are stable.
+    tolerance : float
+        Numerical tolerance of the results, in standard uncertainties.
     trials : int
         Number of trials.
-    is_stable : bool
-        Whether the results are stable; if not, the limit of the number of trials was reached.
+    is_stable : ndarray of bool
+        Where all four results are within the tolerance, with 95 % confidence; elsewhere they are
+        not finite, or the limit of the number of trials was reached.
+    truncated : tuple of str
+        Sentences on the inputs whose distributions reach beyond their limits.
     """
 
     mean: Array
@@ -42,25 +61,19 @@ class MonteCarlo(Brief):
     low: Array
     high: Array
     level: float
-    digits: int
+    tolerance: float
     trials: int
-    is_stable: bool
+    is_stable: NDArray[np.bool_]
+    truncated: tuple[str, ...] = ()
 
-    def validates(self, estimate: Estimate) -> NDArray[np.bool_]:
+    def validates(self, estimate: Estimate, within: float = VALIDATED) -> NDArray[np.bool_]:
         """Return where the interval of an estimate to first order agrees (JCGM 101:2008, 8.1).
 
-        The ends must agree to a digit less than the trials are stable (8.2), and to one at least.
+        Both ends must agree `within` this part of the standard uncertainty.
         """
         reach = estimate.expanded_uncertainty(self.level)
-        tolerance = numerical_tolerance(estimate.standard_uncertainty, max(self.digits - 1, 1))
         ends = (estimate.values - reach - self.low, estimate.values + reach - self.high)
-        return np.asarray(np.maximum(*np.abs(ends)) <= tolerance)
-
-
-def numerical_tolerance(standard_uncertainty: Array, digits: int) -> Array:
-    """Return half a unit in the last of the significant digits (JCGM 101:2008, 7.9.2)."""
-    size = np.maximum(np.abs(standard_uncertainty), np.finfo(float).tiny)
-    return np.asarray(0.5 * 10.0 ** (np.floor(np.log10(size)) - digits + 1))
+        return np.asarray(np.maximum(*np.abs(ends)) <= within * estimate.standard_uncertainty)
 
 
 def monte_carlo(
@@ -68,8 +81,9 @@ def monte_carlo(
     *inputs: Any,
     generator: np.random.Generator,
     level: float = 0.95,
-    digits: int = 2,
+    tolerance: float = 0.01,
     most: int = 10_000_000,
+    limits: Sequence[Limits | None] = (),
 ) -> MonteCarlo:
     """Return the distribution of a function of estimates by an adaptive number of trials.
 
@@ -83,50 +97,112 @@ def monte_carlo(
         Source of the draws.
     level : float
         Coverage probability.
-    digits : int
-        Significant digits of the standard uncertainty to which the results must be stable.
+    tolerance : float
+        Largest error of the results by the draws, in standard uncertainties: a fifth of that of
+        `MonteCarlo.validates` (JCGM 101:2008, 8.2).
     most : int
         Largest number of trials.
+    limits : sequence of Limits or None
+        Physical limits of the inputs, at which their distributions are truncated.
+
+    Raises
+    ------
+    ValueError
+        If more than half of the draws of an input are outside its limits.
 
     Notes
     -----
-    JCGM 101:2008, 7.9.4: blocks of trials are added until twice the standard deviation of the mean
-    over the blocks is under the numerical tolerance for mean, standard uncertainty and both ends of
-    the interval.
+    From the scatter of 20 blocks of trials follows the number of trials with which mean, standard
+    uncertainty and both ends of the interval are all within the tolerance, with 95 % confidence
+    (Wuebbeler et al., Metrologia 47 (2010) 317: with more and more blocks, as in JCGM 101:2008,
+    7.9.4, chance ends the trials too early).
     """
     estimates = [as_estimate(one) for one in inputs]
     freedoms = (part.cause.degrees_of_freedom for one in estimates for part in one.components)
+    source = _Truncated(estimates, generator, limits)
 
     def sample(count: int) -> Array:
-        return np.asarray(function(*draw(estimates, count, generator, True)), np.float64)
+        return np.asarray(function(*source.draw(count)), np.float64)
 
     block = max(ceil(100 / (1 - level)), _BLOCK)
-    return adaptive(sample, level, digits, most, block, min(freedoms, default=np.inf) > 2)
+    has_variance = min(freedoms, default=np.inf) > 2
+    found = adaptive(sample, level, tolerance, most, block, has_variance)
+    return replace(found, truncated=source.stated())
+
+
+class _Truncated:
+    """Draws of estimates within limits: those with a value outside are drawn again."""
+
+    def __init__(
+        self,
+        estimates: Sequence[Estimate],
+        generator: np.random.Generator,
+        limits: Sequence[Limits | None],
+    ) -> None:
+        self.estimates, self.generator = estimates, generator
+        self.limits = {number: one for number, one in enumerate(limits) if one is not None}
+        self.count = 0
+        self.outside = {number: np.zeros(2) for number in self.limits}
+
+    def draw(self, count: int) -> list[Array]:
+        """Return values of each estimate, shape (count, ...)."""
+        parts: list[list[Array]] = []
+        lacking = count
+        while lacking:
+            drawn = draw(self.estimates, max(lacking, _BLOCKS), self.generator, True)
+            kept = self._kept(drawn)
+            parts.append([one[kept][:lacking] for one in drawn])
+            lacking -= len(parts[-1][0])
+        return [np.concatenate(one) for one in zip(*parts, strict=True)]
+
+    def stated(self) -> tuple[str, ...]:
+        """Return sentences on the inputs that are truncated."""
+        return tuple(
+            text
+            for number, one in self.limits.items()
+            for text in one.stated(*self.outside[number] / self.count)
+        )
+
+    def _kept(self, drawn: Sequence[Array]) -> NDArray[np.bool_]:
+        """Return which draws are within all limits; a ValueError if most are outside."""
+        kept = np.ones(len(drawn[0]), np.bool_)
+        self.count += len(kept)
+        for number, one in self.limits.items():
+            values = drawn[number].reshape(len(kept), -1)
+            outside = np.stack([values < one.low, values > one.high]).any(axis=2)
+            self.outside[number] += outside.sum(axis=1)
+            if self.count >= _BLOCK:
+                one.check(*self.outside[number] / self.count)
+            kept &= ~outside.any(axis=0)
+        return kept
 
 
 def adaptive(
     sample: Callable[[int], Array],
     level: float,
-    digits: int,
+    tolerance: float,
     most: int,
     block: int,
     has_variance: bool = True,
     progress: Callable[[float], None] = lambda part: None,
 ) -> MonteCarlo:
     """Return the distribution of samples, as `monte_carlo`; `sample` takes a number of trials."""
+    block = max(min(block, most // _BLOCKS), 1)
     ends = ((1 - level) / 2, (1 + level) / 2)
     values: list[Array] = []
     blocks: list[Array] = []
-    is_stable = False
-    while not is_stable and (len(values) + 1) * block <= most:
-        progress(len(values) * block / most)
+    needed = np.array(_BLOCKS)
+    while len(blocks) < (last := min(int(needed.max()), most // block)):
+        progress(len(blocks) / last)
         values.append(sample(block))
         blocks.append(_summary(values[-1], ends, has_variance))
-        if len(blocks) > 1:
-            is_stable = _is_stable(np.array(blocks), digits, level)
+        if len(blocks) == _BLOCKS:
+            needed = _needed(np.array(blocks), tolerance, level)
     progress(1.0)
     mean, deviation, low, high = _summary(np.concatenate(values), ends, has_variance)
-    return MonteCarlo(mean, deviation, low, high, level, digits, block * len(values), is_stable)
+    is_stable = (needed > 0) & (needed <= len(blocks))
+    trials = block * len(blocks)
+    return MonteCarlo(mean, deviation, low, high, level, tolerance, trials, is_stable)
 
 
 def _summary(values: Array, ends: tuple[float, float], has_variance: bool) -> Array:
@@ -137,10 +213,18 @@ def _summary(values: Array, ends: tuple[float, float], has_variance: bool) -> Ar
     return np.concatenate([moments, np.quantile(values, ends, axis=0)])
 
 
-def _is_stable(blocks: Array, digits: int, level: float) -> bool:
-    """Return whether the summaries of the blocks, those that are finite, scatter little enough."""
+def _needed(blocks: Array, tolerance: float, level: float) -> NDArray[np.int64]:
+    """Return the number of blocks with which results are within a tolerance; 0 if unknown.
+
+    The first stage of Stein's procedure; a mean and a standard deviation may be infinite.
+    """
     low, high = blocks[:, 2:].mean(axis=0)
-    tolerance = numerical_tolerance((high - low) / (2 * ndtri((1 + level) / 2)), digits)
-    with np.errstate(invalid="ignore"):
-        scatter = 2 * blocks.std(axis=0, ddof=1) / np.sqrt(len(blocks))
-    return bool(((scatter <= tolerance) | ~np.isfinite(scatter)).all())
+    size = tolerance * (high - low) / (2 * ndtri((1 + level) / 2))
+    # Bonferroni's inequality: all results together have the confidence.
+    factor = stdtrit(len(blocks) - 1, 1 - (1 - _CONFIDENCE) / (2 * _SUMMARIES))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scatter = blocks.std(axis=0, ddof=1)
+        needed = np.where(scatter == 0, 0.0, (factor * scatter / size) ** 2)
+    needed[:2] = np.where(np.isfinite(needed[:2]), needed[:2], 0.0)
+    largest = np.maximum(needed.max(axis=0), len(blocks))
+    return np.where(np.isfinite(largest), np.ceil(largest), 0).astype(np.int64)

@@ -31,7 +31,7 @@ from chipglow.quantities.units import HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes
-from chipglow.uncertainty import Estimate, MonteCarlo, monte_carlo, propagate
+from chipglow.uncertainty import Estimate, Limits, MonteCarlo, monte_carlo, propagate
 
 TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", "repeatability", "noise")
 """Lines of the budget of a true temperature."""
@@ -45,6 +45,7 @@ _STEP: Final = 0.5
 _STEPS: Final = 200
 _ROUNDS: Final = 4
 _SEED: Final = 2010
+_LIMITS: Final = (Limits("emissivity", 0.0, 1.0), Limits("radiance", 0.0), Limits("reflected", 0.0))
 
 
 def reflected_temperature(
@@ -87,7 +88,8 @@ class TrueTemperature(Brief):
     @cached_property
     def distribution(self) -> MonteCarlo:
         """Distribution of the true temperature by the model itself (JCGM 101:2008)."""
-        return monte_carlo(self.model, *self.inputs, generator=np.random.default_rng(_SEED))
+        generator = np.random.default_rng(_SEED)
+        return monte_carlo(self.model, *self.inputs, generator=generator, limits=_LIMITS)
 
 
 def true_temperature(
@@ -250,6 +252,7 @@ def true_temperatures(
     ]
     warnings += [warning for row in rows for warning in row.estimate.warnings]
     warnings += [text for row, line in zip(rows, lines, strict=True) for text in _far(row, line)]
+    warnings += [f"{row.name}: {text}" for row in rows for text in row.distribution.truncated]
     warnings += [text for row in rows for text in _unvalidated(row)]
     unknown_drift = drift is None and len(measurements) == 1
     unknown_drift |= any(
