@@ -16,25 +16,22 @@ from chipglow.analysis.single import (
     BELOW,
     EXPOSURE,
     MEASURED,
-    NOISE,
     RANDOM,
     REFERENCE,
     TEXTURE,
     SingleReadings,
 )
-from chipglow.camera import Camera, Measurement
+from chipglow.camera import Camera
 from chipglow.io import open_scene
-from chipglow.laboratory.emissivity import RegionTemperatures
 from chipglow.quantities import Array, changed, setting_at
-from chipglow.quantities.units import LENGTH
 from chipglow.scene import Scene
 from chipglow.study.fitting import fit, surfaces_on
 from chipglow.study.running import Progress, cut, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.surface import Surface
 from chipglow.text import Notes
-from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget
-from chipglow.uncertainty.budget import LEAST_TRIALS, check_trials
+from chipglow.uncertainty import Budget, Input, Inputs, budget
+from chipglow.uncertainty.budget import check_trials
 from chipglow.uncertainty.surrogate import Surrogate
 
 SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
@@ -46,9 +43,6 @@ _SOURCES: Final = {"random": "drawn at random", "normal": "predictions of left-o
 
 _MOST_BELOW: Final = 0.05
 """Fraction of a place below the lower range limit without a warning."""
-
-_ALIKE: Final = 0.01
-"""Relative difference of an image's band and pitch from the study's that is accepted."""
 
 _NOMINAL_DRAWS: Final = 32
 """Draws of the random inputs over which the error of a cut scene is a mean."""
@@ -232,57 +226,6 @@ def study_budget(
     ]
     notes = notes + Notes(warnings=doubts)
     return StudyBudget(readings.names, readings.places, found, study, notes, surrogates)
-
-
-def corrected_temperatures(
-    measured: RegionTemperatures, image: Measurement, study: Study, progress: Progress | None = None
-) -> tuple[dict[str, Estimate], StudyBudget]:
-    """Correct measured temperatures by the errors of a study of the same measurement.
-
-    The error is that against the mean radiance of a place (``reference: mean``).
-
-    Parameters
-    ----------
-    measured : RegionTemperatures
-        True temperatures by `true_temperatures`; the camera's resolution is not in them.
-    image : Measurement
-        The image, whose band and pixels must be those of the study's camera.
-    study : Study
-        The study; a region is corrected by the first reading of the place of its name.
-    progress : callable, optional
-        Called with the current step and its completed fraction, 0 to 1.
-
-    Returns
-    -------
-    estimates : dict
-        Mean temperature of each region in K, with the components of both budgets. The study's noise
-        is left out: the measurement states its own.
-    result : StudyBudget
-        The budget of the errors.
-
-    Raises
-    ------
-    ValueError
-        If a region has not the name of a place, or band or pitch differ from the study's.
-    """
-    camera = study.camera.build(study.seed)
-    for name, found, stated in (
-        ("lower limit of the band", image.band.lower, camera.band.lower),
-        ("upper limit of the band", image.band.upper, camera.band.upper),
-        ("pitch", image.raster.spacing, camera.pitch),
-    ):
-        if abs(found / stated - 1.0) > _ALIKE:
-            texts = LENGTH.text(found), LENGTH.text(stated)
-            raise ValueError("{}: {} in the image, {} in the study".format(name, *texts))
-    study = changed(study, {"analysis.reference": "mean"})
-    rows = {row.name: row for row in measured.rows}
-    result = study_budget(study, tuple(rows), LEAST_TRIALS, 2, progress=progress)
-    estimates = {}
-    for name, row in rows.items():
-        names = zip(result.readings, result.places, strict=True)
-        number = next(n for n, known in enumerate(names) if name in known)
-        estimates[name] = row.estimate - row.gain * result.budget.estimate[number].without(NOISE)
-    return estimates, result
 
 
 def errors_of(numbers: Array) -> Array:

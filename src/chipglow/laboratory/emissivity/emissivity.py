@@ -401,7 +401,9 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     line = solve @ means
     freedom = means.size - 2
     residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
-    own = [reduce(Estimate.without, COMMON, one) for one in estimates]
+    # The region is the same at all temperatures, and so is its unevenness.
+    shared = (*COMMON, UNIFORMITY)
+    own = [reduce(Estimate.without, shared, one) for one in estimates]
     random = np.array([one.standard_uncertainty for one in own])
     if isfinite(residual):
         random = np.maximum(random, residual)
@@ -409,12 +411,13 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
         part.cause.identity for one in estimates for part in one.only(RANDOM).components
     )
     observed = Estimate(means).with_component(RANDOM, random, per_element=True, identity=identity)
-    for cause in COMMON:
+    for cause in shared:
         shift = np.array([one.effect(cause) for one in estimates])
         if cause == "reference":
             # An error of the temperature moves the points along the line too.
             shift = shift - line[1] * np.array([one.reference_uncertainty for one in heatings])
-        observed = observed.with_component(cause, shift, identity=ALL_IMAGES)
+        of = f"{areas[0].name} {cause}" if cause == UNIFORMITY else ALL_IMAGES
+        observed = observed.with_component(cause, shift, identity=of)
     if not isfinite(residual) and any("drift" in one.unevaluated for one in estimates):
         observed = observed.with_unevaluated("drift")
     warnings = (warning for one in estimates for warning in one.warnings)
