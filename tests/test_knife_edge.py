@@ -25,6 +25,7 @@ from synthetic_edge import (
 
 from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
 from chipglow.laboratory.psf import NoEdgeError, edge_image, knife_edge, psf_kernel
+from chipglow.laboratory.psf.linearity import asymmetry
 from chipglow.laboratory.psf.psf_models import (
     AnnularModel,
     DefocusedDiscModel,
@@ -406,3 +407,45 @@ def test_a_measurement_becomes_an_image():
     assert told.footprint == pytest.approx(0.9 * PITCH)
     assert told.notes.assumed[0] == "No pixel is saturated."
     assert "acts twice" in told.notes.assumed[1]
+
+
+def test_symmetric_edges_are_not_called_curved_and_a_known_curve_is():
+    """Of 30 standard normal numbers, one is beyond 4 with a probability of 0.2 %."""
+    edges = [GAUSSIAN, tailed_edge(8e-6, 0.2, 20e-6), disc_edge(12e-6)]
+    scores = []
+    for seed in range(10):
+        for edge in edges:
+            found = knife_edge([an_image(3.0 + seed, edge, 0.05, seed)])
+            scores.append(_asymmetry(found))
+    z = [one.value / one.standard_uncertainty for one in scores]
+    assert max(map(abs, z)) < 4
+    assert np.std(z) < 1.3
+    assert not any(one.is_clear for one in scores)
+    # E + q 4 E (1 − E): the curve is in part a shift of the edge, which takes away some of q.
+    fraction = edge_radiance(GAUSSIAN, 5.0, background=0.0, step=1.0)
+    curved = image_of(2.0 + 5.0 * (fraction + 0.1 * 4 * fraction * (1 - fraction)), 0.01)
+    found = _asymmetry(knife_edge([curved]))
+    assert found.is_clear
+    assert found.value == pytest.approx(0.1, rel=0.25)
+
+
+def _asymmetry(found):
+    response = found.best.response(0, found.edges[0].pixels)
+    return asymmetry(found.edges[0].curves, response, response.slope, found.edges[0].line_fwhm)
+
+
+def test_tails_of_a_model_that_does_not_fit_do_not_stop_the_kernel():
+    """A gamma leaves all models alike; the exponential tail of one reaches over 3.4 mm."""
+    radiance = edge_radiance(gaussian_edge(12e-6), 5.0, 48, background=0.1, step=0.8)
+    found = knife_edge([image_of(np.round(255 * radiance ** (1 / 2.2)))])
+    assert found.unexplained
+    kernel = psf_kernel(found)
+    assert kernel.weights.sum() == pytest.approx(1.0)
+    assert {part.cause.name for part in kernel.components} >= {"psf fit", "psf model"}
+
+
+def test_a_width_on_a_node_of_its_table_is_found():
+    """A tail of no light: the width is 50 of the table's steps, but for rounding."""
+    model = GaussianTailModel()
+    for fwhm in np.linspace(8e-6, 16e-6, 200):
+        assert model.fwhm(np.array([fwhm, 0.0, 0.72])) == pytest.approx(fwhm, rel=1e-9)

@@ -159,3 +159,34 @@ def test_the_fill_factor_of_a_cameras_file_is_taken(folder):
     sides = (6.0**2 - 3.6**2) * 8 * np.log(2) / 12
     assert small**2 - whole**2 == pytest.approx(sides, rel=0.1)
     assert "fill_factor" in psf(f"edge.npy {COUNTS} --set fill_factor=2", code=2)
+
+
+def write_gamma(gamma, noise=0.002, fwhm=12e-6):
+    """Counts of 8 bits of an edge from 0.1 to 0.9 of the range, as a video camera makes them."""
+    radiance = edge_radiance(gaussian_edge(fwhm), 5.0, 48, background=0.1, step=0.8)
+    radiance += np.random.default_rng(5).normal(0.0, noise, radiance.shape)
+    counts = np.round(255 * np.clip(radiance, 0.01, 1.0) ** (1 / gamma))
+    np.save("edge.npy", counts.astype(np.uint8)[None])
+
+
+@pytest.mark.parametrize(
+    ("gamma", "noise", "warning"),
+    [
+        (1.0, 0.002, ""),
+        (1.0, 0.01, ""),
+        (
+            2.2,
+            0.002,
+            "may not be linear in the radiance: the edge-spread function is not symmetric",
+        ),
+        (1.4, 0.002, "Counts with a gamma, an automatic contrast"),
+        (2.2, 0.04, "to show even a gamma of 2.2; set a calibration, or average more frames"),
+    ],
+)
+def test_a_gamma_is_told_by_the_edge_and_a_straight_line_is_not(folder, gamma, noise, warning):
+    write_gamma(gamma, noise)
+    output = " ".join(psf(f"edge.npy {COUNTS} --out psf.nc").split())
+    assert "Assumed: The counts are linear in the radiance, without a gamma" in output
+    assert warning in output
+    assert bool(warning) == ("linear in the radiance, but" in output or "may not be" in output)
+    assert MeasuredPSF.from_file("psf.nc").fwhm > 0

@@ -58,7 +58,6 @@ def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius
         [image(emissivity, celsius + CELSIUS)], WHOLE, em.EmissivityLine.constant(emissivity)
     )
     assert found.estimate.values == pytest.approx(celsius + CELSIUS, abs=1e-3)
-    assert found.mean_of_pixels == pytest.approx(found.estimate.values, abs=1e-6)
     assert found.estimate.standard_uncertainty == pytest.approx(0.0, abs=1e-9)
 
 

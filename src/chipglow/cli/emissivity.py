@@ -2,9 +2,10 @@
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from chipglow.cli import options as opt
+from chipglow.cli.batch import common_notes, for_each, load_measurements
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
 
     from chipglow.camera import Measurement
     from chipglow.laboratory import emissivity as lab
+    from chipglow.surface import Origin
     from chipglow.text import Notes
 
 
@@ -48,7 +50,6 @@ def emissivity(
     """Determine emissivity from images of an object of known temperature."""
     from chipglow.laboratory import emissivity as lab
     from chipglow.laboratory.emissivity.figure import draw_emissivity
-    from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_frame
 
     if len(reference) not in (1, len(images)):
@@ -68,7 +69,7 @@ def emissivity(
         for kelvins in (reference if len(reference) > 1 else reference * len(images))
     ]
     named = lab.load_regions(regions)
-    measurements = [load_measurement(image, settings or ()) for image in images]
+    measurements = load_measurements(images, settings or ())
     names = list(map(str, images))
     result = lab.determine_emissivities(measurements, heatings, named, names, metal)
     _print_tables(result)
@@ -123,7 +124,11 @@ def _print_study(result: "lab.RegionEmissivities", out: Path | None) -> None:
 
 def temperature(
     images: Annotated[
-        list[Path], opt.argument("IMAGE...", "Measurements of the object, taken as repetitions.")
+        list[Path],
+        opt.argument(
+            "IMAGE...",
+            "Measurements of the object, taken as repetitions or, by --each, one by one.",
+        ),
     ],
     regions: opt.RegionsFile,
     emissivity: Annotated[
@@ -155,6 +160,9 @@ def temperature(
     reflected_uncertainty: opt.ReflectedUncertainty = None,
     camera_uncertainty: opt.CameraUncertainty = None,
     drift: opt.Drift = None,
+    each: Annotated[
+        bool, opt.flag("--each", "Determine the temperatures of each image by itself.")
+    ] = False,
     study: Annotated[
         Path | None,
         opt.value(
@@ -170,33 +178,68 @@ def temperature(
     from chipglow.laboratory import emissivity as lab
     from chipglow.laboratory.measurement import load_calibration, load_measurement
     from chipglow.laboratory.result_file import write_frame
-    from chipglow.text import Notes
 
+    if each and study is not None:
+        raise ValueError("--each and --study cannot be combined: a study is of one measurement")
     named = lab.load_regions(regions)
     surroundings = None
     if reflected is not None or reflected_uncertainty is not None:
         surroundings = lab.reflected_temperature(reflected or 293.0, reflected_uncertainty or 0.0)
     fitted = None if calibration is None else load_calibration(calibration)
-    measurements = [load_measurement(image, settings or ()) for image in images]
     lines = _emissivities(emissivity, emissivity_uncertainty)
-    names = list(map(str, images))
-    result = lab.true_temperatures(
-        measurements, named, lines, surroundings, fitted, drift, names, camera_uncertainty
-    )
-    _print(result)
-    notes = sum((one.notes for one in measurements), result.notes)
-    if isinstance(lines, dict):
-        origin = lab.read_origin(emissivity)
-        doubts = [
-            text
-            for one in measurements
-            for text in origin.warnings(one.band, str(one.data.attrs.get("metal", "")))
-        ]
-        notes += Notes(warnings=list(dict.fromkeys(doubts)))
-    frame = result.to_frame()
-    if study is not None:
-        notes += _correct(result, measurements[0], frame, study)
+    origin = lab.read_origin(emissivity) if isinstance(lines, dict) else None
+
+    def found(
+        measurements: "list[Measurement]", names: list[str]
+    ) -> "tuple[lab.RegionTemperatures, Notes]":
+        result = lab.true_temperatures(
+            measurements, named, lines, surroundings, fitted, drift, names, camera_uncertainty
+        )
+        notes = sum((one.notes for one in measurements), result.notes)
+        return result, notes + _doubts(origin, measurements)
+
+    if each:
+        results = for_each(
+            images, lambda image: found([load_measurement(image, settings or ())], [str(image)])
+        )
+        frame = _each(results)
+        notes = common_notes({image: those for image, (_, those) in results.items()})
+    else:
+        measurements = load_measurements(images, settings or ())
+        result, notes = found(measurements, list(map(str, images)))
+        _print(result)
+        frame = result.to_frame()
+        if study is not None:
+            notes += _correct(result, measurements[0], frame, study)
     finish(notes, (table, partial(write_frame, frame)))
+
+
+def _doubts(origin: "Origin | None", measurements: "list[Measurement]") -> "Notes":
+    """Warn if emissivities are of another band or metal than the measurements."""
+    from chipglow.text import Notes
+
+    if origin is None:
+        return Notes()
+    doubts = [
+        text
+        for one in measurements
+        for text in origin.warnings(one.band, str(one.data.attrs.get("metal", "")))
+    ]
+    return Notes(warnings=list(dict.fromkeys(doubts)))
+
+
+def _each(results: "dict[Path, tuple[lab.RegionTemperatures, Notes]]") -> "pd.DataFrame":
+    """Print the temperatures of each image and return them, a row for each image and region."""
+    import pandas as pd
+
+    frames = []
+    for image, (result, _) in results.items():
+        frame = result.to_frame()
+        frame.insert(0, "image", str(image))
+        frames.append(frame)
+    whole = pd.concat(frames, ignore_index=True)
+    current().table("regions", _celsius(whole), {"image": "image"} | _TEMPERATURES)
+    return whole
 
 
 def _correct(
@@ -210,14 +253,26 @@ def _correct(
 
     screen = current()
     with progress_bars() as progress:
-        estimates, notes = corrected_temperatures(result, image, load_study(study), progress)
-    rows = list(estimates.values())
-    frame["corrected_temperature_K"] = [float(one.values) for one in rows]
-    frame["corrected_uncertainty_K"] = [float(one.standard_uncertainty) for one in rows]
-    frame["corrected_coverage_factor"] = [float(one.coverage_factor()) for one in rows]
-    frame["corrected_expanded_uncertainty_K"] = [float(one.expanded_uncertainty()) for one in rows]
+        corrected, notes = corrected_temperatures(result, image, load_study(study), progress)
+    rows = list(corrected.values())
+    estimates = {name: row.estimate for name, row in corrected.items()}
+    values = {
+        "temperature_K": [float(row.estimate.values) for row in rows],
+        "uncertainty_K": [float(row.estimate.standard_uncertainty) for row in rows],
+        "coverage_factor": [float(row.estimate.coverage_factor()) for row in rows],
+        "expanded_uncertainty_K": [float(row.estimate.expanded_uncertainty()) for row in rows],
+        "low_K": [float(row.distribution.low) for row in rows],
+        "high_K": [float(row.distribution.high) for row in rows],
+    }
+    for name, column in values.items():
+        frame[f"corrected_{name}"] = column
+    frame["simulated_radiance_temperature_K"] = [row.simulated for row in rows]
+    frame["residual_K"] = [row.residual for row in rows]
+    frame["residual_uncertainty_K"] = [row.residual_uncertainty for row in rows]
     shown = frame.assign(
         corrected_temperature_degC=frame.corrected_temperature_K - 273.15,
+        corrected_low_degC=frame.corrected_low_K - 273.15,
+        corrected_high_degC=frame.corrected_high_K - 273.15,
         correction_K=frame.corrected_temperature_K - frame.true_temperature_K,
     )
     columns = {
@@ -226,6 +281,9 @@ def _correct(
         "corrected ± u / °C": "corrected_temperature_degC ± corrected_uncertainty_K",
         "U 95 % / K": "corrected_expanded_uncertainty_K",
         "k": "corrected_coverage_factor",
+        "lower 95 % / °C": "corrected_low_degC",
+        "upper 95 % / °C": "corrected_high_degC",
+        "image - study ± u / K": "residual_K ± residual_uncertainty_K",
     }
     screen.heading("\nCorrected for blur, pixels and motion")
     screen.table("corrected", shown, columns)
@@ -259,20 +317,26 @@ def _print(result: "lab.RegionTemperatures") -> None:
     from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     screen, rows = current(), result.to_frame()
-    for name in ("radiance_temperature", "true_temperature", "low", "high"):
-        rows[f"{name}_degC"] = rows[f"{name}_K"] - 273.15
-    columns = {
-        "region": "region",
-        "pixels": "pixels",
-        "radiance temperature / °C": "radiance_temperature_degC",
-        "emissivity": "emissivity",
-        "true temperature ± u / °C": "true_temperature_degC ± standard_uncertainty_K",
-        "U 95 % / K": "expanded_uncertainty_K",
-        "k": "coverage_factor",
-        "lower 95 % / °C": "low_degC",
-        "upper 95 % / °C": "high_degC",
-    }
-    screen.table("regions", rows, columns)
+    screen.table("regions", _celsius(rows), _TEMPERATURES)
     screen.heading()
     parts = {cause: f"{cause}_uncertainty_K" for cause in TEMPERATURE_BUDGET}
     screen.table(None, rows, {"parts of u / K": "region"} | parts)
+
+
+def _celsius(rows: "pd.DataFrame") -> "pd.DataFrame":
+    names = ("radiance_temperature", "true_temperature", "low", "high")
+    return rows.assign(**{f"{name}_degC": rows[f"{name}_K"] - 273.15 for name in names})
+
+
+_TEMPERATURES: Final = {
+    "region": "region",
+    "pixels": "pixels",
+    "radiance temperature / °C": "radiance_temperature_degC",
+    "emissivity": "emissivity",
+    "true temperature ± u / °C": "true_temperature_degC ± standard_uncertainty_K",
+    "U 95 % / K": "expanded_uncertainty_K",
+    "k": "coverage_factor",
+    "lower 95 % / °C": "low_degC",
+    "upper 95 % / °C": "high_degC",
+}
+"""Columns of a table of true temperatures."""

@@ -122,6 +122,11 @@ def table(text: str) -> Any:
     return file(f"{text}, .csv or .nc.", ".csv", ".nc")
 
 
+def file_or_folder(text: str) -> Any:
+    """Return the option of a file to write, or of a folder for the results of several files."""
+    return typer.Option(metavar="FILE|DIR", help=text)
+
+
 def folder(text: str) -> Any:
     """Return the option of a results folder to write."""
     return typer.Option(metavar="DIR", help=text, file_okay=False, writable=True)
@@ -130,12 +135,12 @@ def folder(text: str) -> Any:
 def check_outputs(command: Callable[..., Any], values: Mapping[str, Any]) -> None:
     """Check everything that a command writes before it does anything."""
     outputs = _outputs(command)
-    inputs = list(_inputs([value for name, value in values.items() if name not in outputs]))
+    inputs = list(inputs_of([value for name, value in values.items() if name not in outputs]))
     for name, option in outputs.items():
         if values[name] is None:
             continue
         if option.file_okay:
-            _check_file(Path(values[name]), inputs)
+            check_file(Path(values[name]), inputs)
         else:
             _check_folder(Path(values[name]), inputs, values.get("force", False))
 
@@ -149,7 +154,7 @@ def _outputs(command: Callable[..., Any]) -> dict[str, Any]:
     }
 
 
-def _inputs(value: Any) -> Iterator[Path]:
+def inputs_of(value: Any) -> Iterator[Path]:
     """Existing files that values of parameters name, and those that these name if they are YAML."""
     from chipglow.text import read_yaml
 
@@ -167,12 +172,15 @@ def _existing(value: Any, folder: Path) -> Iterator[Path]:
         for one in value:
             yield from _existing(one, folder)
     elif isinstance(value, str | Path):
-        with suppress(OSError, ValueError):  # text that cannot be a name
-            if (folder / value).exists():
-                yield folder / value
+        # A setting such as flat_field.low=low.tif names a file too.
+        for name in (value, str(value).partition("=")[2]):
+            with suppress(OSError, ValueError):  # text that cannot be a name
+                if name and (folder / name).exists():
+                    yield folder / name
 
 
-def _check_file(path: Path, inputs: Iterable[Path]) -> None:
+def check_file(path: Path, inputs: Iterable[Path]) -> None:
+    """Check that a file can be written and is none of the inputs."""
     from chipglow.io.atomic import check_output
 
     target = check_output(path)

@@ -14,20 +14,39 @@ if TYPE_CHECKING:
 
 
 def convert(
-    source: Annotated[Path, opt.argument("SOURCE", "Camera file, or YAML file describing one.")],
+    sources: Annotated[
+        list[Path], opt.argument("SOURCE...", "Camera files, or YAML files describing one.")
+    ],
     out: Annotated[
-        Path | None, opt.file("Measurement to write, NetCDF. Omit it to only inspect the file.")
+        Path | None,
+        opt.file_or_folder(
+            "Measurement to write, NetCDF; of several files a folder with one for each. Omit it to "
+            "only inspect the files."
+        ),
     ] = None,
     settings: opt.Settings = None,
+    force: Annotated[
+        bool, opt.flag("--force", "Replace existing measurements of several files.")
+    ] = False,
 ) -> None:
-    """Convert a camera file to a measurement."""
+    """Convert camera files to measurements."""
+    inputs = list(opt.inputs_of([sources, settings]))
+    if len(sources) > 1:
+        _convert_many(sources, out, settings or [], inputs, force)
+        return
+    if out is not None:
+        opt.check_file(out, inputs)
+    _convert_one(sources[0], out, settings or [])
+
+
+def _convert_one(source: Path, out: Path | None, settings: list[str]) -> None:
     from chipglow.cli.showing import say_measurement
     from chipglow.io import is_measurement, write_measurement
     from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
 
     if is_measurement(source):
         raise ValueError(f"{source}: already a measurement; expected a camera file")
-    description = load_description(source, settings or ())
+    description = load_description(source, settings)
     recording = load_recording(description)
     screen = current()
     given = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
@@ -45,6 +64,56 @@ def convert(
     screen.heading("\nThe measurement:")
     say_measurement(measurement)
     finish(measurement.notes, (out, partial(write_measurement, measurement)))
+
+
+def _convert_many(
+    sources: list[Path], out: Path | None, settings: list[str], inputs: list[Path], force: bool
+) -> None:
+    import numpy as np
+    import pandas as pd
+
+    from chipglow.cli.batch import common_notes, for_each, output_files
+    from chipglow.io import is_measurement, write_measurement
+    from chipglow.laboratory.measurement import load_measurement
+
+    targets = {} if out is None else output_files(sources, out, ".nc", inputs, force)
+    notes = {}
+
+    def converted(source: Path) -> dict[str, object]:
+        if is_measurement(source):
+            raise ValueError(f"{source}: already a measurement; expected a camera file")
+        measurement = load_measurement(source, settings)
+        notes[source] = measurement.notes
+        if out is not None:
+            write_measurement(measurement, targets[source])
+        kelvins = measurement.radiance_temperature()
+        known = kelvins[np.isfinite(kelvins)]
+        least, median, largest = (
+            np.quantile(known, (0.0, 0.5, 1.0)) - 273.15 if known.size else np.full(3, np.nan)
+        )
+        return {
+            "file": str(source),
+            "frames": len(measurement),
+            "least_degC": least,
+            "median_degC": median,
+            "largest_degC": largest,
+            "usable_percent": 100 * np.mean(measurement.usable),
+        }
+
+    rows = for_each(sources, converted)
+    screen = current()
+    columns = {
+        "file": "file",
+        "frames": "frames",
+        "least / °C": "least_degC",
+        "median / °C": "median_degC",
+        "largest / °C": "largest_degC",
+        "usable / %": "usable_percent",
+    }
+    screen.table("measurements", pd.DataFrame(rows.values()), columns)
+    screen.notes(common_notes(notes))
+    for target in targets.values():
+        screen.file(target)
 
 
 def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -34,6 +35,9 @@ Answer = TypeVar("Answer")
 
 _END: Final = "end of the answers"
 
+_KEPT: ContextVar["list[subprocess.Popen[bytes]] | None"] = ContextVar("kept", default=None)
+"""Processes that wait for a job, inside of `one_process`."""
+
 
 @dataclass(frozen=True)
 class Sandbox:
@@ -49,22 +53,31 @@ class Sandbox:
 
     @contextmanager
     def answers(self, job: Job) -> Iterator[Iterator[Any]]:
-        """Yield an iterator of the answers of a job; its process ends with the block."""
+        """Yield an iterator of the answers of a job.
+
+        Its process ends with the block, or waits for the next job in `one_process`.
+        """
         request = pickle.dumps((job, self.name, self.memory))
-        with subprocess.Popen(
-            [sys.executable, *_CHILD],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        ) as process:
+        kept = _KEPT.get()
+        process = kept.pop() if kept else _started()
+        if process.poll() is not None:  # the system ended it while it waited
+            _end(process)
+            process = _started()
+        is_idle = False
+        try:
             assert process.stdin is not None
-            try:
-                with suppress(BrokenPipeError):  # it ended: its code is reported below
-                    process.stdin.write(request)
-                    process.stdin.close()
-                yield self._answers(process)
-            finally:
-                process.kill()
+            with suppress(BrokenPipeError):  # it ended: its code is reported below
+                process.stdin.write(request)
+                process.stdin.flush()
+            answers = self._answers(process)
+            yield answers
+            # A process that has more to say, or failed, is not used again.
+            is_idle = kept is not None and next(answers, _END) is _END
+        finally:
+            if is_idle and kept is not None:
+                kept.append(process)
+            else:
+                _end(process)
 
     def answer(self, function: Callable[[], Answer]) -> Answer:
         """Return what a function returns; it can be pickled. For errors see `answers`."""
@@ -122,25 +135,67 @@ class Isolated(Source):
         return Sandbox(self.name, self.patience, self.memory)
 
 
+@contextmanager
+def one_process() -> Iterator[None]:
+    """Let the readers of many files use one process, one after another, as its start takes 2 s.
+
+    A process whose reader failed is replaced.
+    """
+    kept: list[subprocess.Popen[bytes]] = []
+    token = _KEPT.set(kept)
+    try:
+        yield
+    finally:
+        _KEPT.reset(token)
+        for process in kept:
+            _end(process)
+
+
+def _started() -> "subprocess.Popen[bytes]":
+    return subprocess.Popen(
+        [sys.executable, *_CHILD],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    with process:  # closes its pipes and waits for it
+        pass
+
+
 def _once(function: Callable[[], Any]) -> Iterator[Any]:
     yield function()
 
 
 def main() -> None:
-    """Read the request from standard input, answer on standard output."""
+    """Read requests from standard input, answer on standard output."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints must not mix with the answers
-    job, name, memory = pickle.load(sys.stdin.buffer)
-    limit_memory(memory)
+    is_limited = False
     with suppress(BrokenPipeError), answers:
-        try:
-            for answer in job():
-                _send(answers, answer)
-            _send(answers, _END)
-        except BrokenPipeError:
-            raise
-        except Exception as error:  # readers of damaged files raise anything
-            _send(answers, failure(name, error))
+        while True:
+            try:
+                job, name, memory = pickle.load(sys.stdin.buffer)
+            except EOFError:
+                return
+            if not is_limited:
+                limit_memory(memory)
+                is_limited = True
+            _answer(answers, job, name)
+
+
+def _answer(answers: IO[bytes], job: Job, name: str) -> None:
+    try:
+        for answer in job():
+            _send(answers, answer)
+        _send(answers, _END)
+    except BrokenPipeError:
+        raise
+    except Exception as error:  # readers of damaged files raise anything
+        _send(answers, failure(name, error))
 
 
 def _send(stream: IO[bytes], answer: Any) -> None:

@@ -1,15 +1,15 @@
 """Studies: settings of cut, camera and analysis, as a YAML file or in Python."""
 
-from chipglow.study.budgets import (
-    StudyBudget as StudyBudget,
-    corrected_temperatures as corrected_temperatures,
-    study_budget as study_budget,
-)
+from chipglow.study.budgets import StudyBudget as StudyBudget, study_budget as study_budget
 from chipglow.study.cache import (
     CachedScene as CachedScene,
     cache_folder as cache_folder,
     cached_scenes as cached_scenes,
     clear_cache as clear_cache,
+)
+from chipglow.study.corrected import (
+    CorrectedTemperature as CorrectedTemperature,
+    corrected_temperatures as corrected_temperatures,
 )
 from chipglow.study.corrections import correct_study as correct_study
 from chipglow.study.cost import expected_cost as expected_cost

@@ -18,17 +18,14 @@ from chipglow.analysis.single import (
     BELOW,
     EXPOSURE,
     MEASURED,
-    NOISE,
     RANDOM,
     REFERENCE,
     TEXTURE,
     SingleReadings,
 )
-from chipglow.camera import Camera, Measurement
+from chipglow.camera import Camera
 from chipglow.io import open_scene
-from chipglow.laboratory.emissivity import RegionTemperatures
 from chipglow.quantities import Array, changed
-from chipglow.quantities.units import LENGTH
 from chipglow.scene import Scene
 from chipglow.study.fitting import fit, surfaces_on
 from chipglow.study.running import Progress, cut, fitted_study, silent
@@ -45,9 +42,6 @@ SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 _SURROGATE: Final = "scene settings between the cut ones"
 _EXTREME: Final = 1e-6
 """Probability of the values beyond those that are tried before anything is computed."""
-
-_ALIKE: Final = 0.01
-"""Relative difference of an image's band and pitch from the study's that is accepted."""
 
 _SCENES: Final = 16
 """Scenes to cut, unless stated."""
@@ -277,6 +271,18 @@ def _prepared(
         yield _Ready(readings, known, read, surrogates, notes)
 
 
+def first_order_errors(
+    study: Study, at: Sequence[str], progress: Progress | None = None
+) -> tuple[dict[str, Estimate], Notes]:
+    """Return the error in K of the first reading of each place, to first order, and the notes."""
+    with _prepared(study, at, _SCENES, progress) as ready:
+        errors, _ = first_order(ready.model, ready.inputs, np.random.default_rng(study.seed))
+        notes = ready.doubts(errors.values)
+    known = list(zip(ready.readings.names, ready.readings.places, strict=True))
+    numbers = {name: next(n for n, one in enumerate(known) if name in one) for name in at}
+    return {name: errors[number] for name, number in numbers.items()}, notes
+
+
 def check_draws(study: Study, inputs: Inputs) -> None:
     """Raise a ValueError if an input takes values with which the study is impossible.
 
@@ -288,59 +294,6 @@ def check_draws(study: Study, inputs: Inputs) -> None:
         name = one.name.partition(".")[0]
         for value in one.values or ends:
             _section(getattr(study, name), f"{name}.", {one.name: value}, stated.get(name))
-
-
-def corrected_temperatures(
-    measured: RegionTemperatures, image: Measurement, study: Study, progress: Progress | None = None
-) -> tuple[dict[str, Estimate], Notes]:
-    """Correct measured temperatures by the errors of a study of the same measurement.
-
-    The error is that against the mean radiance of a place (``reference: mean``).
-
-    Parameters
-    ----------
-    measured : RegionTemperatures
-        True temperatures by `true_temperatures`; the camera's resolution is not in them.
-    image : Measurement
-        The image, whose band and pixels must be those of the study's camera.
-    study : Study
-        The study; a region is corrected by the first reading of the place of its name.
-    progress : callable, optional
-        Called with the current step and its completed fraction, 0 to 1.
-
-    Returns
-    -------
-    estimates : dict
-        Mean temperature of each region in K, with the components of both budgets. The study's noise
-        is left out: the measurement states its own.
-    notes : Notes
-        Assumptions and warnings of the budget of the errors, to first order.
-
-    Raises
-    ------
-    ValueError
-        If a region has not the name of a place, or band or pitch differ from the study's.
-    """
-    camera = study.camera.build(study.seed)
-    for name, found, stated in (
-        ("lower limit of the band", image.band.lower, camera.band.lower),
-        ("upper limit of the band", image.band.upper, camera.band.upper),
-        ("pitch", image.raster.spacing, camera.pitch),
-    ):
-        if abs(found / stated - 1.0) > _ALIKE:
-            texts = LENGTH.text(found), LENGTH.text(stated)
-            raise ValueError("{}: {} in the image, {} in the study".format(name, *texts))
-    study = changed(study, {"analysis.reference": "mean"})
-    rows = {row.name: row for row in measured.rows}
-    with _prepared(study, tuple(rows), _SCENES, progress) as ready:
-        errors, _ = first_order(ready.model, ready.inputs, np.random.default_rng(study.seed))
-        notes = ready.doubts(errors.values)
-    estimates = {}
-    for name, row in rows.items():
-        names = zip(ready.readings.names, ready.readings.places, strict=True)
-        number = next(n for n, known in enumerate(names) if name in known)
-        estimates[name] = row.estimate - row.gain * errors[number].without(NOISE)
-    return estimates, notes
 
 
 def errors_of(numbers: Array) -> Array:

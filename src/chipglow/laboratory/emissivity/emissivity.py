@@ -14,9 +14,11 @@ from chipglow.camera import Flag, Measurement
 from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
+    UNIFORMITY,
     UsedPixels,
     calibration_uncertainty,
     check_same_pixels,
+    deviation_of,
     observed_flags,
     observed_radiance,
     used_pixels,
@@ -32,7 +34,7 @@ from chipglow.uncertainty import Estimate, propagate
 COMMON: Final = ("reference", "reflected", "calibration")
 """Causes of error common to all pixels, frames and images."""
 
-BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
+BUDGET: Final = (*COMMON, "drift", UNIFORMITY, "repeatability", "noise")
 """Lines of the budget of an emissivity."""
 
 LABORATORY: Final = 293.0
@@ -158,15 +160,19 @@ class EmissivityMap(Brief):
 
     def of(self, area: Area) -> "RegionEmissivity":
         """Compute the mean emissivity of an area."""
-        used = used_pixels(area, self.mean_radiance, self.flags)
+        used = used_pixels(area, self.radiance, self.flags)
         values = emissivity_of_radiance(self.radiance[:, used.mask], self.heating, self.band)
         mean_radiance = float(self.mean_radiance[used.mask].mean())
         calibration = None if self.calibration is None else self.calibration[used.mask].mean()
         pixels = values.mean(axis=0)
         mean = float(pixels.mean())
         known = self._systematic(np.array(mean), mean_radiance, calibration)
-        by_drift, of = mean_radiance / self._contrast, f"{self.identity} {area.name}"
-        estimate = with_observed(known, values, self.heating.drift, by_drift, self.recordings, of)
+        drift, of = self.heating.drift, f"{self.identity} {area.name}"
+        per_radiance = 1 / self._contrast
+        by_drift = mean_radiance * per_radiance
+        estimate = with_observed(
+            known, values, used, per_radiance, drift, by_drift, self.recordings, of
+        )
         outside = (int((pixels < 0).sum()), int((pixels > 1).sum()))
         return RegionEmissivity(
             name=area.name,
@@ -174,7 +180,7 @@ class EmissivityMap(Brief):
             whole=area.whole,
             heating=self.heating,
             used=used,
-            standard_deviation=float(pixels.std(ddof=1)),
+            standard_deviation=deviation_of(pixels),
             outside=outside,
             observed=values.mean(axis=1),
             estimate=estimate.with_warnings(*self._warnings(used, outside, mean)),
@@ -192,6 +198,9 @@ class EmissivityMap(Brief):
             elif used.flagged[Flag.SATURATED]:
                 text += " The remaining pixels are darker than the region."
             yield text
+        if used.uniformity.is_uneven:
+            deviation = used.uniformity.standard_deviation / self._contrast
+            yield used.uneven_text(f"emissivity varies by {deviation:.2g}")
         darker = "below 0: they are darker than the stated surroundings."
         brighter = "over 1: they are brighter than a blackbody of the true temperature."
         for count, text in zip(outside, (darker, brighter), strict=True):
@@ -392,7 +401,9 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
     line = solve @ means
     freedom = means.size - 2
     residual = sqrt(float(((means - design @ line) ** 2).sum()) / freedom) if freedom else nan
-    own = [reduce(Estimate.without, COMMON, one) for one in estimates]
+    # The region is the same at all temperatures, and so is its unevenness.
+    shared = (*COMMON, UNIFORMITY)
+    own = [reduce(Estimate.without, shared, one) for one in estimates]
     random = np.array([one.standard_uncertainty for one in own])
     if isfinite(residual):
         random = np.maximum(random, residual)
@@ -400,12 +411,13 @@ def emissivity_line(areas: Sequence[EmissivityLine]) -> EmissivityLine:
         part.cause.identity for one in estimates for part in one.only(RANDOM).components
     )
     observed = Estimate(means).with_component(RANDOM, random, per_element=True, identity=identity)
-    for cause in COMMON:
+    for cause in shared:
         shift = np.array([one.effect(cause) for one in estimates])
         if cause == "reference":
             # An error of the temperature moves the points along the line too.
             shift = shift - line[1] * np.array([one.reference_uncertainty for one in heatings])
-        observed = observed.with_component(cause, shift, identity=ALL_IMAGES)
+        of = f"{areas[0].name} {cause}" if cause == UNIFORMITY else ALL_IMAGES
+        observed = observed.with_component(cause, shift, identity=of)
     if not isfinite(residual) and any("drift" in one.unevaluated for one in estimates):
         observed = observed.with_unevaluated("drift")
     warnings = (warning for one in estimates for warning in one.warnings)

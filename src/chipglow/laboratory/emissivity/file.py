@@ -22,7 +22,7 @@ from chipglow.laboratory.emissivity.emissivity import (
     emissivity_covariance,
     emissivity_line,
 )
-from chipglow.laboratory.emissivity.observations import ALL_IMAGES, RANDOM, with_drift
+from chipglow.laboratory.emissivity.observations import ALL_IMAGES, RANDOM, UNIFORMITY, with_drift
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import WAVELENGTHS
@@ -57,9 +57,10 @@ def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) ->
     for cause in BUDGET:
         effect = Estimate.effect if cause in COMMON else Estimate.contribution
         columns[f"{cause}_uncertainty"] = np.array([float(effect(e, cause)) for e in estimates])
-    columns["random_degrees_of_freedom"] = np.array(
-        [float(one.only(RANDOM).degrees_of_freedom) for one in estimates]
-    )
+    for name in (RANDOM, UNIFORMITY):
+        columns[f"{name}_degrees_of_freedom"] = np.array(
+            [float(one.only(name).degrees_of_freedom) for one in estimates]
+        )
     columns["warnings"] = np.array(["\n".join(one.warnings) for one in estimates], object)
     image, table = ("reference", "y", "x"), ("reference", "region")
     shape, kelvins = (len(maps), -1), {"units": "K"}
@@ -108,6 +109,7 @@ def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) ->
 _FORMS: Final = {
     **dict.fromkeys(COMMON, ("systematic", "systematic")),
     "drift": ("random", "systematic"),
+    UNIFORMITY: ("random", "random"),
     "repeatability": ("random", "random"),
     "noise": ("random", "random"),
 }
@@ -120,7 +122,7 @@ def read_emissivity_lines(path: str | os.PathLike[str]) -> dict[str, EmissivityL
 
 
 def _lines(data: xr.Dataset) -> dict[str, EmissivityLine]:
-    if "observations" not in data:
+    if not {"observations", f"region_{UNIFORMITY}_uncertainty"} <= set(data):
         raise ValueError("it was written by an earlier version; write it again")
     maps = [data.isel(reference=index) for index in range(data.sizes["reference"])]
     lines = [
@@ -140,6 +142,12 @@ def _constant(row: xr.Dataset) -> EmissivityLine:
         estimate = estimate.with_component(cause, parts[cause], identity=ALL_IMAGES)
     if np.isfinite(parts["drift"]):
         estimate = with_drift(estimate, parts["drift"], observations)
+    estimate = estimate.with_component(
+        UNIFORMITY,
+        parts[UNIFORMITY],
+        identity=f"{observations} {name} {UNIFORMITY}",
+        degrees_of_freedom=float(row[f"region_{UNIFORMITY}_degrees_of_freedom"]),
+    )
     names = [cause for cause in ("repeatability", "noise") if np.isfinite(parts[cause])]
     freedom = float(row["region_random_degrees_of_freedom"])
     random = Cause(RANDOM, f"{observations} {name}", len(names), freedom, parts=tuple(names))

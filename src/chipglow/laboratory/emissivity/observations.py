@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, isnan, nan, sqrt
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
+from chipglow.laboratory.emissivity.uniformity import Uniformity, noise_around, uniformity
 from chipglow.quantities import Array, Brief
 from chipglow.scene import Area
 from chipglow.uncertainty import Cause, Component, Estimate
@@ -18,6 +19,9 @@ ALL_IMAGES: Final = "all images"
 
 RANDOM: Final = "random"
 """Name of the component of the random errors that observations show."""
+
+UNIFORMITY: Final = "uniformity"
+"""Name of the component of the variation over an area beyond noise and texture."""
 
 _FLAGS: Final = {
     Flag.UNDER_RANGE: "below the lower range limit",
@@ -30,21 +34,37 @@ _MANY_LEFT_OUT: Final = 0.05
 """Fraction of an area's pixels above which their omission is a warning."""
 
 
-def area_estimate(mean: float, values: Array, identity: str) -> Estimate:
-    """Return the mean of an area with its random component, by an analysis of variance."""
+def area_estimate(mean: float, values: Array, identity: str, noise: float = nan) -> Estimate:
+    """Return the mean of an area with its random component, by an analysis of variance.
+
+    `noise` is that of a single pixel, which a single frame does not show.
+    """
     observations, pixels = values.shape
     if observations == 1:
+        if pixels == 1:
+            if isnan(noise):
+                return Estimate(np.array(mean)).with_unevaluated("repeatability", "noise")
+            alone = _random(mean, {"noise": noise}, inf, identity)
+            return alone.with_unevaluated("repeatability")
         noise = float(values[0].std(ddof=1)) / sqrt(pixels)
         alone = _random(mean, {"noise": noise}, pixels - 1.0, identity)
         return alone.with_unevaluated("repeatability")
     means = values.mean(axis=1)
     total = float(means.var(ddof=1)) / observations
+    if pixels == 1:
+        parts = {"repeatability": 0.0, "noise": sqrt(total)}
+        return _random(mean, parts, observations - 1.0, identity)
     residual = values - means[:, None] - values.mean(axis=0) + means.mean()
     freedom = (observations - 1.0) * (pixels - 1.0)
     noise = float((residual**2).sum()) / freedom / values.size
     # One standard deviation is known, that of the means: its parts share its degrees of freedom.
     parts = {"repeatability": sqrt(max(total - noise, 0.0)), "noise": sqrt(noise)}
     return _random(mean, parts, observations - 1.0 if total > noise else freedom, identity)
+
+
+def deviation_of(pixels: Array) -> float:
+    """Return the standard deviation over the pixels of an area, NaN of a single one."""
+    return float(pixels.std(ddof=1)) if pixels.size > 1 else nan
 
 
 def _random(mean: float, parts: dict[str, float], freedom: float, identity: str) -> Estimate:
@@ -77,6 +97,9 @@ class UsedPixels(Brief):
     """Number of other pixels of the area, which are flagged."""
     flagged: dict[Flag, int]
     """Number of pixels with each flag."""
+    uniformity: Uniformity
+    noise: float
+    """Noise of a single pixel of a single frame in W/(m² sr); NaN if there are more, or unknown."""
 
     def warnings(self) -> list[str]:
         """Return a warning if many of the area's pixels are left out."""
@@ -86,30 +109,56 @@ class UsedPixels(Brief):
         flags = flag_text(self.flagged)
         return [f"{self.name}: {self.left_out} of {total} pixels are left out ({flags})."]
 
+    def uneven_text(self, variation: str) -> str:
+        """Return the warning of an uneven area; `variation` is a standard deviation in words."""
+        return (
+            f"{self.name}: is uneven: across it the {variation} (standard deviation), which noise "
+            "and texture do not explain. u includes it (uniformity); draw the region farther from "
+            "edges, or smaller."
+        )
+
 
 def used_pixels(area: Area, radiance: Array, flags: NDArray[np.uint8]) -> UsedPixels:
-    """Return the pixels of an area that can be used; raise ValueError if they are fewer than 2."""
-    usable, total = area.mask & np.isfinite(radiance), int(area.mask.sum())
+    """Return the pixels of an area that can be used; raise ValueError if there is none.
+
+    `radiance` in W/(m² sr) has the shape (observation, y, x).
+    """
+    usable, total = area.mask & np.isfinite(radiance).all(axis=0), int(area.mask.sum())
     count = int(usable.sum())
     flagged = {flag: int((flags[area.mask] & flag != 0).sum()) for flag in _FLAGS}
-    if count < 2:
+    if count == 0:
         raise ValueError(
-            f"region {area.name}: {count} of its {total} pixels can be used "
-            f"({flag_text(flagged)}), expected 2 or more"
+            f"region {area.name}: 0 of its {total} pixels can be used ({flag_text(flagged)}), "
+            "expected 1 or more"
         )
-    return UsedPixels(area.name, usable, count, total - count, flagged)
+    even = uniformity(usable, radiance[:, usable])
+    noise = noise_around(usable, radiance[0]) if count == len(radiance) == 1 else nan
+    return UsedPixels(area.name, usable, count, total - count, flagged, even, noise)
 
 
 def with_observed(
-    known: Estimate, values: Array, drift: float | None, by_drift: float, recordings: int, of: str
+    known: Estimate,
+    values: Array,
+    used: UsedPixels,
+    per_radiance: float,
+    drift: float | None,
+    by_drift: float,
+    recordings: int,
+    of: str,
 ) -> Estimate:
-    """Add the random errors of an area's observations, and the drift beyond their repeatability.
+    """Add the random errors of an area's observations, its unevenness, and the drift beyond both.
 
-    `by_drift` is the effect of a relative drift of 1; `of` identifies the observations and, after
-    a space, their area.
+    `per_radiance` is the change of the estimate with the radiance; `by_drift` is the effect of a
+    relative drift of 1; `of` identifies the observations and, after a space, their area.
     """
     mean = float(known.values)
-    random = area_estimate(mean, values, of)
+    random = area_estimate(mean, values, of, per_radiance * used.noise)
+    known = known.with_component(
+        UNIFORMITY,
+        per_radiance * used.uniformity.standard_deviation,
+        identity=f"{of} {UNIFORMITY}",
+        degrees_of_freedom=used.uniformity.degrees_of_freedom,
+    )
     if recordings > 1:
         repeatability = float(random.contribution("repeatability"))
         stated = (drift or 0.0) * by_drift / sqrt(recordings)

@@ -17,9 +17,11 @@ from chipglow.laboratory.emissivity.emissivity import COMMON, LABORATORY, Emissi
 from chipglow.laboratory.emissivity.observations import (
     ALL_IMAGES,
     RANDOM,
+    UNIFORMITY,
     UsedPixels,
     calibration_uncertainty,
     check_same_pixels,
+    deviation_of,
     observed_flags,
     observed_radiance,
     uncertainty_columns,
@@ -33,14 +35,12 @@ from chipglow.scene import Area, Region, areas
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, Limits, MonteCarlo, monte_carlo, propagate
 
-TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", "repeatability", "noise")
+TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", UNIFORMITY, "repeatability", "noise")
 """Lines of the budget of a true temperature."""
 
 FAR: Final = 50.0
 """Difference of temperature in K beyond which an emissivity may well differ."""
 
-_UNEVEN: Final = 0.5
-_NO_MATTER: Final = 0.01
 _STEP: Final = 0.5
 _STEPS: Final = 200
 _ROUNDS: Final = 4
@@ -71,8 +71,6 @@ class TrueTemperature(Brief):
     """Radiance temperature of the area's mean radiance in K."""
     standard_deviation: float
     """Standard deviation over the temperatures of single pixels in K."""
-    mean_of_pixels: float
-    """Mean of these temperatures in K: under the estimate where the area is uneven."""
     emissivity: float
     estimate: Estimate
     """True temperature in K, with the lines `TEMPERATURE_BUDGET`."""
@@ -134,7 +132,7 @@ def true_temperature(
     """
     check_same_pixels(measurements, "temperature")
     band, radiance = measurements[0].band, observed_radiance(measurements)
-    used = used_pixels(area, radiance.mean(axis=0), observed_flags(measurements))
+    used = used_pixels(area, radiance, observed_flags(measurements))
     values = radiance[:, used.mask]
     mean = float(values.mean())
     if surroundings is None:
@@ -155,8 +153,8 @@ def true_temperature(
     stated = calibration_uncertainty(measurements, radiance.mean(axis=0), camera_uncertainty)
     error = 0.0 if stated is None else float(stated[used.mask].mean())
     inputs = (
-        value.renamed(RANDOM, "emissivity"),
-        _mean_radiance(values, error, shared, drift, len(measurements)),
+        value.renamed(RANDOM, "emissivity").renamed(UNIFORMITY, "emissivity"),
+        _mean_radiance(values, used, error, shared, drift, len(measurements)),
         surroundings,
     )
     estimate = propagate(
@@ -165,20 +163,15 @@ def true_temperature(
         derivatives=[lambda *_, value=value: np.array(value) for value in derivatives],
     )
     pixels = temperature(values.mean(axis=0))
-    mean_of_pixels = float(pixels.mean())
     warnings = used.warnings() + [f"Emissivity: {warning}" for warning in estimate.warnings]
-    uneven = abs(float(estimate.values) - mean_of_pixels)
-    if uneven > max(_UNEVEN * float(estimate.standard_uncertainty), _NO_MATTER):
-        warnings.append(
-            f"{area.name}: is uneven, the mean of its pixels' temperatures is {uneven:.3g} K from "
-            "the temperature of its mean radiance."
-        )
+    if used.uniformity.is_uneven:
+        kelvins = derivatives[1] * used.uniformity.standard_deviation
+        warnings.append(used.uneven_text(f"true temperature varies by {kelvins:.3g} K"))
     return TrueTemperature(
         name=area.name,
         used=used,
         radiance_temperature=float(band.temperature(np.array(mean))),
-        standard_deviation=float(pixels.std(ddof=1)),
-        mean_of_pixels=mean_of_pixels,
+        standard_deviation=deviation_of(pixels),
         emissivity=float(value.values),
         estimate=replace(estimate, warnings=tuple(warnings)),
         gain=derivatives[1] * float(band.slope(band.temperature(np.array(mean)))),
@@ -328,14 +321,19 @@ def _assumptions(
 
 
 def _mean_radiance(
-    values: Array, calibration: float, shared: float, drift: float | None, recordings: int
+    values: Array,
+    used: UsedPixels,
+    calibration: float,
+    shared: float,
+    drift: float | None,
+    recordings: int,
 ) -> Estimate:
     """Return the mean radiance; `shared`: correlation of calibration errors with emissivity."""
     mean = float(values.mean())
     found, own = Estimate(np.array(mean)), sqrt(max(1 - shared**2, 0.0))
     for identity, part in ((ALL_IMAGES, shared), ("measurement", own)):
         found = found.with_component("calibration", part * calibration, identity=identity)
-    return with_observed(found, values, drift, mean, recordings, uuid4().hex)
+    return with_observed(found, values, used, 1.0, drift, mean, recordings, uuid4().hex)
 
 
 def _temperature(emissivity: ArrayLike, reflected: ArrayLike, band: Band, radiance: Array) -> Array:

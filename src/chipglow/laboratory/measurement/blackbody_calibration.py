@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +11,7 @@ import pandas as pd
 
 from chipglow.camera import MODELS, Blackbody, CalibrationFit, FittedCalibration, fit_calibration
 from chipglow.io.column_file import read_calibration_points
-from chipglow.laboratory.measurement.camera_file import WHOLE, read_flat_fields, uniform_counts
+from chipglow.laboratory.measurement.camera_file import WHOLE, uniform_counts
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band
 from chipglow.text import Notes
@@ -68,10 +67,10 @@ def calibrate_blackbodies(
 ) -> BlackbodyCalibration:
     """Fit calibrations of a camera's counts to blackbodies, in recordings read within `region`."""
     points, settings = Path(points), list(settings)
-    read, uneven = lru_cache(maxsize=1)(read_flat_fields), {}
+    uneven: dict[str, float] = {}
 
     def counts_of(file: str) -> float:
-        counts, uneven[file] = uniform_counts(points.parent / file, settings, region, read)
+        counts, uneven[file] = uniform_counts(points.parent / file, settings, region)
         return counts
 
     table = read_calibration_points(points, counts_of)

@@ -1,10 +1,11 @@
 """Measurements as the laboratory's commands take them."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from hashlib import file_digest, sha256
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
 from chipglow.io.cameras.stacks import MissingError
 from chipglow.io.column_file import read_bad_pixels
+from chipglow.io.sources.source import files_of
 from chipglow.laboratory.measurement.calibration_file import load_calibration
 from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
 from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
@@ -105,10 +107,7 @@ def measurement_of(
 
 
 def uniform_counts(
-    source: str | Path,
-    settings: Iterable[str] = (),
-    region: tuple[slice, slice] = WHOLE,
-    read: "FlatFieldReader | None" = None,
+    source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] = WHOLE
 ) -> tuple[float, float]:
     """Return the mean counts of a blackbody's recording, and by how many a block differs."""
     description = load_description(source, settings)
@@ -116,7 +115,7 @@ def uniform_counts(
     try:
         if recording.quantity != "counts":
             raise ValueError(f"holds {recording.quantity}, expected counts")
-        correction, bad = pixel_correction(description, recording, read)
+        correction, bad = pixel_correction(description, recording)
         signal = recording.signal.astype(np.float64)
         if correction is not None:
             signal = correction.apply(signal)
@@ -150,7 +149,7 @@ def _unevenness(image: Array) -> float:
 
 
 def pixel_correction(
-    description: MeasurementDescription, recording: Recording, read: "FlatFieldReader | None" = None
+    description: MeasurementDescription, recording: Recording
 ) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
     """Return the pixel correction and the bad pixels that a description defines."""
     section, table = description.flat_field, description.bad_pixels
@@ -161,7 +160,7 @@ def pixel_correction(
             raise ValueError("flat_field.low: is missing, expected frames of a flat-field source")
         return None, bad
     # The correction does not depend on the file and frames that are corrected.
-    fields = (read or read_flat_fields)(replace(description, file=None, frames=None))
+    fields = read_flat_fields(replace(description, file=None, frames=None))
     for name, frames in (("high", fields.high), ("low", fields.low)):
         for problem in () if frames is None else _problems(frames, recording):
             raise ValueError(f"flat_field.{name}: {problem}")
@@ -193,14 +192,29 @@ class FlatFields:
         return find_bad_pixels(frames, None if self.high is None else self.high.signal)
 
 
-FlatFieldReader: TypeAlias = Callable[[MeasurementDescription], FlatFields]
-
-
 def read_flat_fields(description: MeasurementDescription) -> FlatFields:
-    """Read the frames of the flat-field sources that a description names."""
+    """Read the frames of the flat-field sources that a description names, once for each content."""
+    section = description.flat_field
+    names = [name for name in (section.low, section.high) if name is not None]
+    return _read_flat_fields(description, tuple(map(_digest, names)))
+
+
+@lru_cache(maxsize=1)
+def _read_flat_fields(description: MeasurementDescription, _: tuple[str, ...]) -> FlatFields:
     section = description.flat_field
     high = None if section.high is None else _uniform(description, section.high)
     return FlatFields(_uniform(description, str(section.low)), high)
+
+
+def _digest(name: str) -> str:
+    """Return a hash of the content of a file, a pattern of files or a folder."""
+    total = sha256()
+    for file in files_of(Path(name)):
+        for part in sorted(file.rglob("*")) if file.is_dir() else [file]:
+            if part.is_file():
+                with part.open("rb") as content:
+                    total.update(str(part).encode() + file_digest(content, "sha256").digest())
+    return total.hexdigest()
 
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:

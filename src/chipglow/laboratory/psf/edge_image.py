@@ -125,7 +125,9 @@ def counts_image(
     raster = Raster(0.0, 0.0, recording.pitch, *signal.shape[1:])
     # No camera counts less than nothing: there, the dark side is cut off.
     cut = np.where(recording.signal <= 0, Flag.UNDER_RANGE, 0).astype(np.uint8)
-    assumed = ["The counts are linear in the radiance: an edge needs no calibration."]
+    assumed = [
+        "The counts are linear in the radiance, without a gamma: an edge needs no calibration."
+    ]
     if recording.saturation is None:
         assumed.append(
             "No pixel is saturated: neither the file nor the description states the limit."

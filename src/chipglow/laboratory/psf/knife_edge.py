@@ -7,7 +7,7 @@ with the point spread function; temperature, a bent function of it, is not.
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import cosh, degrees, exp, hypot, log, sqrt
+from math import ceil, cosh, degrees, exp, hypot, log, sqrt
 from typing import Final
 
 import numpy as np
@@ -21,6 +21,7 @@ from chipglow.camera.optics.kernel import normalised, resized
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
 from chipglow.laboratory.psf.edge_line import EdgeLine
 from chipglow.laboratory.psf.edge_spread import BINS_PER_PITCH, edge_curves
+from chipglow.laboratory.psf.linearity import asymmetry
 from chipglow.laboratory.psf.psf_fit import (
     ApertureSignals,
     EdgePixels,
@@ -308,6 +309,33 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> Iterator[str]:
             f"{name}: Only {short * 1e6:.3g} um of one side of the edge are seen, under "
             f"{_PLATEAU:g} widths: tails and brightness of the side cannot be distinguished."
         )
+    yield from _not_linear(best, k, result)
+
+
+def _not_linear(best: ModelFit, k: int, result: EdgeResult) -> Iterator[str]:
+    """Warn if the values of an edge are not, or not shown to be, linear in radiance."""
+    response, name = best.response(k, result.pixels), result.image.name
+    found = asymmetry(result.curves, response, response.slope, result.line_fwhm)
+    is_counts = result.image.unit == "counts"
+    if found is not None and found.is_clear:
+        cause = (
+            "Counts with a gamma, an automatic contrast or a detector that is not linear have "
+            "that: record linear counts, or set a calibration."
+            if is_counts
+            else "A calibration whose curve is wrong causes that."
+        )
+        yield (
+            f"{name}: The values may not be linear in the radiance: the edge-spread function is "
+            f"not symmetric, by {100 * abs(found.value):.2g} % of the step (standard uncertainty "
+            f"{100 * found.standard_uncertainty:.1g} %). {cause} So do an unevenly lit side and "
+            "coma. The width may be wrong."
+        )
+    elif is_counts and (found is None or found.is_hidden):
+        yield (
+            f"{name}: Counts are taken as linear in the radiance, but too little of the edge is "
+            "seen, or too much noise, to show even a gamma of 2.2; set a calibration, or average "
+            "more frames."
+        )
 
 
 def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> Iterator[str]:
@@ -357,7 +385,8 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
     half = len(middle) // 2
 
     def kernel(other: PointSpreadFunction, wider: float = 1.0) -> Array:
-        return resized(normalised(other.kernel(spacing / wider)), half, half)
+        near, light = _within(other, (half + 1) * spacing / wider)
+        return resized(light * normalised(near.kernel(spacing / wider)), half, half)
 
     by_model = [
         np.sqrt(weight) * (kernel(other.psf()) - middle)
@@ -369,6 +398,19 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
         parts[OVAL] = [(kernel(psf, 1 + knife.oval) - kernel(psf, 1 - knife.oval)) / 2]
     components = [_component(name, effects) for name, effects in parts.items() if effects]
     return MeasuredPSF(middle, spacing, tuple(components))
+
+
+def _within(psf: PointSpreadFunction, reach: float) -> tuple[PointSpreadFunction, float]:
+    """Return what a kernel needs within a distance in m, and its fraction of the light.
+
+    The tails of a model that does not fit can reach over millimetres.
+    """
+    if not isinstance(psf, MeasuredPSF):
+        return psf, 1.0
+    middle = len(psf.weights) // 2
+    kept = min(ceil(reach / psf.spacing) + 1, middle)
+    inner = psf.weights[middle - kept : middle + kept + 1, middle - kept : middle + kept + 1]
+    return MeasuredPSF(inner, psf.spacing), float(inner.sum())
 
 
 def _component(name: str, effects: Sequence[Array]) -> Component:

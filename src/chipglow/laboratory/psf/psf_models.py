@@ -87,6 +87,8 @@ class PSFModel(ABC):
         def excess(radius: float) -> float:
             return float(self.density(values, np.array(radius), np.zeros(()))) - half
 
+        if excess(radii[last]) <= 0:  # the radius itself, but for rounding
+            return 2 * float(radii[last])
         return 2 * float(brentq(excess, radii[last], radii[last + 1]))
 
     def psf(self, values: Array) -> PointSpreadFunction:
