@@ -61,8 +61,8 @@ _NO_DATA: Final = 42113
 _X_RESOLUTION: Final = 282
 _PHOTOMETRIC: Final = 262
 _INCH_AND_CENTIMETRE: Final = {2: 0.0254, 3: 0.01}
-_MOST_POLYNOMIAL: Final = 3
-"""ImageJ's calibration functions 0 to 3 are polynomials of degree 1 to 4."""
+_POLYNOMIALS: Final = (0, 1, 2, 3)
+"""ImageJ's calibration functions that are polynomials, of degree 1 to 4."""
 _NO_FUNCTION: Final = 20
 
 
@@ -134,7 +134,7 @@ def _series_arrays(
 ) -> Iterator[FileArray]:
     page = series.keyframe
     stacked = _stacked_axis(path, series, notes)
-    orientation = _turn(_common_tag(path, series, ORIENTATION, 1), notes)
+    orientation = _turn(_orientation(path, series), notes)
     if _photometric(page) == "MINISWHITE":
         notes.warnings.append(
             "The file states that large numbers are dark (PhotometricInterpretation: min-is-white);"
@@ -180,17 +180,16 @@ def _stacked_axis(path: Path, series: Any, notes: Notes) -> str:
     return kind
 
 
-def _common_tag(path: Path, series: Any, tag: int, default: int) -> Any:
-    """Return the value of a tag, which must be the same in all pages."""
-    values = {
-        page.tags.valueof(tag, default=default) for page in series.pages if hasattr(page, "tags")
-    }
-    if len(values) > 1:
-        raise SourceError(
-            f"{path}: its images differ in tag {tag}: {', '.join(map(str, sorted(values)))}, "
-            "expected the same"
-        )
-    return next(iter(values), default)
+def _orientation(path: Path, series: Any) -> Any:
+    """Return the orientation of all images; writers may state it in the first one only."""
+    first = series.keyframe.tags.valueof(ORIENTATION, default=1)
+    for page in series.pages:
+        stated = page.tags.valueof(ORIENTATION, default=first) if hasattr(page, "tags") else first
+        if stated != first:
+            raise SourceError(
+                f"{path}: its images have the orientations {first} and {stated}, expected the same"
+            )
+    return first
 
 
 def _imagej(file: Any) -> Mapping[str, Any]:
@@ -211,17 +210,16 @@ def _imagej_calibration(
     function = stated.get("cf", _NO_FUNCTION)
     if function == _NO_FUNCTION:
         return None, {}
-    known = isinstance(function, int) and 0 <= function <= _MOST_POLYNOMIAL
-    names = [f"c{power}" for power in range(int(function) + 2)] if known else []
-    values = [stated.get(name) for name in names]
-    if not names or not all(isinstance(one, int | float) and isfinite(one) for one in values):
+    if function not in _POLYNOMIALS:
         raise SourceError(
-            f"{path}: ImageJ's calibration function is {function!r} with "
-            f"{', '.join(f'{name} {value}' for name, value in zip(names, values, strict=True))}"
-            f"{'' if names else 'unknown coefficients'}, expected a polynomial (cf 0 to "
-            f"{_MOST_POLYNOMIAL}) and its coefficients; save the image in ImageJ as 32-bit, which "
-            "applies the function"
+            f"{path}: ImageJ's calibration function cf is {function}, expected a polynomial (cf 0 "
+            "to 3); save the image in ImageJ as 32-bit, which applies the function"
         )
+    names = [f"c{power}" for power in range(function + 2)]
+    values = [stated.get(name) for name in names]
+    if not all(isinstance(one, int | float) and isfinite(one) for one in values):
+        pairs = ", ".join(f"{name} {value}" for name, value in zip(names, values, strict=True))
+        raise SourceError(f"{path}: ImageJ's calibration has {pairs}, expected numbers")
     if page.dtype.kind == "f":
         raise SourceError(
             f"{path}: states a calibration function of ImageJ for floating-point numbers, which "
@@ -337,9 +335,8 @@ def _pages_part(path: Path, series: Any, key: Key) -> NDArray[Any]:
 def _decoded(path: Path, page: Any) -> NDArray[Any]:
     try:
         return np.asarray(page.asarray(maxworkers=1))
-    except ValueError as error:
-        if "imagecodecs" in str(error):
-            required("imagecodecs", path, "camera", "imagecodecs for this compression of TIFF")
+    except (ValueError, NotImplementedError, ImportError):
+        required("imagecodecs", path, "camera", "imagecodecs for its packing")
         raise
 
 
