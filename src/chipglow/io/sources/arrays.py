@@ -57,7 +57,7 @@ class FileArray:
     path: str = ""
     """The file or pattern."""
     notes: Notes = field(default_factory=Notes)
-    """What the reader assumed, warns of or applied."""
+    """Assumptions and warnings of the reader, and corrections that it applied."""
 
     def __str__(self) -> str:
         return f"{self.path}: {self.name}"

@@ -114,7 +114,7 @@ def _not_grey(series: Any) -> str:
     if "S" in series.axes:
         count, depth = page.samplesperpixel, page.bitspersample
         if not series.axes.startswith("S"):
-            return f"has {count} numbers per pixel ({kind}), expected one"
+            return f"has {count} numbers per pixel ({kind}), must have a single one"
         if kind != "MINISBLACK" and not (kind == "RGB" and depth > _MOST_BITS_OF_COLOURS):
             return f"has {count} planes of colours ({kind}, {depth} bits), expected grey images"
     elif kind not in (*_BLACK_IS_ZERO, "MINISWHITE"):
@@ -187,7 +187,8 @@ def _orientation(path: Path, series: Any) -> Any:
         stated = page.tags.valueof(ORIENTATION, default=first) if hasattr(page, "tags") else first
         if stated != first:
             raise SourceError(
-                f"{path}: its images have the orientations {first} and {stated}, expected the same"
+                f"{path}: its images have the orientations {first} and {stated}, which must be "
+                "the same"
             )
     return first
 
@@ -266,7 +267,7 @@ def _ome_pixels(file: Any) -> Mapping[str, str]:
 
 
 def _note_pitch(file: Any, page: Any, notes: Notes) -> None:
-    """Note the distance of the pixels that a file states: for most it is that of a printer."""
+    """Note the distance of the pixels that a file states; it is mostly meant for printing."""
     text = ""
     if file.is_ome:
         stated = _ome_pixels(file)
@@ -367,7 +368,7 @@ def png_arrays(path: Path, stack: ExitStack) -> Iterator[FileArray]:
         check_samples(str(path), prod(picture.size))
         count = getattr(picture, "n_frames", 1)
         if count > 1:
-            raise SourceError(f"{path}: has {count} images, expected one per file")
+            raise SourceError(f"{path}: has {count} images, must have a single one per file")
         stored = np.asarray(picture).astype(np.uint8 if depth == 8 else np.uint16)
         information, orientation = picture.info, picture.getexif().get(ORIENTATION, 1)
     _check_bytes(path, stored)
