@@ -57,7 +57,7 @@ def imagej(values=STACK, **stated):
 GREY = {"photometric": "minisblack"}
 RGB = {"photometric": "rgb"}
 PLANES = {"photometric": "rgb", "planarconfig": "separate"}
-"""The default of tifffile up to 2022 for 3 and 4 frames."""
+"""The default of tifffile for 3 and 4 frames."""
 FRAMES = "frames in time"
 
 TIFF_RIGHT = {

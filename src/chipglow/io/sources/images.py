@@ -56,7 +56,7 @@ def _turn(orientation: object, notes: Notes) -> int:
 
 _BLACK_IS_ZERO: Final = ("MINISBLACK", "LINEAR_RAW")
 _MOST_BITS_OF_COLOURS: Final = 8
-"""Colours stored as planes have 8 bits; planes of more bits are usually a stack of frames."""
+"""Planes of more bits are usually a stack of frames, which tifffile writes so by default."""
 _NO_DATA: Final = 42113
 _X_RESOLUTION: Final = 282
 _PHOTOMETRIC: Final = 262
