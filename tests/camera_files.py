@@ -42,7 +42,7 @@ def plain(image):
     return image.astype("<u2").tobytes()
 
 
-def flir_camera(order, stamp, planck=PLANCK, told=OBJECT, rate=30):
+def flir_camera(order, stamp, planck=PLANCK, told=OBJECT, rate=30, counts=(7481, 59029)):
     raw = bytearray(2476)
     put = writer(raw, order)
     put(0, "HHH", 2, COLUMNS, ROWS)
@@ -55,7 +55,7 @@ def flir_camera(order, stamp, planck=PLANCK, told=OBJECT, rate=30):
     raw[0xD4:0xE8] = b"FLIR T420".ljust(20, b"\0")
     raw[0x104:0x10C] = b"62109905"
     put(0x308, "if", planck["o"], planck["r2"])
-    put(0x310, "HH", 7481, 59029)
+    put(0x310, "HH", *counts)
     seconds, rest = divmod(stamp, 1)
     put(0x384, "IIh", START + int(seconds), round(1000 * rest), -60)
     put(0x464, "H", rate)
@@ -82,11 +82,11 @@ def seq(images, stamps=STAMPS, **options):
     return b"".join(fff(image, stamp, **options) for image, stamp in frames)
 
 
-def flir_jpeg(image, part=1000, **options):
-    """A JPEG with FLIR's records in several segments."""
+def flir_jpeg(image, part=1000, behind=b"", exif=b"", **options):
+    """A JPEG with FLIR's records in several segments, with bytes behind the last record."""
     stream = BytesIO()
-    Image.new("L", (8, 8), 99).save(stream, "JPEG")
-    visible, inside = stream.getvalue(), fff(image, **options)
+    Image.new("L", (8, 8), 99).save(stream, "JPEG", exif=exif)
+    visible, inside = stream.getvalue(), fff(image, **options) + behind
     parts = [inside[i : i + part] for i in range(0, len(inside), part)]
     segments = b"".join(
         struct.pack(">HH6sBB", 0xFFE1, len(one) + 10, b"FLIR\0\x01", number, len(parts) - 1) + one
@@ -141,7 +141,7 @@ def _packed(counts, bits):
     return np.packbits((counts.reshape(-1, 1) >> shifts & 1).astype(np.uint8)).tobytes()
 
 
-def cine(images, kind="16", rate=30_000, exposures=None, times=True):
+def cine(images, kind="16", rate=30_000, exposures=None, times=True, viewer=(0, 0, 0)):
     """A recording; 8 and 16 bits lie upside down, as bitmaps do."""
     count, rows, columns = images.shape
     bits, packing, real, pack = {
@@ -155,6 +155,8 @@ def cine(images, kind="16", rate=30_000, exposures=None, times=True):
     setup[140:142] = b"ST"
     put(142, "H", len(setup))
     put(743, "I", 12345)
+    put(756, "II", *viewer[:2])
+    put(884, "i", viewer[2])
     put(768, "I", rate)
     put(792, "I", 711)
     put(896, "I", real)

@@ -642,7 +642,7 @@ def test_only_the_command_line_imports_the_app_and_it_knows_no_room_above_the_st
 
 def test_a_missing_panel_is_named_with_its_extra(monkeypatch):
     monkeypatch.setattr("chipglow.app.find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"expected pip install 'chipglow\[app\]'"):
+    with pytest.raises(ValueError, match=r'Panel; run python -m pip install "\.\[app\]" in the'):
         chipglow.explore()
 
 

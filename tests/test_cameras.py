@@ -13,6 +13,7 @@ import scipy.io
 import tifffile
 import xarray as xr
 from hypothesis import given, settings, strategies as st
+from PIL import Image
 
 from chipglow.camera import Recording
 from chipglow.io.cameras import read_recording, write_hcc
@@ -93,6 +94,46 @@ def test_png_is_read_whatever_the_order_of_its_bytes(tmp_path, swapped):
     path = make(tmp_path, "a.jpg", content)
     recording = read_here(path, "flir", None, Stated())
     assert np.array_equal(recording.signal, PICTURES[:1])
+
+
+@pytest.mark.parametrize("behind", [b"\1", b"F", b"FFF", b"FFF\0", bytes(9), b"FFF\0" + bytes(70)])
+def test_bytes_behind_the_last_record_of_a_jpeg_are_no_frame(tmp_path, behind):
+    recording = read_recording(make(tmp_path, "a.jpg", files.flir_jpeg(PICTURES[0], behind=behind)))
+    assert np.array_equal(recording.signal, PICTURES[:1])
+    assert recording.notes.warnings == []
+
+
+@pytest.mark.parametrize(
+    ("exif", "warned"), [(1, False), (3, True), (6, True), (None, False), (b"Exif\0\0?", False)]
+)
+def test_the_orientation_of_a_jpeg_is_a_warning(tmp_path, exif, warned):
+    if not isinstance(exif, bytes):
+        stated = Image.Exif()
+        if exif is not None:
+            stated[274] = exif
+        exif = stated.tobytes()
+    recording = read_recording(make(tmp_path, "a.jpg", files.flir_jpeg(PICTURES[0], exif=exif)))
+    assert np.array_equal(recording.signal, PICTURES[:1])
+    assert ["EXIF orientation" in text for text in recording.notes.warnings] == [True] * warned
+
+
+@pytest.mark.parametrize(
+    ("counts", "least", "saturation"),
+    [
+        ((7481, 59029), 7481, 59029),
+        ((7481, 65535), 7481, None),
+        ((0, 59029), None, 59029),
+        ((0, 65535), None, None),
+        ((0, 0), None, None),
+        ((9000, 8000), None, None),
+    ],
+)
+def test_limits_of_flirs_counts(tmp_path, counts, least, saturation):
+    path = make(tmp_path, "a.fff", files.fff(PICTURES[0], counts=counts))
+    recording = read_recording(path)
+    assert (recording.least_signal, recording.saturation) == (least, saturation)
+    assert recording.under_range().sum() == np.sum(PICTURES[0] < (least or 0))
+    assert recording.saturated().sum() == np.sum(PICTURES[0] > (saturation or 65535))
 
 
 def test_jpeg_ls_is_read_in_a_process_of_its_own(tmp_path):
@@ -240,6 +281,14 @@ def test_ffmpeg_sees_the_same_in_cine(tmp_path, kind, bits, shift):
         seen = np.stack([frame.to_ndarray() for frame in container.decode(video=0)]) >> shift
     counts = _CURVE[seen] if kind == "10p" else seen  # FFmpeg leaves the codes as they are
     assert np.array_equal(counts, read_recording(path).signal)
+
+
+@pytest.mark.parametrize("viewer", [(1, 0, 0), (0, 1, 0), (0, 0, 90), (1, 1, -90), (0, 0, 0)])
+def test_settings_of_cine_for_viewers_are_a_warning(tmp_path, viewer):
+    recording = read_recording(make(tmp_path, "a.cine", files.cine(PICTURES, viewer=viewer)))
+    assert np.array_equal(recording.signal, PICTURES)
+    warned = ["tells viewers to turn the image" in text for text in recording.notes.warnings]
+    assert warned == [True] * any(viewer)
 
 
 def test_cine_whose_exposure_changes_has_no_integration_time(tmp_path):

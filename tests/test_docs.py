@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 from posixpath import join, normpath
@@ -52,6 +53,15 @@ def test_the_blocks_of_a_page_run(page, reader):
         write_samples(page.stem, reader.folder)
     for block in blocks(page):
         reader.follow(block)
+
+
+def test_pages_install_extras_by_the_command_of_the_messages():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    for page in (*PAGES, ROOT / "CONTRIBUTING.md"):
+        for line in page.read_text("utf-8").splitlines():
+            if "pip install" in line:
+                (extras,) = re.findall(r'python -m pip install (?:-e )?"\.\[([a-z,]+)\]"', line)
+                assert set(extras.split(",")) <= set(project["optional-dependencies"]), page
 
 
 def test_the_readmes_python_prints_what_is_shown(tmp_path, capsys):
@@ -140,7 +150,7 @@ sys.exit(main(sys.argv[1:]))
 @pytest.fixture(scope="session")
 def site(shared_folder):
     """The folder of the pages, built with warnings as errors."""
-    pytest.importorskip("sphinx_gallery", reason="no sphinx-gallery: pip install '.[docs]'")
+    pytest.importorskip("sphinx_gallery", reason="needs the extra docs")
     return shared_folder("site", build)
 
 

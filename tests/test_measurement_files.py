@@ -501,6 +501,36 @@ def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
     assert body == pytest.approx(expected[0] + fraction * (expected[1] - expected[0]), abs=0.5)
 
 
+@pytest.mark.parametrize(
+    ("counts", "message"),
+    [
+        ((0, 59029), None),
+        ((5000, 59029), "10.00% of it is below the camera's range, expected a brighter object"),
+        ((0, 5000), "90.00% of it is saturated, expected a darker object"),
+    ],
+)
+def test_a_blackbody_outside_the_range_of_flirs_counts_is_refused(tmp_path, counts, message):
+    image = np.full((40, 40), 9000, np.uint16)
+    image[:4] = 3000
+    path = tmp_path / "body.fff"
+    path.write_bytes(camera_files.fff(image, counts=counts))
+    if message is None:
+        assert uniform_counts(path)[0] == pytest.approx(8400.0)
+        return
+    with pytest.raises(ValueError, match=re.escape(message)):
+        uniform_counts(path)
+
+
+def test_a_flat_field_below_the_range_of_the_recording_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    image = np.full((40, 40), 9000, np.uint16)
+    (tmp_path / "chip.fff").write_bytes(camera_files.fff(image, counts=(5000, 59029)))
+    (tmp_path / "cold.fff").write_bytes(camera_files.fff(image // 3, counts=(5000, 59029)))
+    settings = ["band=7.5-13 um", "pitch=6 um", "flat_field.low=cold.fff"]
+    with pytest.raises(ValueError, match=r"flat_field\.low: 100% of it is below the range"):
+        load_measurement("chip.fff", settings)
+
+
 def test_a_blackbody_before_a_background_is_refused_until_its_region_is_given(tmp_path):
     """A hot disc on a cold ground, as an aperture shows it: its gain would be a fifth."""
     y, x = np.mgrid[:64, :64]

@@ -316,4 +316,6 @@ def test_mp4_without_pyav_is_refused_before_the_cut(folder, monkeypatch):
     monkeypatch.setattr(CuttingSimulation, "run", no_run)
     monkeypatch.setattr("chipglow.io.movie_file.find_spec", lambda _: None)
     arguments = ("cut", "study.yaml", "--out", "a.nc", "--preview", "a.mp4")
-    assert refused(arguments, "a.mp4: MP4 needs PyAV").count("\n") == 1
+    assert (
+        refused(arguments, "a.mp4: needs PyAV for MP4; run python -m pip install").count("\n") == 1
+    )

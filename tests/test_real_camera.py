@@ -170,6 +170,23 @@ def test_bad_sensors_are_replaced_or_dead():
     assert np.isnan(measured.radiance_temperature()[:, 6, 6]).all()
 
 
+def test_signals_below_the_cameras_range_are_flagged():
+    counts = 500.0 + 1.8 * BAND.radiance(np.full((1, 5, 5), 900.0))
+    least = counts[0, 0, 0] - 1.0
+    counts[0, 1, 1] = least - 1.0
+    counts[0, 4, 4] = least
+    bad = np.zeros((5, 5), bool)
+    bad[2, 2] = bad[0, 4] = True
+    measured = calibrate_recording(recording(counts, least_signal=least), LINE, bad_pixels=bad)
+    expected = np.zeros((5, 5), int)
+    expected[1, 1] = Flag.UNDER_RANGE
+    # The median of neighbours of which one is outside the range is not trusted.
+    expected[2, 2] = Flag.REPLACED | Flag.UNDER_RANGE
+    expected[0, 4] = Flag.REPLACED
+    assert measured.flags[0].tolist() == expected.tolist()
+    assert np.isnan(measured.radiance_temperature()[0, 1, 1])
+
+
 def test_the_median_of_a_saturated_neighbourhood_is_not_trusted():
     counts = 500.0 + 1.8 * BAND.radiance(np.full((1, 5, 5), 900.0))
     counts[0, 1, 1] = 17000.0

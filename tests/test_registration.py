@@ -19,6 +19,7 @@ from chipglow.laboratory.registration import (
     fit_images,
     fit_points,
     load_registration,
+    read_pictures,
     simultaneous_frames,
     write_registration,
 )
@@ -286,6 +287,27 @@ def test_the_command_writes_map_pictures_and_numbers(folder):
         assert blink.size[0] == 640
     with Image.open("over.png") as picture:
         assert picture.size[0] > 900
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_visible_picture_is_upright(tmp_path, suffix, orientation):
+    stored = np.zeros((8, 16), np.uint8)
+    stored[0, 0] = 255
+    exif = Image.Exif()
+    exif[274] = orientation
+    path = tmp_path / f"visible.{suffix}"
+    Image.fromarray(stored).save(path, exif=exif, **({"quality": 100} if suffix == "jpg" else {}))
+    if suffix == "tif" and orientation > 4:  # Pillow scrambles them
+        with pytest.raises(ValueError, match=r"visible\.tif: a TIFF picture on its side"):
+            read_pictures(path)
+        return
+    (frame,) = read_pictures(path).signal
+    # By the TIFF standard: where row 0 and column 0 of the stored picture are.
+    row, column = ((0, 0), (0, -1), (-1, -1), (-1, 0))[(orientation - 1) % 4]
+    assert frame.shape == ((8, 16) if orientation < 5 else (16, 8))
+    assert frame[row, column] > 250
+    assert frame.sum() < 300
 
 
 ALIGN = "--align '60 um, 30 um, 120 um, 90 um' --pairs pairs.csv"

@@ -125,5 +125,7 @@ def test_the_doctor_computes_and_lists_the_optional_parts():
     assert found["values"]["greatest_radiance_difference"] < 1e-6
     parts = {row["extra"]: row["advice"] for row in found["tables"]["optional"]}
     assert parts["mesh"] == ""
+    assert parts["pyxel"] in ("", 'python -m pip install ".[pyxel]"')
+    assert "all" not in parts
     assert found["facts"]["machine"]["cache"]
     assert found["facts"]["machine"]["threads"].endswith("; active while they wait")

@@ -13,6 +13,7 @@ import zarr
 from cgns_file import write_cgns
 from foam_case import PARTS, write_foam
 from lasso.dyna import D3plot
+from PIL import Image
 from tecplot_file import ZoneOfFile, extras_of_header, write_tecplot
 from vtkmodules.vtkIOExodus import vtkExodusIIWriter
 from vtkmodules.vtkIOParallel import vtkEnSightWriter
@@ -27,7 +28,7 @@ from movies import CODECS, GIF, NamedMap, drawn, encode, known_field
 
 GRIDS = (
     "grid.h5", "five.mat", "grid.npy", "grid.npz", "four.nc", "three.nc", "grid.csv", "grid.tif",
-    "2.zarr", "3.zarr",
+    "grid.png", "2.zarr", "3.zarr",
 )  # fmt: skip
 CLOUDS = ("points.csv", "points.npz")
 MOVIES = {
@@ -67,7 +68,8 @@ def source_of(folder, name):
     name = Path(name).parts[0]
     path = folder / name
     if name in GRIDS:
-        return GridSource(str(path), spacing=0.03, top=1.0, interval=1e-6)
+        axes = ("time", "y", "x") if name == "five.mat" else None
+        return GridSource(str(path), axes=axes, spacing=0.03, top=1.0, interval=1e-6)
     if name in CLOUDS:
         return CloudSource(str(path), interval=1e-6)
     if name in MOVIES:
@@ -84,6 +86,7 @@ def write_grids(folder):
     scipy.io.savemat(folder / "five.mat", {"temperature": values})
     np.save(folder / "grid.npy", values)
     np.savez_compressed(folder / "grid.npz", temperature=values)
+    Image.fromarray(values[0].astype(np.uint16)).save(folder / "grid.png", compress_level=0)
     np.savetxt(folder / "grid.csv", values[0], delimiter=",", fmt="%.2f")
     tifffile.imwrite(folder / "grid.tif", values, compression="zlib", photometric="minisblack")
     coords = {

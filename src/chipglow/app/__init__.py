@@ -6,6 +6,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from chipglow.text import needs_extra
+
 if TYPE_CHECKING:
     from chipglow.scene import Scene
     from chipglow.study import Study
@@ -60,4 +62,4 @@ def serve(path: Path | None, address: str, port: int, ready: Callable[[str], Non
 
 def _check_installed() -> None:
     if find_spec("panel") is None:
-        raise ValueError("app: needs Panel, expected pip install 'chipglow[app]'")
+        raise ValueError(needs_extra("app", "Panel", "app"))

@@ -59,6 +59,8 @@ class Recording(Brief):
     """Integration time in s."""
     saturation: float | None = None
     """Largest unsaturated signal."""
+    least_signal: float | None = None
+    """Smallest signal within the measuring range."""
     band: Band | None = None
     pitch: float | None = None
     """Distance between pixels on the object in m."""
@@ -96,3 +98,13 @@ class Recording(Brief):
             raise ValueError(
                 f"recording: fill_factor must be above 0 and at most 1, not {self.fill_factor!r}"
             )
+
+    def saturated(self) -> NDArray[np.bool_]:
+        """Return where the signal is saturated; nowhere if no limit is known."""
+        limit = np.inf if self.saturation is None else self.saturation
+        return np.asarray(self.signal > limit)
+
+    def under_range(self) -> NDArray[np.bool_]:
+        """Return where the signal is below the measuring range; nowhere if no limit is known."""
+        limit = -np.inf if self.least_signal is None else self.least_signal
+        return np.asarray(self.signal < limit)

@@ -20,9 +20,10 @@ from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.radiometry import Band
 from chipglow.study import cache_folder, cached_scenes
+from chipglow.text import install_command
 
-_LEFT_OUT: Final = ("test", "dev", "docs", "import")
-"""Extras for developers, and the one that only names others."""
+_LEFT_OUT: Final = ("test", "dev", "docs", "import", "all")
+"""Extras for developers, and those that only name others."""
 
 _BAND: Final = (3.8e-6, 5.1e-6)
 _TEMPERATURES: Final = (600.0, 1000.0, 1500.0)
@@ -49,7 +50,7 @@ def examine() -> None:
     wrong = required[required["state"] != ""]
     if not wrong.empty:
         names = ", ".join(f"{row.package} ({row.state})" for row in wrong.itertuples())
-        raise ValueError(f"packages: {names}, expected pip install --upgrade chipglow")
+        raise ValueError(f"packages: {names}, expected python -m pip install --upgrade .")
     if not largest < _TOLERANCE:
         raise ValueError(f"in-band radiance: off by {largest:.1g}, expected below {_TOLERANCE:g}")
 
@@ -92,7 +93,7 @@ def _packages() -> pd.DataFrame:
                 "installed": installed or "–",
                 "needed": str(wanted.specifier),
                 "state": "" if good else "too old" if installed else "missing",
-                "advice": "" if good else f"pip install 'chipglow[{extra}]'",
+                "advice": "" if good else install_command(extra),
             }
         )
     return pd.DataFrame(rows)

@@ -131,6 +131,8 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
         yield "range", recording.range_name
     if recording.saturation is not None:
         yield "saturated", f"over {recording.saturation:g}"
+    if recording.least_signal is not None:
+        yield "smallest in range", f"{recording.least_signal:g}"
     if recording.band is not None:
         yield "band", f"{1e6 * recording.band.lower:.4g} µm to {1e6 * recording.band.upper:.4g} µm"
     if recording.pitch is not None:

@@ -21,7 +21,7 @@ from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import COLDEST, LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
-from chipglow.text import Notes
+from chipglow.text import Notes, needs_extra
 
 SAMPLES_ACROSS: Final = 900
 """Samples along the longer side of a scene by default: as many as in the paper's scene."""
@@ -142,8 +142,9 @@ def prospect(wanted: Import) -> Prospect:
     flow = wanted.completion.uses_flow(survey.found, len(survey.times))
     if flow and find_spec("skimage") is None:
         raise SourceError(
-            "velocity: the source has none and the optical flow needs scikit-image, expected "
-            "pip install 'chipglow[flow]'"
+            needs_extra(
+                "velocity", "scikit-image for the optical flow, as the source has none", "flow"
+            )
         )
     return Prospect(survey, raster, survey.notes + Notes(assumed))
 

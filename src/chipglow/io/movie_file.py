@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.atomic import atomic_path
+from chipglow.text import needs_extra
 
 PALETTE_SIZE: Final = 255
 """Most colours of a GIF: one more stands for what did not change."""
@@ -25,8 +26,7 @@ def check_movie_path(path: str | os.PathLike[str]) -> None:
         raise ValueError(f"{path}: expected the name of a movie, ending in .mp4 or .gif")
     if suffix == ".mp4" and find_spec("av") is None:
         raise ValueError(
-            f"{path}: MP4 needs PyAV, expected pip install 'chipglow[movie]' "
-            "or a name that ends in .gif"
+            needs_extra(path, "PyAV for MP4", "movie") + ", or choose a name that ends in .gif"
         )
 
 

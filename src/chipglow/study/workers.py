@@ -8,6 +8,8 @@ from itertools import islice
 from os import cpu_count
 from typing import Any, Final, TypeAlias
 
+from chipglow.text import needs_extra
+
 Client: TypeAlias = Any
 """A `distributed.Client`."""
 
@@ -109,10 +111,8 @@ def _distributed() -> Any:
     try:
         return import_module("distributed")
     except ImportError:
-        raise ValueError(
-            "a sweep on several processes needs Dask: install chipglow with the extra 'sweep', or "
-            "set the number of workers to 0"
-        ) from None
+        needed = needs_extra("a sweep on several processes", "Dask", "sweep")
+        raise ValueError(f"{needed}, or set the number of workers to 0") from None
 
 
 def _with_one_thread(function: Callable[..., None], *arguments: Any) -> None:

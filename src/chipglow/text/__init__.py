@@ -1,4 +1,4 @@
-"""Files from outside: small text files, YAML and what it describes, HDF5 without links."""
+"""Files from outside: small text files, YAML and what it describes, HDF5 without links, extras."""
 
 from chipglow.text.description import (
     described_by as described_by,
@@ -6,6 +6,7 @@ from chipglow.text.description import (
     placed as placed,
     validated as validated,
 )
+from chipglow.text.extras import install_command as install_command, needs_extra as needs_extra
 from chipglow.text.notes import Notes as Notes
 from chipglow.text.own_data import check_own_data as check_own_data
 from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema

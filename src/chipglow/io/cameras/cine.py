@@ -29,9 +29,12 @@ _SETUP: Final = layout(
     mark=("S2", 140),
     length=("<u2", 142),
     serial=("<u4", 743),
+    mirrored=("<u4", 756),
+    flipped=("<u4", 760),
     rate=("<u4", 768),
     camera=("<u4", 792),
     colours=("<u4", 808),
+    turned=("<i4", 884),
     bits=("<u4", 896),
     shutter=("<u4", 1568),
 )
@@ -60,6 +63,13 @@ class Cine(CameraFile):
         self.places = binary.numbers(header["places"], header["count"], "<i8")
         self.complete = self._complete()
         notes.remarks.append(f"Frame 0 is number {header['first']} of the recording.")
+        viewer = {name: setup[name] for name in ("mirrored", "flipped", "turned") if setup[name]}
+        if viewer:
+            stated = ", ".join(f"{name} {value}" for name, value in viewer.items())
+            notes.warnings.append(
+                f"The file tells viewers to turn the image ({stated}); it is not turned (set "
+                "quarter_turns or mirror)."
+            )
         if self.complete < header["count"]:
             self.note_truncation()
 

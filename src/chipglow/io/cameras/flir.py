@@ -3,6 +3,7 @@
 The layout follows ExifTool's documentation of FLIR's tags.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
@@ -24,12 +25,14 @@ from chipglow.io.cameras.binary import (
     text_of,
 )
 from chipglow.io.sources import SourceError
+from chipglow.io.sources.images import ORIENTATION, roughness
 from chipglow.io.sources.source import reading, required
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.text import Notes
 
 _MAGIC: Final = b"FFF\0"
 _JPEG: Final = b"\xff\xd8\xff"
+_EXIF: Final = b"Exif\0\0"
 _JPEG_LS: Final = b"\xff\xf7"
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 _ENDS: Final = {"PNG": b"IEND\xaeB`\x82", "JPEG-LS": b"\xff\xd9"}
@@ -100,15 +103,16 @@ class Flir(CameraFile):
     """FLIR's radiometric JPEG, FFF, SEQ and CSQ: counts."""
 
     def __init__(self, binary: Binary, notes: Notes) -> None:
-        super().__init__(_records(binary), notes)
-        self.frames = self._find_frames()
+        inside = _records(binary, notes)
+        super().__init__(inside, notes)
+        self.frames = self._find_frames(single=inside is not binary)
         self.complete = len(self.frames)
         self.shape = self._shape(0)
         check_picture(self.path, *self.shape)
         self.camera_fields = cache(self._camera_fields)
 
-    def _find_frames(self) -> list[_Frame]:
-        """Find all frames that are whole."""
+    def _find_frames(self, single: bool) -> list[_Frame]:
+        """Find all frames that are whole; a JPEG has a single one, whatever follows it."""
         found: list[_Frame] = []
         place: int | None = 0
         while place is not None:
@@ -120,7 +124,7 @@ class Flir(CameraFile):
                 self.complete = len(found)
                 self.note_truncation()
                 break
-            place = self._next(found[-1].end)
+            place = None if single else self._next(found[-1].end)
         return found
 
     def _next(self, end: int) -> int | None:
@@ -182,11 +186,12 @@ class Flir(CameraFile):
         self.note_start(self._moment(0))
         model, serial = text_of(fields["model"]), text_of(fields["serial"])
         name = model if model.startswith("FLIR") else f"FLIR {model}".strip()
-        # Cameras without a range of counts state all 16 bits.
-        has_range = fields["least_count"] < fields["most_counts"] < 65_535
+        # Cameras without a limit state the end of 16 bits.
+        least, most = fields["least_count"], fields["most_counts"]
         facts = {
             "camera": f"{name}, serial number {serial}" if serial else name,
-            "saturation": float(fields["most_counts"]) if has_range else None,
+            "saturation": float(most) if least < most < 65_535 else None,
+            "least_signal": float(least) if 0 < least < most else None,
             "conversion": self._conversion(fields),
             "object_parameters": self._object(fields),
         }
@@ -259,7 +264,7 @@ def _through_air(
 # Records
 
 
-def _records(binary: Binary) -> Binary:
+def _records(binary: Binary, notes: Notes) -> Binary:
     """Return what of a JPEG is FLIR's, in numbered segments; another file as it is."""
     if binary.read(0, min(3, binary.size)) != _JPEG:
         return binary
@@ -272,6 +277,8 @@ def _records(binary: Binary) -> Binary:
         segment = binary.read(place + 4, length - 2) if marker == 0xFFE1 else b""
         if segment[:5] == b"FLIR\0" and len(segment) >= 8:
             parts[segment[6]], last = segment[8:], segment[7]
+        if segment.startswith(_EXIF):
+            _note_orientation(segment, notes)
         place += 2 + length
     if not parts:
         raise SourceError(f"{binary.path}: is a JPEG without FLIR's counts in it")
@@ -281,6 +288,20 @@ def _records(binary: Binary) -> Binary:
         )
     inside = b"".join(parts[number] for number in range(last + 1))
     return Binary(binary.path, BytesIO(inside), len(inside))
+
+
+def _note_orientation(segment: bytes, notes: Notes) -> None:
+    """Warn of an image that viewers turn: the counts are stored as the sensor reads them."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    with suppress(Exception):  # damaged EXIF concerns the visible image only
+        exif.load(segment)
+    if (orientation := exif.get(ORIENTATION, 1)) != 1:
+        notes.warnings.append(
+            f"The JPEG states the EXIF orientation {orientation}, by which viewers turn the image; "
+            "the counts are not turned (set quarter_turns or mirror)."
+        )
 
 
 def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
@@ -336,7 +357,7 @@ def _whole_picture(binary: Binary, place: int, length: int) -> bool:
 def has_packed_counts(path: Path) -> bool:
     """Return whether the counts of a file are packed as PNG or JPEG-LS."""
     with opened(path) as file:
-        binary = _records(file)
+        binary = _records(file, Notes())
         stored = binary.read(*_frame(binary, 0, 0, Notes()).records[_RAW])
         return _packing(stored[_RAW_HEADER:]) != ""
 
@@ -364,9 +385,4 @@ def _in_order(values: NDArray[np.uint16]) -> NDArray[np.uint16]:
     Neighbours in an image are similar, unless the bytes of its counts are swapped.
     """
     swapped = values.byteswap()
-    return swapped if _roughness(swapped) < _roughness(values) else values
-
-
-def _roughness(values: NDArray[np.uint16]) -> int:
-    wide = values.astype(np.int64)
-    return int(np.abs(np.diff(wide, axis=0)).sum() + np.abs(np.diff(wide, axis=1)).sum())
+    return swapped if roughness(swapped) < roughness(values) else values

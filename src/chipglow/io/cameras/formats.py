@@ -14,7 +14,8 @@ from chipglow.io.cameras.ptw import Ptw
 from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sandbox import Sandbox
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.source import files_of, head_of, reading
+from chipglow.io.sources.file_names import files_of
+from chipglow.io.sources.source import head_of, reading
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
@@ -76,6 +77,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     ),
     "cine": CameraFormat("Phantom CINE", (".cine",), _starts(b"CI\x2c\0"), Cine.recording),
     "tiff": _array("TIFF, a stack or one file per frame", (".tif", ".tiff"), _starts(*_TIFF)),
+    "png": _array("PNG, grey, one file per frame", (".png",), _starts(b"\x89PNG\r\n")),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
     "npz": _array("NumPy arrays, zipped", (".npz",)),
     "mat": _hdf5("MATLAB, versions 5 to 7.3", (".mat",), _starts(b"MATLAB ")),
@@ -131,7 +133,7 @@ def read_recording(
     Parameters
     ----------
     path : str or Path
-        The file. For TIFF and tables also a pattern with ``*``: one file per frame.
+        The file. For TIFF, PNG and tables also a pattern with ``*``: one file per frame.
     frames : slice, optional
         Which frames to read, all by default; the others are not read.
     format : str, optional

@@ -79,7 +79,7 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
         reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
         arrays = open_arrays(str(path), stack, reader)
         one = _dataset(path, arrays, stated.dataset)
-        notes = Notes()
+        notes = Notes() + one.notes
         axes = axes_of(one, stated.axes, notes)
         lengths = dict(zip(axes, one.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)

@@ -1,11 +1,11 @@
 """Arrays in files of many formats behind one face: they are described first and read in parts."""
 
-import logging
 import mmap
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
 from functools import cache, partial
 from math import prod
 from pathlib import Path
@@ -15,8 +15,10 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.source import SourceError, check_hdf5, files_of, head_of, reading, required
+from chipglow.io.sources.file_names import files_of, missing_number
+from chipglow.io.sources.source import SourceError, check_hdf5, head_of, reading, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
+from chipglow.text import Notes
 
 MOST_SAMPLES: Final = 100_000_000
 """Maximum number of samples that are read at once."""
@@ -25,6 +27,8 @@ MOST_ON_A_SIDE: Final = 1_000_000
 """Maximum number of samples along an axis other than time."""
 
 _KINDS: Final = "fiub"
+_MEANING: Final = ("units", "scale_factor", "add_offset", "_FillValue", "missing_value")
+"""Attributes on which the meaning of numbers depends: those of a series are of its first file."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
     "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
@@ -52,6 +56,8 @@ class FileArray:
     """Shape of the parts that the file keeps together."""
     path: str = ""
     """The file or pattern."""
+    notes: Notes = field(default_factory=Notes)
+    """Assumptions and warnings of the reader, and corrections that it applied."""
 
     def __str__(self) -> str:
         return f"{self.path}: {self.name}"
@@ -80,6 +86,11 @@ class FileArray:
             return self.read(key)
 
 
+def list_array(name: str, values: NDArray[np.float64], unit: str) -> FileArray:
+    """Return values of a coordinate as an array of a file."""
+    return FileArray(name, values.shape, lambda key: values[key], attributes={"units": unit})
+
+
 ArrayReader: TypeAlias = Callable[[Path, ExitStack], Iterator[FileArray]]
 """Opens a file, which the stack closes, and yields its arrays."""
 
@@ -104,7 +115,10 @@ def open_arrays(
         raise SourceError(f"{paths[0]}: there is no array of numbers in it")
     arrays = list(first.values())
     if len(paths) > 1 or paths[0] != Path(pattern):
-        arrays = [_series(paths, array, reader) for array in arrays]
+        notes, gap = Notes(), missing_number(paths)
+        if gap:
+            notes.warnings.append(f"{pattern}: {gap}; the frames are taken as evenly spaced.")
+        arrays = [_series(paths, array, reader, notes) for array in arrays]
     only = re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
     arrays = [replace(array, name=array.name or only, path=pattern) for array in arrays]
     return {array.name: array for array in arrays}
@@ -125,7 +139,9 @@ def _open_file(
         return {array.name: replace(array, path=str(path)) for array in reader(path, stack)}
 
 
-def _series(paths: Sequence[Path], first: FileArray, reader: ArrayReader | None) -> FileArray:
+def _series(
+    paths: Sequence[Path], first: FileArray, reader: ArrayReader | None, notes: Notes
+) -> FileArray:
     def read(key: Key) -> NDArray[Any]:
         chosen = paths[key[0]]
         check_samples(str(chosen[0]), len(chosen) * first.size)
@@ -134,7 +150,8 @@ def _series(paths: Sequence[Path], first: FileArray, reader: ArrayReader | None)
 
     dims = ("time", *first.dims) if first.dims else ()
     shape, chunks = (len(paths), *first.shape), (1, *first.shape)
-    return replace(first, shape=shape, read=read, dims=dims, chunks=chunks)
+    notes = first.notes + notes
+    return replace(first, shape=shape, read=read, dims=dims, chunks=chunks, notes=notes)
 
 
 def _read_whole(path: Path, first: FileArray, reader: ArrayReader | None) -> NDArray[Any]:
@@ -145,6 +162,13 @@ def _read_whole(path: Path, first: FileArray, reader: ArrayReader | None) -> NDA
             raise SourceError(
                 f"{path}: expected an array {first.name!r} of shape {first.shape}, it has {found}"
             )
+        for name in _MEANING:
+            ours, stated = array.attributes.get(name), first.attributes.get(name)
+            if str(ours) != str(stated):
+                raise SourceError(
+                    f"{path}: {name} of {first.name!r} is {ours}, expected {stated} as in the "
+                    "first file of the series"
+                )
         return array.part()
 
 
@@ -294,12 +318,63 @@ def _netcdf3(path: Path, stack: ExitStack) -> Iterator[FileArray]:
 # MATLAB
 
 
+_FRAME: Final = re.compile(r"Frame(\d+)")
+_DATE: Final = "_DateTime"
+"""ResearchIR exports the images Frame1, Frame2, ... and Frame1_DateTime, ..."""
+
+
 def _matlab(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     import h5py
 
-    if h5py.is_hdf5(path):
-        yield from _hdf5(path, stack)
+    read = _hdf5 if h5py.is_hdf5(path) else _matlab_5
+    arrays = {array.name: array for array in read(path, stack)}
+    images = {
+        int(match[1]): array for name, array in arrays.items() if (match := _FRAME.fullmatch(name))
+    }
+    numbers = sorted(images)
+    frames = [images[number] for number in numbers]
+    if len(frames) < 2 or len({array.shape for array in frames}) > 1:
+        yield from arrays.values()
         return
+    dates = [arrays.get(array.name + _DATE) for array in frames]
+    used = {array.name for array in (*frames, *dates) if array is not None}
+    yield from (array for name, array in arrays.items() if name not in used)
+    notes = Notes()
+    if None not in dates:
+        yield list_array("time", _seconds_since_first(path, [one for one in dates if one]), "s")
+    elif np.ptp(np.diff(numbers)):
+        notes.warnings.append(
+            f"The numbers of the arrays {frames[0].name} to {frames[-1].name} have gaps; they are "
+            "taken as evenly spaced."
+        )
+    shape = (len(frames), *frames[0].shape)
+    yield FileArray("Frame", shape, partial(_stack, frames), ("time", "y", "x"), notes=notes)
+
+
+def _stack(arrays: Sequence[FileArray], key: Key) -> NDArray[Any]:
+    return np.stack([array.part(key[1:]) for array in arrays[key[0]]])
+
+
+def _seconds_since_first(path: Path, dates: Sequence[FileArray]) -> NDArray[np.float64]:
+    """Return times in s of lists of year, month, day, hour, minute, second and millisecond."""
+    moments = [_moment(path, array) for array in dates]
+    return np.array([(moment - moments[0]).total_seconds() for moment in moments])
+
+
+def _moment(path: Path, array: FileArray) -> datetime:
+    numbers = np.asarray(array.part(), np.float64).reshape(-1).tolist()
+    try:
+        year, month, day, hours, minutes, seconds, milliseconds = numbers
+        since = timedelta(hours=hours, minutes=minutes, seconds=seconds, milliseconds=milliseconds)
+        return datetime(int(year), int(month), int(day)) + since
+    except (TypeError, ValueError, OverflowError):
+        raise SourceError(
+            f"{path}: {array.name} is {numbers}, expected year, month, day, hour, minute, second "
+            "and millisecond"
+        ) from None
+
+
+def _matlab_5(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     from scipy.io import whosmat
 
     for name, shape, kind in whosmat(path):
@@ -320,55 +395,19 @@ def _load_matlab(path: Path, name: str) -> NDArray[Any]:
     return values
 
 
-# TIFF
+# TIFF, PNG
 
 
 def _tiff(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    tifffile = required("tifffile", path, "grid")
-    with _errors_logged("tifffile") as errors:
-        file = stack.enter_context(tifffile.TiffFile(path))
-        every = list(file.series)
-    if errors:
-        raise SourceError(f"{path}: is damaged or truncated: {errors[0]}")
-    for number, series in enumerate(every):
-        if series.dtype.kind in _KINDS:
-            if "S" in series.axes:
-                raise SourceError(f"{path}: has colours; a single value per sample is required")
-            dims = tuple({"Y": "y", "X": "x"}.get(axis, "time") for axis in series.axes)
-            name = f"series_{number + 1}" if number else ""
-            yield FileArray(name, tuple(series.shape), _tiff_reader(path, series), dims)
+    from chipglow.io.sources.images import tiff_arrays  # which needs FileArray
+
+    yield from tiff_arrays(path, stack)
 
 
-@contextmanager
-def _errors_logged(name: str) -> Iterator[list[str]]:
-    """Collect errors that a library logs while it continues with the rest of a file."""
-    said: list[str] = []
-    handler = logging.Handler(logging.ERROR)
-    handler.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
-    logging.getLogger(name).addHandler(handler)
-    try:
-        yield said
-    finally:
-        logging.getLogger(name).removeHandler(handler)
+def _png(path: Path, stack: ExitStack) -> Iterator[FileArray]:
+    from chipglow.io.sources.images import png_arrays  # which needs FileArray
 
-
-def _tiff_reader(path: Path, series: Any) -> Read:
-    if series.dataoffset is not None:
-        dtype = np.dtype(series.parent.byteorder + series.dtype.char)
-        values = np.memmap(path, dtype, "r", series.dataoffset, tuple(series.shape))
-        return partial(_copy_of_mapped, values)
-    for page in series.pages:
-        ends = [a + n for a, n in zip(page.dataoffsets, page.databytecounts, strict=True)]
-        if max(ends, default=0) > path.stat().st_size:
-            raise SourceError(f"{path}: is truncated, a picture ends at byte {max(ends)}")
-    return partial(_tiff_pages, path, series)
-
-
-def _tiff_pages(path: Path, series: Any, key: Key) -> NDArray[Any]:
-    pages = list(series.pages)[key[0]] if len(series.shape) > 2 else list(series.pages)
-    check_samples(str(path), len(pages) * prod(series.shape[-2:]))
-    part = np.stack([page.asarray(maxworkers=1)[key[-2:]] for page in pages])
-    return part[0] if len(series.shape) == 2 else part
+    yield from png_arrays(path, stack)
 
 
 # Zarr
@@ -445,6 +484,7 @@ ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     **dict.fromkeys((".nc", ".nc4", ".cdf"), _netcdf),
     ".mat": _matlab,
     **dict.fromkeys((".tif", ".tiff"), _tiff),
+    ".png": _png,
     **dict.fromkeys((".zarr", ".zip"), _zarr),
     **dict.fromkeys((".csv", ".txt", ".dat"), _csv),
 }

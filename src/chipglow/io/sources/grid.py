@@ -190,6 +190,7 @@ class _Grid:
         """Arrays that are neither field nor coordinate."""
 
     def _layer(self, name: str, array: FileArray) -> _Layer:
+        self.notes += array.notes
         axes = axes_of(array, self._source.axes, self.notes)
         unit = SI
         if name != "material":

@@ -60,6 +60,11 @@ def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tupl
     if given is not None:
         names = tuple(given)
     elif sorted(names) not in (sorted(AXES), ["x", "y"]):
+        if len(shape) == 3 and array.path.lower().endswith(".mat"):
+            raise SourceError(
+                f"{array}: has shape {shape}, give the axes: y, x, time as MATLAB orders images, "
+                "or time, y, x"
+            )
         names = AXES[-len(shape) :]
         notes.assumed.append(f"The axes of {array.name} are {', '.join(names)}.")
     if len(names) != len(shape) or len(shape) not in (2, 3):

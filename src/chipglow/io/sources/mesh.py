@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, match_names, simple
+from chipglow.io.sources.file_names import files_of
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_flat import FlatMesh, flatten
@@ -21,7 +22,6 @@ from chipglow.io.sources.source import (
     SourceError,
     Survey,
     even_times,
-    files_of,
     naming,
     reading,
     required,

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources.file_names import natural
 from chipglow.io.sources.mesh_reader import Block, MeshReader, grid_of
-from chipglow.io.sources.source import SourceError, natural, reading
+from chipglow.io.sources.source import SourceError, reading
 
 if TYPE_CHECKING:
     import pandas as pd

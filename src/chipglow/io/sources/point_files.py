@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.source import SourceError, files_of, head_of, mapped, reading, required
+from chipglow.io.sources.file_names import files_of
+from chipglow.io.sources.source import SourceError, head_of, mapped, reading, required
 from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")

@@ -1,14 +1,10 @@
 """Interface of all readers of fields: a survey, and frames sampled on a raster."""
 
-import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from errno import ENOENT
-from glob import glob, has_magic
 from importlib import import_module
-from itertools import pairwise
 from math import isfinite
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -18,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Raster, SampledFrame
-from chipglow.text import Notes, check_own_data
+from chipglow.text import Notes, check_own_data, needs_extra
 
 
 class SourceError(ValueError):
@@ -30,9 +26,7 @@ def required(module: str, file: object, extra: str, called: str = "") -> Any:
     try:
         return import_module(module)
     except ImportError:
-        raise SourceError(
-            f"{file}: needs {called or module}, expected pip install 'chipglow[{extra}]'"
-        ) from None
+        raise SourceError(needs_extra(file, called or module, extra)) from None
 
 
 @contextmanager
@@ -80,47 +74,6 @@ def mapped(file: Path) -> mmap:
     """Return the bytes of a file, mapped into memory."""
     with file.open("rb") as stream:
         return mmap(stream.fileno(), 0, access=ACCESS_READ)
-
-
-def natural(name: str) -> tuple[tuple[int, str], ...]:
-    """Return a key that sorts 9 before 10."""
-    words = re.split(r"(\d+)", name)
-    return tuple((int(word), "") if word.isdecimal() else (-1, word) for word in words)
-
-
-def files_of(pattern: str | Path, *, gaps_allowed: bool = True) -> tuple[Path, ...]:
-    """Return the files of a path or pattern such as ``chip_*.vtu``, by the numbers in their names.
-
-    A missing number in an otherwise regular series is a `SourceError` unless gaps are allowed.
-    """
-    if Path(pattern).exists():
-        return (Path(pattern),)
-    if not has_magic(str(pattern)):
-        raise FileNotFoundError(ENOENT, "there is no such file", str(pattern))
-    names = glob(str(pattern))  # noqa: PTH207  the folder may be part of the pattern
-    files = tuple(Path(name) for name in sorted(names, key=natural))
-    if not files:
-        raise FileNotFoundError(ENOENT, "no file has such a name", str(pattern))
-    if not gaps_allowed:
-        _check_gaps(pattern, files)
-    return files
-
-
-def _check_gaps(pattern: str | Path, files: Sequence[Path]) -> None:
-    numbers = [[int(digits) for digits in re.findall(r"\d+", file.name)] for file in files]
-    columns = [column for column in zip(*numbers, strict=False) if len(set(column)) == len(files)]
-    if len(files) < 3 or not columns:
-        return
-    counts = columns[-1]
-    steps = [after - before for before, after in pairwise(counts)]
-    usual = max(sorted(set(steps)), key=steps.count)
-    for file, count, step in zip(files, counts, steps, strict=False):
-        # A step that is twice the usual one is a file that got lost; the last is often shorter.
-        if step > usual and step % usual == 0:
-            raise SourceError(
-                f"{pattern}: after {file.name} number {count + usual} is missing, expected the "
-                "whole series, or the time of each file"
-            )
 
 
 @dataclass(frozen=True)

@@ -35,8 +35,8 @@ WHOLE: Final = np.s_[:, :]
 
 _BLOCKS: Final = 4
 _CLEARLY: Final = 4.0
-_MOST_SATURATED: Final = 0.05
-"""Fraction of a flat-field source's frames that may be saturated, as bad pixels are."""
+_MOST_OUTSIDE: Final = 0.05
+"""Fraction of a flat-field source's frames that may be outside the range, as bad pixels are."""
 
 
 def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
@@ -124,10 +124,12 @@ def uniform_counts(
             good &= ~bad[region]
         if not good.any():
             raise ValueError("the region contains no good pixel")
-        if recording.saturation is not None:
-            fraction = float(np.mean(recording.signal[:, *region][:, good] > recording.saturation))
-            if fraction > 0:
-                raise ValueError(f"{fraction:.2%} of it is saturated, expected a darker object")
+        for wrong, problem in (
+            (recording.saturated(), "saturated, expected a darker object"),
+            (recording.under_range(), "below the camera's range, expected a brighter object"),
+        ):
+            if fraction := float(np.mean(wrong[:, *region][:, good])):
+                raise ValueError(f"{fraction:.2%} of it is {problem}")
     except ValueError as error:
         raise DescriptionError(f"{source}: {error}") from error
     signal = signal[:, *region]
@@ -234,7 +236,12 @@ def _problems(uniform: Recording, recording: Recording) -> Iterator[str]:
             f"has an integration time of {1e6 * theirs:g} us, the recording {1e6 * ours:g} us, "
             "they must be the same"
         )
-    if recording.saturation is not None:
-        fraction = float(np.mean(uniform.signal > recording.saturation))
-        if fraction > _MOST_SATURATED:
-            yield f"{fraction:.0%} of it is saturated, expected a darker flat-field source"
+    same_range = replace(
+        uniform, saturation=recording.saturation, least_signal=recording.least_signal
+    )
+    for outside, problem in (
+        (same_range.saturated(), "saturated, expected a darker flat-field source"),
+        (same_range.under_range(), "below the range, expected a brighter flat-field source"),
+    ):
+        if (fraction := float(np.mean(outside))) > _MOST_OUTSIDE:
+            yield f"{fraction:.0%} of it is {problem}"

@@ -85,7 +85,7 @@ class MeasurementDescription(Part):
 
     file: Annotated[
         FileBeside | None,
-        Parameter("The camera file; for TIFF and tables also a pattern: frame_*.tif."),
+        Parameter("The camera file; for TIFF, PNG and tables also a pattern: frame_*.tif."),
     ] = None
     format: Annotated[
         str | None,

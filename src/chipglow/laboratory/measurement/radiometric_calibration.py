@@ -216,7 +216,7 @@ def repaired_signal(
     """Return a recording's signal with its pixels corrected, and flags."""
     raw = recording.signal
     signal = raw.astype(np.float64)
-    over = raw > (np.inf if recording.saturation is None else recording.saturation)
+    over, under = recording.saturated(), recording.under_range()
     bad = np.zeros(raw.shape[1:], np.bool_) if bad_pixels is None else bad_pixels
     if non_uniformity is not None:
         signal = non_uniformity.apply(signal)
@@ -224,19 +224,20 @@ def repaired_signal(
     flags = np.zeros(raw.shape, np.uint8)
     if bad_pixels is not None or bad.any():
         signal, replaced = replace_bad_pixels(signal, bad)
-        over = _over(over, bad, replaced)
+        over, under = _outside(over, bad, replaced), _outside(under, bad, replaced)
         flags[:, bad & ~replaced] = Flag.DEAD
         flags[:, replaced] = Flag.REPLACED
     flags[over] |= np.uint8(Flag.SATURATED)
+    flags[under] |= np.uint8(Flag.UNDER_RANGE)
     signal[~np.isfinite(signal)] = np.nan
     return signal, flags
 
 
-def _over(
-    over: NDArray[np.bool_], bad: NDArray[np.bool_], replaced: NDArray[np.bool_]
+def _outside(
+    outside: NDArray[np.bool_], bad: NDArray[np.bool_], replaced: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Mark a replaced pixel as saturated if a neighbour is: its median cannot be trusted."""
-    trusted = over & ~bad
+    """Mark a replaced pixel as outside the range if a neighbour is: its median has a bias."""
+    trusted = outside & ~bad
     result = trusted.copy()
     for y, x in np.argwhere(replaced):
         around = np.s_[:, max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]

@@ -7,7 +7,7 @@ from typing import Final, NotRequired
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from PIL import Image, ImageSequence, UnidentifiedImageError
+from PIL import ExifTags, Image, ImageOps, ImageSequence, UnidentifiedImageError
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
@@ -21,6 +21,8 @@ from chipglow.quantities import Array, problem
 from chipglow.scene import Raster
 from chipglow.text import DescriptionError, Notes, read_small_text, read_yaml
 
+_TRANSPOSED: Final = (5, 6, 7, 8)
+"""Orientations with exchanged rows and columns: Pillow scrambles TIFF files that state them."""
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif")
 
 _MOST_PIXELS: Final = 400_000_000
@@ -117,7 +119,15 @@ def _frames(path: Path) -> NDArray[np.float32]:
         with Image.open(path) as picture:
             if getattr(picture, "n_frames", 1) * picture.width * picture.height > _MOST_PIXELS:
                 raise ValueError(f"{path}: expected up to {_MOST_PIXELS} pixels in all")
-            frames = [_brightness(page) for page in ImageSequence.Iterator(picture)]
+            orientation = picture.getexif().get(ExifTags.Base.Orientation)
+            if picture.format == "TIFF" and orientation in _TRANSPOSED:
+                raise ValueError(
+                    f"{path}: a TIFF picture on its side (tag Orientation {orientation}); save it "
+                    "upright"
+                )
+            # Points are chosen in a viewer, which turns a picture as its EXIF states.
+            pages = map(ImageOps.exif_transpose, ImageSequence.Iterator(picture))
+            frames = [_brightness(page) for page in pages]
     except (UnidentifiedImageError, Image.DecompressionBombError):
         raise ValueError(f"{path}: expected a picture, such as PNG, TIFF or JPEG") from None
     except (SyntaxError, EOFError, OSError) as error:
