@@ -17,7 +17,7 @@ from chipglow.io.sources.conventions import (
     simple,
 )
 from chipglow.io.sources.layout import check_times, unit_of
-from chipglow.io.sources.point_files import DUMP_ENDINGS, PointTable, open_points
+from chipglow.io.sources.point_files import PointTable, open_points
 from chipglow.io.sources.source import Source, SourceError, Survey, even_times, naming, span_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, Unit
@@ -42,8 +42,6 @@ class CloudSource(Source, Part):
     """
 
     title: ClassVar[str] = "points"
-    # Most files of points have another ending: they are called by their kind.
-    endings: ClassVar[tuple[str, ...]] = DUMP_ENDINGS
     files: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     spacing: Annotated[
