@@ -1,10 +1,17 @@
-"""Files from outside: small text files, YAML and what it describes, HDF5 without links."""
+"""Files from outside: text tables, YAML and what it describes, HDF5 without links."""
 
+from chipglow.text.cells import TableError as TableError
 from chipglow.text.description import (
     described_by as described_by,
     load_described as load_described,
     placed as placed,
     validated as validated,
+)
+from chipglow.text.matrix_table import Matrix as Matrix, read_matrix as read_matrix
+from chipglow.text.named_table import (
+    NamedTable as NamedTable,
+    has_names_of_columns as has_names_of_columns,
+    read_named_table as read_named_table,
 )
 from chipglow.text.notes import Notes as Notes
 from chipglow.text.own_data import check_own_data as check_own_data

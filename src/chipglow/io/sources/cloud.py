@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
@@ -142,6 +143,7 @@ class _Points:
     def cloud(self, table: PointTable) -> Cloud:
         """Return points of a table in the scene, in SI."""
         table.check()
+        self.notes = self.notes + table.notes.about(Path(table.path).name)
         source, placement = self._source, self._source.placement
         places = self._places(table)
         values = np.stack([self._values(table, name) for name in self.found], axis=1)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
-from chipglow.io.sources.source import SourceError, files_of, reading, required
-from chipglow.io.sources.text_table import TextTable
+from chipglow.io.sources.source import SourceError, files_of, required, table_errors
+from chipglow.text import NamedTable, Notes, read_named_table
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".dat", ".tsv")
@@ -38,6 +38,7 @@ class PointTable:
     """Units that the file states, by the names of the columns."""
     wrong: Mapping[str, str] = field(default_factory=dict)
     """Errors about columns of text."""
+    notes: Notes = field(default_factory=Notes)
 
     @property
     def count(self) -> int:
@@ -112,40 +113,27 @@ def _read_file(path: Path) -> PointTable:
 
 
 def _read_text(path: Path) -> PointTable:
-    import pandas as pd
-
-    with reading(path):
-        table = TextTable.look_at(path)
-        labels = [re.split(r"[\[(]", cell)[0].strip() or cell for cell in table.cells]
-        _check_labels(path, table, labels)
-        frame = table.read(names=labels, header=0, index_col=False, on_bad_lines="error")
-        columns, wrong = {}, {}
-        for label in labels:
-            values = frame[label]
-            if values.dtype.kind not in "fiub":
-                text = values.astype(str).str.replace(table.decimal, ".")
-                numbers = pd.to_numeric(text, errors="coerce")
-                rows = np.flatnonzero(numbers.isna() & values.notna())
-                if rows.size:
-                    wrong[label] = (
-                        f"{path}, line {table.line_of(rows[0])}: {label} is "
-                        f"{str(values[rows[0]])[:40]!r}, expected a number"
-                    )
-                values = numbers
-            columns[label] = values.to_numpy()
-    units = [re.search(r"[\[(]([^\])]*)[\])]\s*$", cell) for cell in table.cells]
+    with table_errors():
+        table = read_named_table(path)
+        labels = [re.split(r"[\[(]", name)[0].strip() or name for name in table.names]
+        _check_labels(table, labels)
+        columns, errors = table.columns()
+    units = [re.search(r"[\[(]([^\])]*)[\])]\s*$", name) for name in table.names]
     known = {label: unit[1].strip() for label, unit in zip(labels, units, strict=True) if unit}
-    return PointTable(str(path), columns, known, wrong)
+    wrong = {labels[index]: error for index, error in errors.items()}
+    numbers = dict(zip(labels, columns, strict=True))
+    return PointTable(str(path), numbers, known, wrong, table.notes)
 
 
-def _check_labels(path: Path, table: TextTable, labels: Sequence[str]) -> None:
+def _check_labels(table: NamedTable, labels: Sequence[str]) -> None:
+    place = f"{table.path}, line {table.first}"
     if not any(re.match(r"[A-Za-z]", label) for label in labels):
         raise SourceError(
-            f"{path}, line 1: {table.first[:60]!r}, expected names of columns such as "
+            f"{place}: {', '.join(labels)[:60]!r}, expected names of columns such as "
             "x,y,temperature"
         )
     if len(set(labels)) < len(labels):
-        raise SourceError(f"{path}, line 1: two columns have one name")
+        raise SourceError(f"{place}: two columns have one name")
 
 
 def _split(table: PointTable, time: str | None) -> PointFrames:
