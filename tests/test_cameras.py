@@ -422,7 +422,7 @@ def test_lines_of_text_before_an_exported_table_are_left_out(tmp_path, mark, dec
     path = make(tmp_path, "a.csv", text.encode())
     recording = read_here(path, "csv", None, Stated(unit="K"))
     assert np.abs(recording.signal[0] - PICTURES[0] / 40).max() < 0.006
-    assert recording.notes.remarks[-1] == "Ignored 3 lines of text before the numbers."
+    assert recording.notes.remarks == ["Ignored text that is not part of the matrix: lines 1, 3."]
 
 
 def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):

@@ -448,8 +448,8 @@ def test_hdf5_that_claims_too_much(tmp_path, shape, chunks):
     ("text", "said"),
     [
         ("1," * 10**7 + "1\n", "a line has over 4000000 letters"),
-        ("300,301\n302,hot\n", "column 2: has text in it"),
-        ("300,301\n302,303,304\n", "T.csv"),
+        ("300,301\n302,hot\n", "T.csv, line 2, column 2: 'hot' is not a number"),
+        ("300,301\n302,303,304\n", "T.csv, line 1: has 2 cells, expected 3"),
     ],
     ids=["long", "text", "ragged"],
 )

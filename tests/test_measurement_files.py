@@ -180,6 +180,8 @@ def test_tables_are_read_with_their_units(tmp_path):
     assert read["temperature"] == pytest.approx([873.15, 373.15])
     assert read["temperature_uncertainty"] == pytest.approx([1.0, 5.0])
     assert read["counts"].tolist() == [10.0, 20.0]
+    table.write_text("temperature_degC;counts\n600,5;1000\n700;2000\n")
+    assert read_table(table, POINT_COLUMNS)[0]["temperature"] == pytest.approx([873.65, 973.15])
     table.write_text("wavelength_nm,response\n5000,0.5\n4000,1\n")
     assert read_response(table).wavelengths == pytest.approx((4e-6, 5e-6))
     table.write_text("column,row\n3,0\n")
@@ -194,13 +196,14 @@ def test_tables_are_read_with_their_units(tmp_path):
         ("", "no number in it"),
         ("temperature_degC,counts\n", "no number in it"),
         ("temperature,counts\n1,2\n", "line 1: 'temperature' has no unit, expected .*_degC"),
-        ("temperature_K;counts\n1;2\n", "line 1: .* is separated by ';', expected commas"),
+        ("temperature_K;counts\n1,234;2\n", "line 2, column 1: .* may be the decimal mark"),
+        ("temperature_K;counts\n1.234;2.345\n", "the decimal mark is not certain"),
         ("temperature_um,counts\n1,2\n", "line 1: unknown unit 'um'"),
         ("temperature_K,colour\n1,2\n", "line 1: unknown column 'colour'"),
         ("temperature_K\n1\n", "expected a column 'counts', once"),
         ("temperature_K,counts,counts\n1,2,3\n", "expected a column 'counts', once"),
-        ("temperature_K,counts\n1,2\n3\n", "line 3: '3', expected 2 numbers"),
-        ("temperature_K,counts\n1,nan\n", "line 2: '1,nan', expected 2 numbers"),
+        ("temperature_K,counts\n1,2\n3\n", "line 3: has 1 cell separated by ',', expected 2"),
+        ("temperature_K,counts\n1,nan\n", "line 2: counts is 'nan', expected a number"),
         ("temperature_K,counts\n1,two\n", "line 2"),
     ],
 )
@@ -555,16 +558,16 @@ def test_a_blackbody_before_a_background_is_refused_until_its_region_is_given(tm
     ("table", "settings", "message"),
     [
         ("nothing.csv", [], "nothing.csv"),
-        ("chip.npy", [], "chip.npy: expected text"),
+        ("chip.npy", [], "chip.npy: is not text"),
         ("temperature_degC,counts\n300,1000\n", [], "wrong.csv: calibration: 1 points"),
         ("temperature_degC,counts\n300,3\n400,5\n500,9\n", CAMERA, "--set: .* no recordings"),
         ("temperature_degC,file\n300,none.npy\n", CAMERA, "none.npy"),
         ("temperature_degC,file\n300,hot.npy\n", [*CAMERA[:2], "saturation=2000"], "saturated"),
         ("temperature_degC,file\n300,hot.npy\n", ["unit=K", "interval=1 ms"], "expected counts"),
-        ("temperature_degC,file\nhot,hot.npy\n", CAMERA, "line 2: 'hot,hot.npy', expected 2"),
+        ("temperature_degC,file\nhot,hot.npy\n", CAMERA, "line 2: temperature is 'hot', expected"),
         ("temperature_degC,file,counts\n300,hot.npy,3\n", CAMERA, "line 2: expected either"),
         ("temperature_degC,file,counts\n300,,\n", CAMERA, "line 2: expected either counts or"),
-        ("temperature_degC,file,counts\n300,,many\n", CAMERA, "line 2: '300,,many', expected"),
+        ("temperature_degC,file,counts\n300,,many\n", CAMERA, "line 2: counts is 'many', expected"),
     ],
 )
 def test_a_table_of_no_black_bodies_is_one_clear_error(laboratory, table, settings, message):

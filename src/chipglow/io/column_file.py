@@ -1,6 +1,5 @@
 """Small tables in text: columns by name, each with its unit."""
 
-import csv
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from chipglow.quantities import Array
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.radiometry import TabulatedResponse
-from chipglow.text import read_small_text
+from chipglow.text import NamedTable, read_named_table
 
 
 @dataclass(frozen=True)
@@ -45,37 +44,36 @@ POINT_COLUMNS: Final = (TEMPERATURE, Column("counts"), *_POINT_UNCERTAINTIES)
 
 
 def read_table(
-    path: str | os.PathLike[str], columns: Sequence[Column]
+    path: str | os.PathLike[str] | NamedTable, columns: Sequence[Column]
 ) -> tuple[dict[str, Array], list[int]]:
     """Read a table of numbers from a CSV file, and which line of the file each row is.
 
     The columns are in SI by name, each of shape (rows,). In the first line the unit follows the
-    name: ``temperature_degC,counts``.
+    name: ``temperature_degC,counts``. Semicolons and tabs separate cells as well, then also with
+    a decimal comma.
     """
-    path = Path(path)
-    lines = read_small_text(path).splitlines()
-    rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
-    if len(rows) < 2:
+    table = path if isinstance(path, NamedTable) else read_named_table(Path(path))
+    if not table.rows:
         raise ValueError(
-            f"{path}: there is no number in it, expected a first line such as "
+            f"{table.path}: there is no number in it, expected a first line such as "
             f"{','.join(column.title for column in columns)} and lines of numbers"
         )
-    first = rows[0][1]
-    if len(first) == 1 and len(columns) > 1 and (mark := next(filter(first[0].count, ";\t"), "")):
-        raise ValueError(
-            f"{path}, line 1: {first[0][:60]!r} is separated by {mark!r}, expected commas"
-        )
-    found = [_column(path, cell.strip(), columns) for cell in first]
+    place = f"{table.path}, line {table.first}"
+    found = [_column(place, name, columns) for name in table.names]
     names = [column.name for column, _ in found]
     for column in columns:
         if names.count(column.name) > 1 or (column.required and column.name not in names):
-            raise ValueError(f"{path}, line 1: expected a column {column.title!r}, once")
-    numbers = np.array([_numbers(path, number, row, found) for number, row in rows[1:]])
-    table = {
+            raise ValueError(f"{place}: expected a column {column.title!r}, once")
+    if table.notes.assumed and table.separator != ",":
+        raise ValueError(
+            f"{table.path}: the decimal mark is not certain; separate the cells by commas"
+        )
+    numbers = np.array([_numbers(table, line, cells, found) for line, cells in table.cells()])
+    values = {
         column.name: unit.scale * values + (0.0 if column.difference else unit.offset)
         for (column, unit), values in zip(found, numbers.T, strict=True)
     }
-    return table, [number for number, _ in rows[1:]]
+    return values, [line for line, _ in table.rows]
 
 
 def read_calibration_points(
@@ -86,12 +84,12 @@ def read_calibration_points(
     A column ``file`` may stand for ``counts`` or beside it, where each line fills one of both:
     `counts_of` gives the counts of that recording.
     """
-    first = read_small_text(Path(path)).partition("\n")[0]
-    if "file" not in map(str.strip, first.split(",")):
-        return read_table(path, POINT_COLUMNS)[0]
+    points = read_named_table(Path(path))
+    if "file" not in points.names:
+        return read_table(points, POINT_COLUMNS)[0]
     counts = Column("counts", required=False, blank=True)
     file = Column("file", number_of=counts_of, blank=True)
-    table, lines = read_table(path, (TEMPERATURE, counts, file, *_POINT_UNCERTAINTIES))
+    table, lines = read_table(points, (TEMPERATURE, counts, file, *_POINT_UNCERTAINTIES))
     stated = table.pop("counts", np.full(len(lines), nan))
     read = table.pop("file")
     for line, both in zip(lines, np.isfinite(stated) == np.isfinite(read), strict=True):
@@ -100,45 +98,46 @@ def read_calibration_points(
     return {**table, "counts": np.fmax(stated, read)}
 
 
-def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
+def _column(place: str, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
     """Return the column that a cell of the first line names, and its unit."""
     for column in sorted(columns, key=lambda one: -len(one.name)):
         if cell == column.name and not column.base:
             return column, SI
         if cell == column.name:
             raise ValueError(
-                f"{path}, line 1: {cell!r} has no unit, expected a name such as {column.title}"
+                f"{place}: {cell!r} has no unit, expected a name such as {column.title}"
             )
         if cell.startswith(f"{column.name}_") and column.base:
             try:
                 return column, parse_unit(cell[len(column.name) + 1 :], column.base, column.name)
             except ValueError as error:
-                raise ValueError(f"{path}, line 1: {error}") from None
+                raise ValueError(f"{place}: {error}") from None
     expected = ", ".join(column.title for column in columns)
-    raise ValueError(f"{path}, line 1: unknown column {cell[:60]!r}, expected {expected}")
+    raise ValueError(f"{place}: unknown column {cell[:60]!r}, expected {expected}")
 
 
 def _numbers(
-    path: Path, number: int, row: list[str], columns: Sequence[tuple[Column, Unit]]
+    table: NamedTable, line: int, cells: list[str], columns: Sequence[tuple[Column, Unit]]
 ) -> list[float]:
-    if len(row) == len(columns):
-        cells = [(cell.strip(), column) for cell, (column, _) in zip(row, columns, strict=True)]
-        if all(_fits(cell, column) for cell, column in cells):
-            return [(column.number_of or float)(cell) if cell else nan for cell, column in cells]
-    what = "numbers" if all(column.number_of is None for column, _ in columns) else "values"
-    raise ValueError(
-        f"{path}, line {number}: {','.join(row)[:80]!r}, expected {len(columns)} {what} separated "
-        "by commas"
-    )
+    return [
+        _number(table, line, cell, column) for cell, (column, _) in zip(cells, columns, strict=True)
+    ]
 
 
-def _fits(cell: str, column: Column) -> bool:
-    if not cell:
-        return column.blank
+def _number(table: NamedTable, line: int, cell: str, column: Column) -> float:
+    if not cell and column.blank:
+        return nan
+    if column.number_of is not None and cell:
+        return column.number_of(cell)
     try:
-        return column.number_of is not None or isfinite(float(cell))
+        number = table.number(cell)
     except ValueError:
-        return False
+        number = nan
+    if not isfinite(number):
+        raise ValueError(
+            f"{table.path}, line {line}: {column.name} is {cell[:40]!r}, expected a number"
+        )
+    return number
 
 
 def read_polyline(path: Path) -> tuple[Array, list[int]]:

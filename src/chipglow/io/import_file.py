@@ -1,6 +1,5 @@
 """The description of an import: fields, their meaning, and the samples."""
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, make_dataclass, replace
 from pathlib import Path
@@ -19,19 +18,10 @@ from chipglow.io.tool_section import ToolSection
 from chipglow.quantities import Family, FileBeside, Parameter, Part, adapter
 from chipglow.quantities.units import TIME
 from chipglow.scene.completion import Completion
-from chipglow.text import commented_yaml, described_by
+from chipglow.text import commented_yaml, described_by, has_names_of_columns
 
 IMPORT_SOURCES: Final = Family("import_source")
 """Kinds of sources; those of other packages have a title and endings, too."""
-
-
-def _has_header(path: Path) -> bool:
-    """Return whether a table of text begins with a line of names."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        first = file.readline(10_000).decode("utf-8", "replace").lower()
-    return any(word not in ("e", "nan", "inf") for word in re.findall(r"[a-z_]+", first))
 
 
 IMPORT_SOURCES.add("movie", MovieSource)
@@ -99,7 +89,7 @@ class ImportDescription(Part):
         if self.source is None:
             raise ValueError("source: is missing, expected a file")
         name = Path(self.source).name.lower()
-        if name.endswith((".csv", ".tsv")) and _has_header(Path(self.source)):
+        if name.endswith((".csv", ".tsv")) and has_names_of_columns(Path(self.source)):
             return "points"
         if name.endswith(OTHER_HDF) and holds(self.source, ("VTKHDF",)):
             return "mesh"

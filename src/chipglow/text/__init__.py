@@ -1,5 +1,6 @@
-"""Files from outside: small text files, YAML and what it describes, HDF5 without links, extras."""
+"""Files from outside: text tables, YAML and what it describes, HDF5 without links, extras."""
 
+from chipglow.text.cells import TableError as TableError
 from chipglow.text.description import (
     described_by as described_by,
     load_described as load_described,
@@ -7,6 +8,12 @@ from chipglow.text.description import (
     validated as validated,
 )
 from chipglow.text.extras import install_command as install_command, needs_extra as needs_extra
+from chipglow.text.matrix_table import Matrix as Matrix, read_matrix as read_matrix
+from chipglow.text.named_table import (
+    NamedTable as NamedTable,
+    has_names_of_columns as has_names_of_columns,
+    read_named_table as read_named_table,
+)
 from chipglow.text.notes import Notes as Notes
 from chipglow.text.own_data import check_own_data as check_own_data
 from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema

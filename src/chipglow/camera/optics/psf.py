@@ -26,7 +26,7 @@ from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Array, Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
 from chipglow.radiometry import Band
-from chipglow.text import check_own_data
+from chipglow.text import check_own_data, read_matrix
 from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
@@ -444,8 +444,10 @@ def _read_array(path: Path) -> Array:
     if path.suffix.lower() == ".npy":
         with path.open("rb") as file:
             return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
-    rows = path.read_text(encoding="utf-8-sig").splitlines()
-    return np.array([[float(cell) for cell in row.split(",")] for row in rows if row.strip()])
+    frames = read_matrix(path).values
+    if len(frames) > 1:
+        raise ValueError(f"{path}: has {len(frames)} matrices, expected one")
+    return np.asarray(frames[0])
 
 
 def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:

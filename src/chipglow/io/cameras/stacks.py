@@ -14,13 +14,7 @@ from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
 from chipglow.io.cameras.binary import check_picture, chosen_frames, evenly
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import (
-    ARRAY_READERS,
-    MOST_ON_A_SIDE,
-    FileArray,
-    exported_table,
-    open_arrays,
-)
+from chipglow.io.sources.arrays import ARRAY_READERS, MOST_ON_A_SIDE, FileArray, open_arrays
 from chipglow.io.sources.layout import (
     AXES,
     axes_of,
@@ -76,8 +70,7 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
     `kind` is the ending of the names of such files; the file's own may be another.
     """
     with ExitStack() as stack:
-        reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
-        arrays = open_arrays(str(path), stack, reader)
+        arrays = open_arrays(str(path), stack, ARRAY_READERS[kind])
         one = _dataset(path, arrays, stated.dataset)
         notes = Notes() + one.notes
         axes = axes_of(one, stated.axes, notes)
@@ -92,18 +85,20 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
                 f"{', '.join(RECORDING_UNITS)}"
             )
         if times is None:
-            missing.append("give the interval between frames, the file states no times")
+            missing.append(
+                f"give the interval between frames: there are {lengths['time']}, without times"
+            )
         if unit is None or times is None:
             raise MissingError(f"{one}: {'; '.join(missing)}")
         signal = _signal(one, axes, chosen)
-    if skipped := one.attributes.get("lines_of_text"):
-        notes.remarks.append(f"Ignored {skipped} lines of text before the numbers.")
     quantity, known = unit
     if quantity != "counts":
         # 32 bits hold temperature to 1e-4 K, where the file does not hold more.
         precision = np.float32 if signal.dtype.itemsize <= 4 else np.float64
         signal = (signal.astype(np.float64) * known.scale + known.offset).astype(precision)
-    return Recording(signal=signal, quantity=quantity, times=times, camera="unknown", notes=notes)
+    return Recording(
+        signal=signal, quantity=quantity, times=times, camera="unknown", notes=notes + one.notes
+    )
 
 
 def _dataset(path: Path, arrays: Mapping[str, FileArray], name: str | None) -> FileArray:

@@ -16,9 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_names import files_of, missing_number
-from chipglow.io.sources.source import SourceError, check_hdf5, head_of, reading, required
-from chipglow.io.sources.text_table import TextTable, lines_of_text
-from chipglow.text import Notes
+from chipglow.io.sources.source import (
+    SourceError,
+    check_hdf5,
+    head_of,
+    reading,
+    required,
+    table_errors,
+)
+from chipglow.text import Notes, read_matrix
 
 MOST_SAMPLES: Final = 100_000_000
 """Maximum number of samples that are read at once."""
@@ -26,6 +32,8 @@ MOST_SAMPLES: Final = 100_000_000
 MOST_ON_A_SIDE: Final = 1_000_000
 """Maximum number of samples along an axis other than time."""
 
+_MOST_NOTES: Final = 10
+_MORE_NOTES: Final = "There are more notes on further files."
 _KINDS: Final = "fiub"
 _MEANING: Final = ("units", "scale_factor", "add_offset", "_FillValue", "missing_value")
 """Attributes on which the meaning of numbers depends: those of a series are of its first file."""
@@ -57,7 +65,7 @@ class FileArray:
     path: str = ""
     """The file or pattern."""
     notes: Notes = field(default_factory=Notes)
-    """Assumptions and warnings of the reader, and corrections that it applied."""
+    """Assumptions, warnings and corrections of the reader, of the parts read so far."""
 
     def __str__(self) -> str:
         return f"{self.path}: {self.name}"
@@ -142,19 +150,36 @@ def _open_file(
 def _series(
     paths: Sequence[Path], first: FileArray, reader: ArrayReader | None, notes: Notes
 ) -> FileArray:
+    said = first.notes + notes
+
     def read(key: Key) -> NDArray[Any]:
         chosen = paths[key[0]]
         check_samples(str(chosen[0]), len(chosen) * first.size)
-        whole = [_read_whole(path, first, reader) for path in chosen]
-        return np.stack([values[key[1:]] for values in whole])
+        parts = []
+        for path in chosen:
+            values, found = _read_whole(path, first, reader)
+            parts.append(values[key[1:]])
+            _add_notes(said, found, path.name)
+        return np.stack(parts)
 
     dims = ("time", *first.dims) if first.dims else ()
     shape, chunks = (len(paths), *first.shape), (1, *first.shape)
-    notes = first.notes + notes
-    return replace(first, shape=shape, read=read, dims=dims, chunks=chunks, notes=notes)
+    return replace(first, shape=shape, read=read, dims=dims, chunks=chunks, notes=said)
 
 
-def _read_whole(path: Path, first: FileArray, reader: ArrayReader | None) -> NDArray[Any]:
+def _add_notes(notes: Notes, added: Notes, name: str) -> None:
+    """Add notes on a further file that differ from those on the files before."""
+    for kind, sentences in vars(added).items():
+        known: list[str] = getattr(notes, kind)
+        for sentence in sentences:
+            if not any(one.endswith(sentence) for one in known) and len(known) <= _MOST_NOTES:
+                more = len(known) == _MOST_NOTES
+                known.append(_MORE_NOTES if more else f"{name}: {sentence}")
+
+
+def _read_whole(
+    path: Path, first: FileArray, reader: ArrayReader | None
+) -> tuple[NDArray[Any], Notes]:
     with ExitStack() as stack:
         array = _open_file(path, stack, reader).get(first.name)
         if array is None or array.shape != first.shape:
@@ -169,7 +194,7 @@ def _read_whole(path: Path, first: FileArray, reader: ArrayReader | None) -> NDA
                     f"{path}: {name} of {first.name!r} is {ours}, expected {stated} as in the "
                     "first file of the series"
                 )
-        return array.part()
+        return array.part(), array.notes
 
 
 # NumPy
@@ -459,22 +484,12 @@ def _codecs(metadata: Mapping[str, Any]) -> Iterator[str]:
 # Text
 
 
-def exported_table(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    """Read a matrix behind lines of text, as cameras' programs export it; an `ArrayReader`."""
-    return _csv(path, stack, lines_of_text(path))
-
-
-def _csv(path: Path, stack: ExitStack, skipped: int = 0) -> Iterator[FileArray]:
-    table = TextTable.look_at(path, skipped).read(header=None, skiprows=skipped)
-    for column, kind in enumerate(table.dtypes):
-        if kind.kind not in _KINDS:
-            raise SourceError(
-                f"{path}, column {column + 1}: has text in it, expected numbers; "
-                "a table of points needs kind: points"
-            )
-    values = table.to_numpy(np.float32)
-    attributes = {"lines_of_text": skipped}
-    yield FileArray("", values.shape, lambda key: values[key], attributes=attributes)
+def _text(path: Path, stack: ExitStack) -> Iterator[FileArray]:
+    with table_errors():
+        matrix = read_matrix(path)
+    values = matrix.values.astype(np.float32)
+    values = values if len(values) > 1 else values[0]
+    yield FileArray("", values.shape, lambda key: values[key], notes=matrix.notes)
 
 
 ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
@@ -486,6 +501,6 @@ ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     **dict.fromkeys((".tif", ".tiff"), _tiff),
     ".png": _png,
     **dict.fromkeys((".zarr", ".zip"), _zarr),
-    **dict.fromkeys((".csv", ".txt", ".dat"), _csv),
+    **dict.fromkeys((".csv", ".txt", ".dat"), _text),
 }
 """Readers of arrays by the ending of the file's name."""

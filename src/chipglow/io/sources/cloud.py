@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
@@ -17,7 +18,7 @@ from chipglow.io.sources.conventions import (
     simple,
 )
 from chipglow.io.sources.layout import check_times, unit_of
-from chipglow.io.sources.point_files import DUMP_ENDINGS, PointTable, open_points
+from chipglow.io.sources.point_files import PointTable, open_points
 from chipglow.io.sources.source import Source, SourceError, Survey, even_times, naming, span_of
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, Unit
@@ -42,8 +43,6 @@ class CloudSource(Source, Part):
     """
 
     title: ClassVar[str] = "points"
-    # Most files of points have another ending: they are called by their kind.
-    endings: ClassVar[tuple[str, ...]] = DUMP_ENDINGS
     files: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     spacing: Annotated[
@@ -144,6 +143,7 @@ class _Points:
     def cloud(self, table: PointTable) -> Cloud:
         """Return points of a table in the scene, in SI."""
         table.check()
+        self.notes = self.notes + table.notes.about(Path(table.path).name)
         source, placement = self._source, self._source.placement
         places = self._places(table)
         values = np.stack([self._values(table, name) for name in self.found], axis=1)

@@ -112,7 +112,7 @@ class GridSource(Source, Part):
                 unused=grid.unused,
                 spacing=min(abs(float(np.ptp(one)) / (one.size - 1)) for one in (grid.x, grid.y)),
                 temperatures=grid.check_ends(),
-                notes=Notes() + grid.notes,
+                notes=sum((layer.array.notes for layer in grid.layers.values()), grid.notes),
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:

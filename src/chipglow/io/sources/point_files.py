@@ -1,11 +1,10 @@
-"""Tables of points over time: text, dumps of LAMMPS, NumPy, HDF5, MATLAB and VTK files."""
+"""Tables of points over time: text, NumPy, HDF5, MATLAB and VTK files."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,24 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_vtk
-from chipglow.io.sources.arrays import FileArray, check_samples, open_arrays
+from chipglow.io.sources.arrays import FileArray, open_arrays
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
 from chipglow.io.sources.file_names import files_of
-from chipglow.io.sources.source import SourceError, head_of, mapped, reading, required
-from chipglow.io.sources.text_table import TextTable
+from chipglow.io.sources.source import SourceError, required, table_errors
+from chipglow.text import NamedTable, Notes, read_named_table
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".dat", ".tsv")
 MOST_POINTS: Final = 10_000_000
-DUMP_ENDINGS: Final = (".dump", ".lammpstrj", ".lammpsdump")
-
-_ITEM: Final = b"ITEM: "
-_ATOMS: Final = re.compile(rb"(?m)^ITEM: ATOMS ([^\r\n]*)\r?\n")
-_LENGTHS: Final[Mapping[str, tuple[str, str]]] = {
-    "si": ("m", "s"), "cgs": ("cm", "s"), "micro": ("um", "us"), "nano": ("nm", "ns"),
-    "metal": ("angstrom", "ps"), "real": ("angstrom", "fs"),
-}  # fmt: skip
-"""Units of length and time by LAMMPS's names of its systems of units."""
 
 _PLACES: Final = ("points", "positions", "position", "coordinates", "coords", "pos", "location")
 _PERHAPS_TIME: Final = "t"
@@ -49,6 +39,7 @@ class PointTable:
     """Units that the file states, by the names of the columns."""
     wrong: Mapping[str, str] = field(default_factory=dict)
     """Errors about columns of text."""
+    notes: Notes = field(default_factory=Notes)
 
     @property
     def count(self) -> int:
@@ -95,8 +86,6 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     paths = files_of(pattern)
     path, suffix = paths[0], paths[0].suffix.lower()
     _check_empty(path)
-    if suffix in (*DUMP_ENDINGS, *TEXT_SUFFIXES) and head_of(path, len(_ITEM)) == _ITEM:
-        return _dumps(paths)
     if len(paths) == 1 and suffix in TEXT_SUFFIXES:
         return _split(_read_text(path), time)
     if len(paths) == 1 and suffix not in VTK_SUFFIXES:
@@ -125,40 +114,27 @@ def _read_file(path: Path) -> PointTable:
 
 
 def _read_text(path: Path) -> PointTable:
-    import pandas as pd
-
-    with reading(path):
-        table = TextTable.look_at(path)
-        labels = [re.split(r"[\[(]", cell)[0].strip() or cell for cell in table.cells]
-        _check_labels(path, table, labels)
-        frame = table.read(names=labels, header=0, index_col=False, on_bad_lines="error")
-        columns, wrong = {}, {}
-        for label in labels:
-            values = frame[label]
-            if values.dtype.kind not in "fiub":
-                text = values.astype(str).str.replace(table.decimal, ".")
-                numbers = pd.to_numeric(text, errors="coerce")
-                rows = np.flatnonzero(numbers.isna() & values.notna())
-                if rows.size:
-                    wrong[label] = (
-                        f"{path}, line {table.line_of(rows[0])}: {label} is "
-                        f"{str(values[rows[0]])[:40]!r}, expected a number"
-                    )
-                values = numbers
-            columns[label] = values.to_numpy()
-    units = [re.search(r"[\[(]([^\])]*)[\])]\s*$", cell) for cell in table.cells]
+    with table_errors():
+        table = read_named_table(path)
+        labels = [re.split(r"[\[(]", name)[0].strip() or name for name in table.names]
+        _check_labels(table, labels)
+        columns, errors = table.columns()
+    units = [re.search(r"[\[(]([^\])]*)[\])]\s*$", name) for name in table.names]
     known = {label: unit[1].strip() for label, unit in zip(labels, units, strict=True) if unit}
-    return PointTable(str(path), columns, known, wrong)
+    wrong = {labels[index]: error for index, error in errors.items()}
+    numbers = dict(zip(labels, columns, strict=True))
+    return PointTable(str(path), numbers, known, wrong, table.notes)
 
 
-def _check_labels(path: Path, table: TextTable, labels: Sequence[str]) -> None:
+def _check_labels(table: NamedTable, labels: Sequence[str]) -> None:
+    place = f"{table.path}, line {table.first}"
     if not any(re.match(r"[A-Za-z]", label) for label in labels):
         raise SourceError(
-            f"{path}, line 1: {table.first[:60]!r}, expected names of columns such as "
+            f"{place}: {', '.join(labels)[:60]!r}, expected names of columns such as "
             "x,y,temperature"
         )
     if len(set(labels)) < len(labels):
-        raise SourceError(f"{path}, line 1: two columns have one name")
+        raise SourceError(f"{place}: two columns have one name")
 
 
 def _split(table: PointTable, time: str | None) -> PointFrames:
@@ -264,97 +240,3 @@ def _read_vtk(path: Path) -> PointTable:
         if values.dtype.kind in "fiub" and (values.ndim == 1 or values.shape[1] in (2, 3)):
             columns |= _components(name, values)
     return PointTable(str(path), columns)
-
-
-# Dumps of LAMMPS, as ``dump custom`` writes them
-
-
-@dataclass(frozen=True)
-class _Snapshot:
-    """Frame of a dump."""
-
-    path: Path
-    rows: slice
-    """Bytes of the lines of its atoms."""
-    count: int
-    labels: tuple[str, ...]
-    box: NDArray[np.float64]
-    """Lowest and highest place along x, y and z, shape (3, 2)."""
-    tilted: bool
-    """Whether the box is oblique."""
-    time: float | None
-    """Time in the dump's unit."""
-    units: Mapping[str, str]
-    """Units of places, velocities and times, if the dump states its system of units."""
-
-    def table(self) -> PointTable:
-        """Read the numbers of the atoms, with their places as ``x``, ``y``, ``z``."""
-        import pandas as pd
-
-        check_samples(f"{self.path}: a frame", self.count * len(self.labels))
-        with reading(self.path), mapped(self.path) as content:
-            table = pd.read_csv(BytesIO(content[self.rows]), sep=r"\s+", header=None)
-        shape = self.count, len(self.labels)
-        if table.shape != shape or table.iloc[:, -1].isna().any():
-            raise SourceError(
-                f"{self.path}: a frame has {table.shape[0]} atoms of {table.shape[1]} numbers, "
-                f"expected {shape[0]} of {shape[1]}: it is truncated"
-            )
-        table.columns = pd.Index(self.labels)
-        numbers = table.select_dtypes("number")
-        columns = {label: numbers[label].to_numpy(np.float64) for label in numbers}
-        for (low, high), axis in zip(self.box, "xyz", strict=True):
-            # Places may be unwrapped or fractions of the box.
-            names = [
-                name for name in (axis, f"{axis}u", f"{axis}s", f"{axis}su") if name in columns
-            ]
-            if names:
-                values = columns.pop(names[0])
-                scaled = "s" in names[0]
-                if scaled and self.tilted:
-                    raise SourceError(
-                        f"{self.path}: {names[0]} in an oblique box, expected places as {axis}"
-                    )
-                columns[axis] = low + values * (high - low) if scaled else values
-        return PointTable(str(self.path), columns, self.units)
-
-
-def _dumps(paths: Sequence[Path]) -> PointFrames:
-    found = [snapshot for path in paths for snapshot in _snapshots(path)]
-    known = [snapshot.time for snapshot in found if snapshot.time is not None]
-    times = np.array(known) if known and len(known) == len(found) else None
-    unit = found[0].units.get("time") if found else None
-    return PointFrames([snapshot.table for snapshot in found], times, unit)
-
-
-def _snapshots(path: Path) -> Iterator[_Snapshot]:
-    """Yield all frames of a dump, whose atoms are not read yet."""
-    content = mapped(path)
-    if content[-1:] != b"\n":
-        raise SourceError(f"{path}: its last line has no end, it is truncated")
-    begin, units = 0, _units("")
-    for atoms in _ATOMS.finditer(content):
-        head = content[begin : atoms.start()].decode("utf-8", "replace")
-        begin = content.find(b"\n" + _ITEM, atoms.end() - 1) + 1 or len(content)
-        items = dict(re.findall(r"ITEM: ([A-Z ]+)[^\n]*\n((?:(?!ITEM: ).*\n)*)", head))
-        items = {name.strip(): value.strip() for name, value in items.items()}
-        units = _units(items["UNITS"]) if "UNITS" in items else units
-        try:
-            count = int(items["NUMBER OF ATOMS"])
-            box = np.array([line.split()[:2] for line in items["BOX BOUNDS"].split("\n")], float)
-            time = float(items["TIME"]) if "TIME" in items else None
-        except (KeyError, ValueError):
-            raise SourceError(f"{path}: a frame's head is damaged") from None
-        labels = tuple(atoms[1].decode("utf-8", "replace").split())
-        if count < 1 or box.shape != (3, 2) or len(set(labels)) < max(len(labels), 1):
-            raise SourceError(f"{path}: a frame's head is damaged")
-        rows = slice(atoms.end(), begin)
-        yield _Snapshot(path, rows, count, labels, box, " xy " in head, time, units)
-
-
-def _units(system: str) -> dict[str, str]:
-    if system not in _LENGTHS:
-        return {}
-    length, time = _LENGTHS[system]
-    places = dict.fromkeys("xyz", length)
-    return {**places, **dict.fromkeys(("vx", "vy", "vz"), f"{length}/{time}"), "time": time}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Raster, SampledFrame
-from chipglow.text import Notes, check_own_data, needs_extra
+from chipglow.text import Notes, TableError, check_own_data, needs_extra
 
 
 class SourceError(ValueError):
@@ -36,6 +36,15 @@ def naming(name: object) -> Iterator[None]:
         yield
     except ValueError as error:
         raise SourceError(f"{name}: {error}") from error
+
+
+@contextmanager
+def table_errors() -> Iterator[None]:
+    """Turn errors on text tables, which name the file, into SourceErrors."""
+    try:
+        yield
+    except TableError as error:
+        raise SourceError(str(error)) from None
 
 
 def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:

@@ -19,7 +19,7 @@ from chipglow.io.column_file import Column, read_table
 from chipglow.laboratory.registration.registration import Method, Model, Registration
 from chipglow.quantities import Array, problem
 from chipglow.scene import Raster
-from chipglow.text import DescriptionError, Notes, read_small_text, read_yaml
+from chipglow.text import DescriptionError, Notes, read_named_table, read_yaml
 
 _TRANSPOSED: Final = (5, 6, 7, 8)
 """Orientations with exchanged rows and columns: Pillow scrambles TIFF files that state them."""
@@ -155,8 +155,9 @@ def read_points(
 ) -> tuple[Array, Array]:
     """Read points from a CSV file."""
     path = Path(path)
-    by_pixel = "infrared_column" in read_small_text(path).partition("\n")[0]
-    table, lines = read_table(path, _BY_PIXEL if by_pixel else _BY_LENGTH)
+    named = read_named_table(path)
+    by_pixel = "infrared_column" in named.names
+    table, lines = read_table(named, _BY_PIXEL if by_pixel else _BY_LENGTH)
     pixels = np.stack([table["visible_column"], table["visible_row"]], axis=1)
     if by_pixel:
         places = np.stack([table["infrared_column"], table["infrared_row"]], axis=1)
