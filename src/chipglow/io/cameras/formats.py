@@ -83,7 +83,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "hdf5": _hdf5(
         "HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: _HDF5 in (head[:8], head[512:520])
     ),
-    "zarr": _array("Zarr, a folder or zipped", (".zarr", ".zip")),
+    "zarr": _array("Zarr", (".zarr",)),
     "csv": _array("table of numbers in text, one file per frame", (".csv", ".txt", ".dat")),
 }
 

@@ -376,11 +376,9 @@ def _tiff_pages(path: Path, series: Any, key: Key) -> NDArray[Any]:
 
 def _zarr(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     zarr = required("zarr", path, "grid")
-    if path.is_dir():
-        store = zarr.storage.LocalStore(path, read_only=True)
-    else:
-        with ZipFile(path):  # Zarr's own opening leaves a half-open store behind
-            store = stack.enter_context(zarr.storage.ZipStore(path, mode="r"))
+    if not path.is_dir():
+        raise SourceError(f"{path}: is a file, expected the folder of a Zarr store")
+    store = zarr.storage.LocalStore(path, read_only=True)
     try:
         root = zarr.open(store, mode="r")
     except FileNotFoundError:
@@ -445,7 +443,7 @@ ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     **dict.fromkeys((".nc", ".nc4", ".cdf"), _netcdf),
     ".mat": _matlab,
     **dict.fromkeys((".tif", ".tiff"), _tiff),
-    **dict.fromkeys((".zarr", ".zip"), _zarr),
+    ".zarr": _zarr,
     **dict.fromkeys((".csv", ".txt", ".dat"), _csv),
 }
 """Readers of arrays by the ending of the file's name."""
