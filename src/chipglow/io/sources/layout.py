@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources.arrays import FileArray
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, SI_UNITS, match_names, simple
 from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.unpacking import unpack
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
 
@@ -111,7 +112,8 @@ def coordinate(
 def read_list(axis: str, array: FileArray, own: Unit, notes: Notes) -> NDArray[np.float64]:
     """Return all values of a coordinate in SI; for its unit see `unit_of`."""
     unit = unit_of(axis, str(array), array.unit, own, notes)
-    values = np.asarray(array.part(), np.float64).reshape(-1) * unit.scale + unit.offset
+    numbers = unpack(array.part(), array.attributes)
+    values = np.asarray(numbers, np.float64).reshape(-1) * unit.scale + unit.offset
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
         raise SourceError(f"{array}: value {wrong[0]} is {values[wrong[0]]}, expected a number")
@@ -122,24 +124,12 @@ def read_frames(array: FileArray, axes: Sequence[str], frames: slice) -> NDArray
     """Return frames as they are in the file, shape (time, y, x), NaN where a number is missing."""
     lengths = dict(zip(axes, array.shape, strict=True))
     key = tuple(frames if axis == "time" else slice(None) for axis in axes)
-    values = _unpacked(array.part(key), array.attributes)
+    values = unpack(array.part(key), array.attributes)
     values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
     values = values if "time" in axes else values[None]
     expected = (len(range(lengths.get("time", 1))[frames]), lengths["y"], lengths["x"])
     if values.shape != expected:
         raise SourceError(f"{array}: has shape {values.shape}, expected {expected}")
-    return values
-
-
-def _unpacked(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
-    """Return numbers that may be packed by NetCDF's conventions, NaN where one is missing."""
-    values = raw
-    scale, offset = (attributes.get(name) for name in ("scale_factor", "add_offset"))
-    if scale is not None or offset is not None:
-        values = raw * float(1.0 if scale is None else scale) + float(offset or 0.0)
-    for name in ("_FillValue", "missing_value"):
-        if attributes.get(name) is not None:
-            values = np.where(raw == raw.dtype.type(attributes[name]), np.nan, values)
     return values
 
 
