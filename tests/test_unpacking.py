@@ -100,7 +100,7 @@ NUMBERS = np.array([[[0, 4, 8, 200], [12, 16, 20, 24], [28, 32, 36, 40]]])
 
 
 def meant(name):
-    kind, encoding, attributes = TABLE[name]
+    _, encoding, _ = TABLE[name]
     values = NUMBERS * encoding.get("scale_factor", 1.0) + encoding.get("add_offset", 0.0)
     values = values.astype(np.float64)
     lost = name in ("fill", "range", "float", "double")
@@ -212,5 +212,5 @@ def test_zarr_of_all_types_with_and_without_names_of_axes(tmp_path, version):
 
 def test_a_zipped_store_is_refused(tmp_path):
     (tmp_path / "a.zip").write_bytes(b"PK\5\6" + bytes(18))
-    with ExitStack() as stack, pytest.raises(SourceError, match="unknown ending '.zip'"):
+    with ExitStack() as stack, pytest.raises(SourceError, match=r"unknown ending '\.zip'"):
         open_arrays(str(tmp_path / "a.zip"), stack)

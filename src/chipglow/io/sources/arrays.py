@@ -21,9 +21,6 @@ from chipglow.io.sources.text_table import TextTable, lines_of_text
 MOST_SAMPLES: Final = 100_000_000
 """Maximum number of samples that are read at once."""
 
-MOST_ON_A_SIDE: Final = 1_000_000
-"""Maximum number of samples along an axis other than time."""
-
 _KINDS: Final = "fiub"
 _ATTRIBUTES: Final = (
     "units", "standard_name", "axis", "bounds", "flag_values", "flag_masks", "flag_meanings",

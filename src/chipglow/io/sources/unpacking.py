@@ -23,7 +23,7 @@ def unpack(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
     raw : array
         The numbers in the file.
     attributes : mapping
-        Those of the array: ``_Unsigned``, ``_FillValue``, ``missing_value``, ``valid_min``,
+        Attributes of the array: ``_Unsigned``, ``_FillValue``, ``missing_value``, ``valid_min``,
         ``valid_max``, ``valid_range``, ``scale_factor`` and ``add_offset`` are applied;
         ``prefilled`` means that `_PREFILLED` values are missing.
 
