@@ -420,9 +420,11 @@ def test_lines_of_text_before_an_exported_table_are_left_out(tmp_path, mark, dec
     rows = [mark.join(f"{v:.2f}".replace(".", decimal) for v in row) for row in PICTURES[0] / 40]
     text = f"File:{mark}IR_0001.jpg\n\nEmissivity:{mark}0{decimal}95\n" + "\n".join(rows)
     path = make(tmp_path, "a.csv", text.encode())
-    recording = read_here(path, "csv", None, Stated(unit="K"))
-    assert np.abs(recording.signal[0] - PICTURES[0] / 40).max() < 0.006
-    assert recording.notes.remarks == ["Ignored text that is not part of the matrix: lines 1, 3."]
+    recording = read_here(path, "csv", None, Stated(unit="degC"))
+    assert np.abs(recording.signal[0] - PICTURES[0] / 40 - 273.15).max() < 0.006
+    assert recording.notes.remarks[-1] == (
+        "Ignored text that is not part of the matrix: lines 1, 3."
+    )
 
 
 def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
@@ -449,7 +451,7 @@ def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
         ({}, "unit: is missing, .*; give the interval between frames"),
         ({"quantity": "counts", "interval": 0.0}, "interval: is 0.0 s"),
         ({"quantity": "heat"}, "quantity: is 'heat'"),
-        ({"unit": "degF"}, "unit: is 'degF'"),
+        ({"unit": "bar"}, "unit: is 'bar'"),
         ({"quantity": "radiance", "unit": "K"}, "radiance is not in K"),
         ({"quantity": "counts", "interval": 1.0, "dataset": "b"}, "no dataset 'b'"),
         ({"quantity": "counts", "interval": 1.0, "axes": ("y", "z")}, "axes: are y, z"),

@@ -296,12 +296,12 @@ def a_stack(folder, values, unit="K"):
 @pytest.mark.parametrize(
     ("values", "unit", "said"),
     [
-        (np.nan, "K", "temperature: T has no number in the frames"),
+        (np.nan, "K", "T: every value is missing"),
         (np.inf, "K", "T: has infinite numbers"),
-        (-5.0, "K", "temperature: -5 in T, expected kelvin"),
-        (-500.0, "K", "temperature: -500 in T, expected kelvin"),
-        (25.0, "K", "temperature: 25 in T, expected kelvin .* units.temperature: degC"),
-        (-120.0, "degC", "153.15 in T, expected .*; units.temperature is degC"),
+        (-5.0, "K", "T: temperature -5 K, expected 200 to 6000 K"),
+        (-500.0, "K", "T: temperature -500 K, expected 200 to 6000 K"),
+        (25.0, "K", "T: temperature 25 K, expected .* such as degC"),
+        (-120.0, "degC", "T: temperature 153.15 K, .*; units.temperature is degC"),
     ],
 )
 def test_what_no_import_could_take_is_refused_at_the_first_look(tmp_path, values, unit, said):
@@ -319,6 +319,6 @@ def test_what_is_out_of_view_may_be_colder(tmp_path):
     values = np.full((1, 1, 5), 500.0)
     values[..., 0] = 0.0
     wanted = a_stack(tmp_path, values)
-    with pytest.raises(SourceError, match="0 in T, expected kelvin"):
+    with pytest.raises(SourceError, match="T: temperature 0 K, expected"):
         prospect(wanted)
     prospect(replace(wanted, view=View(left=6e-6)))

@@ -53,6 +53,8 @@ DETECTOR = Detector(
     bits=14,
     terms=(GainPattern(0.03), DeadElements(0.003), OffsetPattern(20.0), ReadNoise(3.0)),
 )
+KELVINS = ["unit=K", "scale=0.05", "offset=300"]
+"""With them the counts would be possible temperatures."""
 Y, X = np.mgrid[: SHAPE[0], : SHAPE[1]]
 TRUTH = 700.0 + 450.0 * np.exp(-((X - 20) ** 2 + (Y - 15) ** 2) / 100.0)
 FIELDS = {
@@ -353,8 +355,8 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
         (["object_parameters.emissivity=2"], "emissivity: 2, expected more than 0"),
         (["colour=red"], "unknown key 'colour'"),
         (["file=none"], "file: is missing"),
-        (["unit=K", "calibration=none", "band=3-5 um"], "not linear in light"),
-        (["unit=K", "flat_field={}", "bad_pixels=none"], "holds temperature, expected counts"),
+        ([*KELVINS, "calibration=none", "band=3-5 um"], "not linear in light"),
+        ([*KELVINS, "flat_field={}", "bad_pixels=none"], "holds temperature, expected counts"),
     ],
 )
 def test_what_cannot_be_is_one_clear_error(laboratory, settings, message):
@@ -563,7 +565,7 @@ def test_a_blackbody_before_a_background_is_refused_until_its_region_is_given(tm
         ("temperature_degC,counts\n300,3\n400,5\n500,9\n", CAMERA, "--set: .* no recordings"),
         ("temperature_degC,file\n300,none.npy\n", CAMERA, "none.npy"),
         ("temperature_degC,file\n300,hot.npy\n", [*CAMERA[:2], "saturation=2000"], "saturated"),
-        ("temperature_degC,file\n300,hot.npy\n", ["unit=K", "interval=1 ms"], "expected counts"),
+        ("temperature_degC,file\n300,hot.npy\n", [*KELVINS, "interval=1 ms"], "expected counts"),
         ("temperature_degC,file\nhot,hot.npy\n", CAMERA, "line 2: temperature is 'hot', expected"),
         ("temperature_degC,file,counts\n300,hot.npy,3\n", CAMERA, "line 2: expected either"),
         ("temperature_degC,file,counts\n300,,\n", CAMERA, "line 2: expected either counts or"),

@@ -64,6 +64,10 @@ class Recording(Brief):
     band: Band | None = None
     pitch: float | None = None
     """Distance between pixels on the object in m."""
+    position: tuple[float, float] | None = None
+    """Left and upper edge of the image in m, in coordinates that the file states."""
+    stored: str = "y, x"
+    """Order of the image's axes in the file; a minus before one whose direction was reversed."""
     conversion: PlanckConversion | None = None
     """Factory conversion of counts."""
     object_parameters: ObjectParameters | None = None

@@ -51,7 +51,7 @@ def show(path: Path, at: float | None, plot: Path | None) -> None:
             f"{path}: not a NetCDF-4 file, or truncated; expected a scene or measurement "
             "(chipglow convert inspects camera files)"
         )
-    if path.is_file() and not is_scene(path):
+    if path.is_file() and not (is_scene(path) or holds(path, ("temperature",))):
         raise ValueError(
             f"{path}: contains neither temperature nor radiance; expected a scene or measurement"
         )

@@ -16,9 +16,10 @@ import numpy as np
 from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
 from chipglow.io.sources.layout import check_times
+from chipglow.io.sources.plausible import check_temperatures, doubt_of_size
 from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import COLDEST, LENGTH, POSITION
+from chipglow.quantities.units import COLDEST, HOTTEST, LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
 from chipglow.text import Notes, needs_extra
@@ -31,7 +32,6 @@ MOST_SAMPLES: Final = 100_000_000
 
 _CHECKPOINT_INTERVAL: Final = 30.0
 _KEY: Final = "import"
-_SMALLEST, _LARGEST = 5e-6, 0.05
 
 
 @dataclass(frozen=True)
@@ -132,10 +132,8 @@ def prospect(wanted: Import) -> Prospect:
     raster = wanted.view.raster(survey)
     _check_temperatures(wanted, survey, raster)
     left, right, bottom, top = survey.extent
-    size = max(right - left, top - bottom)
-    doubt = f"The source is {size:.3g} m large by units.length; a chip is about 1 mm."
     assumed = [
-        *([] if _SMALLEST <= size <= _LARGEST else [doubt]),
+        *doubt_of_size("The source", max(right - left, top - bottom), "units.length"),
         *(text for name, text in wanted.assumptions.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
@@ -253,43 +251,33 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
     frames = complete(wanted.source.frames(raster, first), raster, wanted.completion)
     seen = done > 0
     for frame in islice(frames, done - first, None):
-        lowest = float(frame.temperature.min())
-        if -100.0 < lowest < COLDEST:
-            raise _not_kelvin(wanted, lowest, f"at {frame.time:.9g} s")
+        lowest, highest = float(frame.temperature.min()), float(frame.temperature.max())
+        check_temperatures(f"at {frame.time:.9g} s", lowest, highest, _remedy(wanted))
         seen = seen or bool(frame.material.any())
         yield frame
     if not seen:
         raise SourceError("import: no frame shows material in the field of view")
 
 
-def _not_kelvin(wanted: Import, value: float, place: str) -> SourceError:
-    unit = wanted.description.get("units", {}).get("temperature", "K")
-    other = f"units.temperature is {unit}"
-    if unit == "K":
-        other = "if it is in °C, expected units.temperature: degC"
-    return SourceError(
-        f"temperature: {value:.6g} {place}, expected kelvin of {COLDEST:g} or more; {other}"
-    )
+def _remedy(wanted: Import) -> str:
+    """Return what to do about temperatures beyond those of a scene."""
+    unit = wanted.description.get("units", {}).get("temperature") or "K, or as the file states"
+    return f"units.temperature is {unit}: state another unit, such as degC, degF or cK"
 
 
 def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:
     """Refuse what no import could take: no temperature at all, or what is none in kelvin.
 
-    If only a part of the source is in view, the lowest temperature need not be.
+    If only a part of the source is in view, the extreme temperatures need not be.
     """
     if survey.temperatures is None:
         return
     lowest, highest = survey.temperatures
-    if not isfinite(highest):
-        raise SourceError(
-            f"temperature: {survey.found['temperature']} has no number in the frames that were "
-            "looked at, expected at least one"
-        )
     view, there = np.reshape(raster.extent, (2, 2)), np.reshape(survey.extent, (2, 2))
     beyond = (there - view) * (-1, 1) > 1e-6 * raster.spacing
-    if highest < COLDEST or (lowest < COLDEST and not beyond.any()):
-        worst = highest if highest < COLDEST else lowest
-        raise _not_kelvin(wanted, worst, f"in {survey.found['temperature']}")
+    if beyond.any():  # part of the source has to be in view, at some temperature in between
+        lowest, highest = min(max(lowest, COLDEST), highest), max(min(highest, HOTTEST), lowest)
+    check_temperatures(survey.found["temperature"], lowest, highest, _remedy(wanted))
 
 
 def _key(wanted: Import, looked: Prospect) -> str:

@@ -396,8 +396,11 @@ def example_scene() -> StoredScene:
 
 
 def is_scene(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is one that `SceneWriter` or `write_scene` wrote, or like it."""
-    return holds(path, ("temperature",)) or holds(path, (spline_file.SPLINES,))
+    """Return whether a file is one that `SceneWriter` or `write_scene` wrote."""
+    if not holds(path, ()):
+        return False
+    with h5py.File(path, "r") as file:
+        return "chipglow_format" in file.attrs
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = False) -> None:

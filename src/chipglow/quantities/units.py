@@ -27,6 +27,7 @@ _FRACTION: Final = r"\d{1,3}/\d{1,3}"
 _UNIT: Final = r"(?:(?<=\s)1/)?[A-Za-z°µμ][A-Za-z0-9°µμ/*^ ().-]{0,60}"
 _QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_FRACTION}|{_NUMBER}))\s*({_UNIT})\s*")
 _RANGE: Final = re.compile(rf"\s*({_NUMBER})\s*[-–]\s*({_NUMBER})\s*({_UNIT})?\s*")
+_MULTIPLE: Final = re.compile(rf"({_NUMBER})\s*\*?\s*([A-Za-z°µμ].*)")
 _BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
 _MOST_DIGITS: Final = 21
 _LONGEST_NUMBER: Final = 12
@@ -77,16 +78,21 @@ CELSIUS: Final = Unit(1.0, ZERO_CELSIUS)
 
 
 def parse_unit(text: str, base: str, name: str) -> Unit:
-    """Return the unit of a text (CF, udunits, pint); a date after ``since`` is left out."""
+    """Return the unit of a text (CF, udunits, pint); a date after ``since`` is left out.
+
+    A number before the unit, as in ``0.01 K``, multiplies its scale.
+    """
     clean = text.split(" since ")[0].strip()
     if base == "1" and clean.lower() in _NO_UNIT:
         return SI
+    multiple = _MULTIPLE.fullmatch(clean)
+    factor, single = multiple.groups() if multiple else ("1", clean)
     try:
-        scale, offset = _scale_and_offset(clean, base)
+        scale, offset = _scale_and_offset(single, base)
+        return Unit(float(Decimal(factor) * scale), float(offset), text)
     except ValueError:
         expected = f"expected a unit such as {base}"
         raise ValueError(f"unknown unit {text[:60]!r} of {name}, {expected}") from None
-    return Unit(float(scale), float(offset), text)
 
 
 @dataclass(frozen=True)

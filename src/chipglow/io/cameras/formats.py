@@ -85,7 +85,7 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "hdf5": _hdf5(
         "HDF5", (".h5", ".hdf5", ".hdf", ".he5"), lambda head: _HDF5 in (head[:8], head[512:520])
     ),
-    "zarr": _array("Zarr, a folder or zipped", (".zarr", ".zip")),
+    "zarr": _array("Zarr", (".zarr",)),
     "csv": _array("table of numbers in text, one file per frame", (".csv", ".txt", ".dat")),
 }
 
@@ -127,6 +127,9 @@ def read_recording(
     interval: float | None = None,
     dataset: str | None = None,
     axes: Sequence[str] | None = None,
+    scale: float | None = None,
+    offset: float | None = None,
+    void_value: float | None = None,
 ) -> Recording:
     """Read frames of a camera file.
 
@@ -140,19 +143,28 @@ def read_recording(
         One of `camera_formats`; found by the file's content and name by default.
     quantity : {"counts", "radiance", "temperature"}, optional
         Measured quantity, for files that do not state it.
-    unit : {"counts", "W/m2/sr", "K", "degC"}, optional
-        Unit of the samples, for files that do not state it.
+    unit : str, optional
+        Unit of the samples, instead of the one that the file states: ``counts``, or a unit of
+        temperature or radiance such as ``K``, ``degC``, ``degF``, ``cK``, ``0.01 K``, ``W/m2/sr``.
     interval : float, optional
         Time between frames in s, for files that omit it or are wrong.
     dataset : str, optional
         Which array of the file, if it has several.
     axes : sequence of str, optional
         Axes: ``time``, ``y`` and ``x`` in their order.
+    scale, offset : float, optional
+        The temperature or radiance is ``scale`` times the number in the file plus ``offset``, in
+        the unit: 1 and 0 by default.
+    void_value : float, optional
+        Number in the file that stands for no value; it becomes NaN, as those do that the file
+        declares missing.
 
     Returns
     -------
     Recording
-        The frames; times count from the first frame of the file.
+        The frames; times count from the first frame of the file. By coordinates ``y`` and ``x`` of
+        the file, the upper row and the left column come first, and the pitch and the position of
+        the image are known; without ``y``, row 0 of the file is the upper one.
 
     Raises
     ------
@@ -162,7 +174,7 @@ def read_recording(
     OSError
         If it is missing or not accessible.
     """
-    stated = Stated(quantity, unit, interval, dataset, axes)
+    stated = Stated(quantity, unit, interval, dataset, axes, scale, offset, void_value)
     path = Path(path)
     if format is not None and format not in camera_formats():
         raise ValueError(f"format: is {format!r}, expected one of {', '.join(camera_formats())}")
@@ -171,7 +183,7 @@ def read_recording(
     if one.states_quantity and stated != Stated(interval=interval):
         raise ValueError(
             f"{path}: is {one.description}, which states itself what was measured: "
-            "expected no quantity, unit, dataset or axes"
+            "expected no quantity, unit, scale, offset, void_value, dataset or axes"
         )
     read = partial(read_here, path, kind, frames, stated)
     return Sandbox(str(path)).answer(read) if one.in_subprocess(path) else read()

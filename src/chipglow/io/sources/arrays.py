@@ -29,14 +29,19 @@ from chipglow.text import Notes, read_matrix
 MOST_SAMPLES: Final = 100_000_000
 """Maximum number of samples that are read at once."""
 
-MOST_ON_A_SIDE: Final = 1_000_000
-"""Maximum number of samples along an axis other than time."""
-
 _MOST_NOTES: Final = 10
 _MORE_NOTES: Final = "There are more notes on further files."
 _KINDS: Final = "fiub"
-_MEANING: Final = ("units", "scale_factor", "add_offset", "_FillValue", "missing_value")
+_MEANING: Final = (
+    "units", "scale_factor", "add_offset", "_Unsigned", "_FillValue", "missing_value", "valid_min",
+    "valid_max", "valid_range",
+)  # fmt: skip
 """Attributes on which the meaning of numbers depends: those of a series are of its first file."""
+
+_ATTRIBUTES: Final = (
+    "standard_name", "axis", "bounds", "flag_values", "flag_masks", "flag_meanings", *_MEANING
+)  # fmt: skip
+"""Attributes of the NetCDF and CF conventions that readers use."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
     "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
@@ -59,7 +64,7 @@ class FileArray:
     dims: tuple[str, ...] = ()
     """Names of its axes, if the file states them."""
     attributes: Mapping[str, Any] = field(default_factory=dict)
-    """``units``, ``scale_factor``, ``_FillValue`` and others."""
+    """``units``, ``scale_factor``, ``_FillValue`` and others: text, a number or an array."""
     chunks: tuple[int, ...] | None = None
     """Shape of the parts that the file keeps together."""
     path: str = ""
@@ -291,11 +296,7 @@ def _hdf5_arrays(name: str, item: Any) -> Iterator[FileArray]:
         return
     if item.dtype.kind not in _KINDS or item.shape is None or "#" in name:
         return
-    attributes = {
-        key: _plain(item.attrs[key])
-        for key in ("units", "scale_factor", "add_offset", "_FillValue", "missing_value")
-        if key in item.attrs
-    }
+    attributes = {key: _plain(item.attrs[key]) for key in _ATTRIBUTES if key in item.attrs}
     dims = tuple(_dimension(dimension) for dimension in item.dims)
     dims = dims if all(dims) else ()
     kind = item.attrs.get("MATLAB_class")
@@ -316,15 +317,19 @@ def _dimension(dimension: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return an attribute as text or a number."""
-    value = np.asarray(value).reshape(-1)[0] if np.size(value) else ""
-    if isinstance(value, bytes):
-        return value.decode(errors="replace")
-    return str(value) if isinstance(value, str) else value
+    """Return an attribute as text, a number or a list of numbers."""
+    values = np.asarray(value).reshape(-1)
+    if values.size > 1 and values.dtype.kind in _KINDS:
+        return values
+    first = values[0] if values.size else ""
+    if isinstance(first, bytes):
+        return first.decode(errors="replace")
+    return str(first) if isinstance(first, str) else first
 
 
 def _netcdf(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    yield from (_netcdf3 if head_of(path, 3) == b"CDF" else _hdf5)(path, stack)
+    for array in (_netcdf3 if head_of(path, 3) == b"CDF" else _hdf5)(path, stack):
+        yield replace(array, attributes={**array.attributes, "prefilled": True})
 
 
 def _netcdf3(path: Path, stack: ExitStack) -> Iterator[FileArray]:
@@ -440,32 +445,42 @@ def _png(path: Path, stack: ExitStack) -> Iterator[FileArray]:
 
 def _zarr(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     zarr = required("zarr", path, "grid")
-    if path.is_dir():
-        store = zarr.storage.LocalStore(path, read_only=True)
-    else:
-        with ZipFile(path):  # Zarr's own opening leaves a half-open store behind
-            store = stack.enter_context(zarr.storage.ZipStore(path, mode="r"))
+    if not path.is_dir():
+        raise SourceError(f"{path}: is a file, expected the folder of a Zarr store")
+    store = zarr.storage.LocalStore(path, read_only=True)
     try:
-        root = zarr.open(store, mode="r")
+        # Consolidated metadata may differ from those of the arrays, which are checked here.
+        root = zarr.open(store, mode="r", use_consolidated=False)
     except FileNotFoundError:
         raise SourceError(f"{path}: there is no Zarr array or group in it") from None
     members = [("", root)] if isinstance(root, zarr.Array) else root.members(max_depth=None)
-    for name, item in members:
-        if isinstance(item, zarr.Array):
-            unknown = sorted(set(_codecs(item.metadata.to_dict())) - set(_CODECS))
-            if unknown:  # one of Zarr's codecs unpickles, and so would run what is in the file
-                raise SourceError(
-                    f"{path}: {name} is packed by {unknown[0]!r}, which is not allowed"
-                )
-            if item.dtype.kind in _KINDS:
-                yield _zarr_array(name, item)
+    arrays = {name: item for name, item in members if isinstance(item, zarr.Array)}
+    for name, item in arrays.items():
+        unknown = sorted(set(_codecs(item.metadata.to_dict())) - set(_CODECS))
+        if unknown:  # one of Zarr's codecs unpickles, and so would run what is in the file
+            raise SourceError(f"{path}: {name} is packed by {unknown[0]!r}, which is not allowed")
+    for name, item in arrays.items():
+        if item.dtype.kind in _KINDS:
+            yield _zarr_array(store, name, item)
 
 
-def _zarr_array(name: str, array: Any) -> FileArray:
-    attributes = dict(array.attrs)
-    dims = getattr(array.metadata, "dimension_names", None) or attributes.get("_ARRAY_DIMENSIONS")
-    names = tuple(str(dim) for dim in dims or ())
+def _zarr_array(store: Any, name: str, array: Any) -> FileArray:
+    """Return an array; if its axes have names, xarray or a program like it wrote it.
+
+    xarray knows where either version of Zarr keeps the fill value, and in which encoding.
+    """
+    dims = getattr(array.metadata, "dimension_names", None) or array.attrs.get("_ARRAY_DIMENSIONS")
     read: Read = lambda key: np.asarray(array[key])  # noqa: E731
+    attributes = dict(array.attrs)
+    if dims and name:
+        from xarray.backends import ZarrStore
+
+        group, _, short = name.rpartition("/")
+        opened = ZarrStore.open_group(store, mode="r", group=group or None, consolidated=False)
+        variable = opened.open_store_variable(short)
+        read = lambda key: np.asarray(variable[key].values)  # noqa: E731
+        attributes = dict(variable.attrs)
+    names = tuple(map(str, dims or ()))
     return FileArray(name, tuple(array.shape), read, names, attributes, array.chunks)
 
 
@@ -500,7 +515,7 @@ ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     ".mat": _matlab,
     **dict.fromkeys((".tif", ".tiff"), _tiff),
     ".png": _png,
-    **dict.fromkeys((".zarr", ".zip"), _zarr),
+    ".zarr": _zarr,
     **dict.fromkeys((".csv", ".txt", ".dat"), _text),
 }
 """Readers of arrays by the ending of the file's name."""

@@ -176,7 +176,7 @@ class _Points:
 
     def _unit(self, name: str, label: str, table: PointTable) -> Unit:
         units = self._source.units
-        own = units.length if name in _AXES else units.of(name)
+        own = units.length if name in _AXES else units.unit_given(name)
         return unit_of(name, f"{table.path}: {label}", table.units.get(label), own, self.notes)
 
     def _places(self, table: PointTable) -> NDArray[np.float64]:

@@ -99,7 +99,7 @@ def match_names(
     return result
 
 
-METRE, SECOND, KELVIN = (Unit(1.0, text=text) for text in ("m", "s", "K"))
+METRE, SECOND = (Unit(1.0, text=text) for text in ("m", "s"))
 
 
 def _unit(name: str, base: str) -> tuple[Any, ...]:
@@ -126,10 +126,12 @@ class Units(Part):
         InstanceOf[Unit], *_unit("time", "s"), Parameter("Unit of times.", allowed="s, ms, us, ...")
     ] = SECOND
     temperature: Annotated[
-        InstanceOf[Unit],
-        *_unit("temperature", "K"),
-        Parameter("Unit of temperatures.", allowed="K, degC, degF"),
-    ] = KELVIN
+        Annotated[InstanceOf[Unit], *_unit("temperature", "K")] | None,
+        Parameter(
+            "Unit of temperatures; none: as the source says, or K.",
+            allowed="none, K, degC, degF, cK, 0.01 K, ...",
+        ),
+    ] = None
     velocity: Annotated[
         Annotated[InstanceOf[Unit], *_unit("velocity", "m/s")] | None,
         Parameter(
@@ -141,10 +143,14 @@ class Units(Part):
         Parameter("Unit of strain rates; none: from the time.", allowed="none, 1/s, 1/ms, ..."),
     ] = None
 
+    def unit_given(self, name: str) -> Unit | None:
+        """Return the unit of a field of a scene; None for temperatures without one."""
+        return self.temperature if name == "temperature" else self.of(name)
+
     def of(self, name: str) -> Unit:
-        """Return the unit of a field of a scene."""
+        """Return the unit of a field of a scene in a source that states none."""
         if name == "temperature":
-            return self.temperature
+            return self.temperature or SI
         if name.startswith("velocity"):
             return self.velocity or Unit(self.length.scale / self.time.scale)
         if name == "plastic_strain_rate":

@@ -9,20 +9,26 @@ from typing import Annotated, Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.arrays import ARRAY_READERS, MOST_ON_A_SIDE, FileArray, open_arrays
+from chipglow.io.sources.arrays import ARRAY_READERS, FileArray, open_arrays
 from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple
 from chipglow.io.sources.layout import (
     AXES,
     COORDINATES,
+    ROW_0,
+    ascends,
     axes_of,
-    check_even,
     check_times,
     coordinate,
+    even_positions,
     find_fields,
+    may_be_field,
     read_frames,
     read_list,
+    scaled,
     unit_of,
+    without,
 )
+from chipglow.io.sources.plausible import check_sides, check_tenths
 from chipglow.io.sources.source import Source, SourceError, Survey, even_times, extent_of, span_of
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
@@ -79,6 +85,15 @@ class GridSource(Source, Part):
         float | None,
         Parameter("Number that stands for no material, in the file's unit; NaN always does."),
     ] = None
+    scale: Annotated[
+        float | None,
+        Parameter(
+            "Temperatures are scale x number + offset in their unit; none: 1.",
+            over=0.0,
+            allowed="none, 0.04",
+        ),
+    ] = None
+    offset: Annotated[float | None, Parameter("See scale; none: 0.", allowed="none, -40")] = None
     interval: float | None = None
     units: Units = field(default_factory=Units)
     placement: Placement = field(default_factory=Placement)
@@ -136,11 +151,7 @@ class _Layer:
         self.dims = dict(zip(axes, array.dims, strict=False))
         """Names of the axes in the file, if it states them."""
         samples = self.shape[1] * self.shape[2]
-        for axis, length in zip(AXES[1:], self.shape[1:], strict=True):
-            if not 2 <= length <= MOST_ON_A_SIDE:
-                raise SourceError(
-                    f"{array}: has {length} samples along {axis}, expected 2 to {MOST_ON_A_SIDE}"
-                )
+        check_sides(array, *self.shape[1:])
         if self.shape[0] < 1:
             raise SourceError(f"{array}: has no frame")
         self._first, self._block = 0, np.empty((0, 0, 0), np.float32)
@@ -191,10 +202,13 @@ class _Grid:
 
     def _layer(self, name: str, array: FileArray) -> _Layer:
         self.notes += array.notes
-        axes = axes_of(array, self._source.axes, self.notes)
+        source = self._source
+        axes = axes_of(array, source.axes, self.notes, self._arrays)
         unit = SI
         if name != "material":
-            unit = unit_of(name, str(array), array.unit, self._source.units.of(name), self.notes)
+            unit = unit_of(name, str(array), array.unit, source.units.unit_given(name), self.notes)
+        if name == "temperature":
+            unit = scaled(unit, source.scale, source.offset)
         return _Layer(array, axes, unit)
 
     def _choose(self) -> dict[str, FileArray]:
@@ -214,7 +228,8 @@ class _Grid:
 
     def _candidates(self, path: str) -> dict[str, FileArray]:
         """Return the arrays of a file that may be a field, by their number of axes."""
-        arrays = self._files[path]
+        every, named = self._files[path], self._source.names.values()
+        arrays = [one for one in every if may_be_field(one, every) or one.name in named]
         solid = any(len(array.shape) == 3 for array in arrays)
         number = len(self._source.axes or (AXES if solid else AXES[1:]))
         result = {
@@ -228,9 +243,12 @@ class _Grid:
         return result
 
     def _coordinate(self, axis: str) -> FileArray | None:
+        source = self._source
+        own = source.units.time if axis == "time" else source.units.length
         count = self._first.shape[AXES.index(axis)]
-        given, dim = self._source.names.get(axis), self._first.dims.get(axis, "")
-        return coordinate(axis, self._arrays, given, dim, count)
+        dim = self._first.dims.get(axis, "")
+        given = source.names.get(axis)
+        return coordinate(axis, self._arrays, count, dim, self.notes, given, own)
 
     def _positions(self, axis: str) -> NDArray[np.float64]:
         """Return the centres of the columns or rows in m, in the order of the file."""
@@ -240,16 +258,20 @@ class _Grid:
                 raise SourceError(
                     f"{self._first.array.path}: has no coordinate {axis!r}, expected grid.spacing"
                 )
-            return check_even(str(array), read_list(axis, array, source.units.length, self.notes))
-        number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5
+            return even_positions(axis, array, source.units.length, self.notes)
+        is_ascending = axis == "x" or not source.top_first
         if array is not None:
-            self.notes.remarks.append(f"The coordinate {axis} is not used: the spacing is given.")
+            is_ascending = ascends(array)
+            self.notes.remarks.append(
+                f"The spacing is given; the coordinate {axis} determines only the direction."
+            )
+        elif axis == "y":
+            self.notes.assumed.append(ROW_0.format("upper" if source.top_first else "lower"))
+        number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5
         if axis == "x":
-            return source.left + source.spacing * number
-        edge = "upper" if source.top_first else "lower"
-        self.notes.assumed.append(f"Row 0 is the {edge} edge.")
+            return source.left + source.spacing * (number if is_ascending else number[::-1])
         down = source.row_spacing or source.spacing
-        return source.top - down * (number if source.top_first else number[::-1])
+        return source.top - down * (number[::-1] if is_ascending else number)
 
     def _find_times(self) -> NDArray[np.float64]:
         source = self._source
@@ -268,6 +290,8 @@ class _Grid:
             values, material = self.read(index)
             if "temperature" in self.layers:
                 heat = values[list(self.layers).index("temperature")][material != Material.VOID]
+                if (layer := self.layers["temperature"]).unit == SI and self._source.scale is None:
+                    check_tenths(str(layer.array), heat)
                 found += [value for value in span_of(heat) if isfinite(value)]
         return span_of(found) if "temperature" in self.layers else None
 
@@ -288,10 +312,7 @@ class _Grid:
             raise SourceError(
                 f"{self.layers[name].array}: has infinite numbers, expected finite ones or NaN"
             )
-        void: NDArray[np.bool_] = np.isnan(raw[name])
-        if self._source.void_value is not None:
-            void |= np.isclose(raw[name], self._source.void_value, rtol=1e-6, atol=0.0)
-        return void
+        return np.asarray(np.isnan(without(raw[name], self._source.void_value)))
 
     def _read_material(self, layer: _Layer, index: int) -> NDArray[np.uint8]:
         kinds = np.nan_to_num(layer.read(index), nan=float(Material.VOID))

@@ -8,14 +8,31 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import FileArray
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, SI_UNITS, match_names, simple
+from chipglow.io.sources.plausible import LARGEST_WITHOUT_UNIT
 from chipglow.io.sources.source import SourceError, naming
+from chipglow.io.sources.unpacking import unpack
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
 
 AXES: Final = ("time", "y", "x")
 COORDINATES: Final = (*AXES, "z")
 
+ROW_0: Final = "Row 0 is the {} edge."
+"""Assumption on images without a coordinate y."""
+
 _GRID_NAMES: Final = {**COMMON_NAMES, "material": ("material",)}
+_DIMENSIONS: Final[Mapping[str, tuple[str, ...]]] = {
+    "time": ("frame", "frames", "image", "images"),
+    "y": ("row", "rows", "line", "lines", "height", "lat", "latitude", "ny"),
+    "x": ("column", "columns", "col", "cols", "width", "lon", "longitude", "nx"),
+}
+"""Further names of dimensions."""
+_CF_AXES: Final = {
+    "t": "time", "time": "time",
+    "y": "y", "projection_y_coordinate": "y", "latitude": "y", "grid_latitude": "y",
+    "x": "x", "projection_x_coordinate": "x", "longitude": "x", "grid_longitude": "x",
+}  # fmt: skip
+"""Axes by the attributes ``axis`` and ``standard_name`` of their coordinates."""
 _LARGEST_UNEVENNESS: Final = 0.05
 """Maximum distance of a coordinate from its even place, in steps."""
 
@@ -50,41 +67,84 @@ def find_fields(
     return {name: arrays[found[name]] for name in dict.fromkeys((*known, *found)) if name in found}
 
 
-def axes_of(array: FileArray, given: Sequence[str] | None, notes: Notes) -> tuple[str, ...]:
-    """Return the axes of an array in their order: ``y``, ``x`` and possibly ``time``."""
+def may_be_field(array: FileArray, arrays: Iterable[FileArray]) -> bool:
+    """Return whether an array may hold samples: neither bounds of a coordinate nor flags."""
+    bounds = {str(one.attributes.get("bounds")) for one in arrays}
+    flags = ("flag_values", "flag_masks", "flag_meanings")
+    is_flag = any(name in array.attributes for name in flags)
+    return array.short not in bounds and not (is_flag and simple(array.short) != "material")
+
+
+def axes_of(
+    array: FileArray, given: Sequence[str] | None, notes: Notes, arrays: Iterable[FileArray] = ()
+) -> tuple[str, ...]:
+    """Return the axes of an array in their order: ``y``, ``x`` and possibly ``time``.
+
+    The other arrays of the file may state which axis a dimension is.
+    """
     shape = array.shape
-    names = tuple(
-        next((axis for axis in COORDINATES if simple(dim) in OTHER_NAMES[axis]), "")
-        for dim in array.dims
-    )
-    if given is not None:
-        names = tuple(given)
-    elif sorted(names) not in (sorted(AXES), ["x", "y"]):
-        if len(shape) == 3 and array.path.lower().endswith(".mat"):
-            raise SourceError(
-                f"{array}: has shape {shape}, give the axes: y, x, time as MATLAB orders images, "
-                "or time, y, x"
-            )
-        names = AXES[-len(shape) :]
-        notes.assumed.append(f"The axes of {array.name} are {', '.join(names)}.")
-    if len(names) != len(shape) or len(shape) not in (2, 3):
+    if len(shape) not in (2, 3) or (given is not None and len(given) != len(shape)):
         raise SourceError(
             f"{array}: has shape {shape}, expected the axes {', '.join(given or AXES)}"
         )
+    if given is not None:
+        return tuple(given)
+    named = tuple(_axis_of(dim, arrays) for dim in array.dims) or ("",) * len(shape)
+    if len(shape) == 3 and not any(named) and array.path.lower().endswith(".mat"):
+        raise SourceError(
+            f"{array}: has shape {shape}, give the axes: y, x, time as MATLAB orders images, "
+            "or time, y, x"
+        )
+    names = _completed(named)
+    if names is None:
+        raise SourceError(
+            f"{array}: has the dimensions {', '.join(array.dims)}, give its axes, such as y, x"
+        )
+    if names != named:
+        notes.assumed.append(f"The axes of {array.name} are {', '.join(names)}.")
     return names
 
 
-def unit_of(name: str, label: str, text: str | None, own: Unit, notes: Notes) -> Unit:
-    """Return and note the unit of a quantity: the user's own if not SI, else the file's text."""
+def _axis_of(dim: str, arrays: Iterable[FileArray]) -> str:
+    """Return the axis that a dimension is, by its name or by its coordinate; "" if unknown."""
+    for axis in COORDINATES:
+        if simple(dim) in (*OTHER_NAMES[axis], *_DIMENSIONS.get(axis, ())):
+            return axis
+    own = (array for array in arrays if array.short == dim)
+    return next((axis for array in own if (axis := _stated_axis(array))), "")
+
+
+def _stated_axis(array: FileArray) -> str:
+    """Return the axis that attributes of the CF conventions state for a coordinate."""
+    axis, name = (str(array.attributes.get(key, "")).lower() for key in ("axis", "standard_name"))
+    return _CF_AXES.get(axis) or _CF_AXES.get(name, "")
+
+
+def _completed(names: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Return axes with those that are unknown filled in; None if that would be a guess."""
+    usual = AXES[-len(names) :]
+    rest = [axis for axis in usual if axis not in names]
+    known = {axis for axis in names if axis}
+    moved = any(axis and axis != place for axis, place in zip(names, usual, strict=True))
+    if not known <= set(usual) or len(rest) != names.count("") or (len(rest) > 1 and moved):
+        return None
+    return tuple(axis or rest.pop(0) for axis in names)
+
+
+def unit_of(name: str, label: str, text: str | None, given: Unit | None, notes: Notes) -> Unit:
+    """Return and note the unit of a quantity: the one given, else that of the file's text, else SI.
+
+    SI counts as given for temperatures only: other units of a description are SI by default.
+    """
     short = label.rsplit(": ", 1)[-1]
-    if own != SI:
-        if text is not None:
-            notes.remarks.append(f"{short} is in {text!r}; the given unit is used instead.")
-        return own
+    if given is not None and (given != SI or name == "temperature"):
+        if text is not None and _known_unit(text, name) != given:
+            note_other_unit(short, text, notes)
+        return given
     if text is None:
         if SI_UNITS[name] != "1":
             notes.assumed.append(f"{short} is in {SI_UNITS[name]}: the file states no unit.")
-        return own
+        return SI
     with naming(label):
         unit = parse_unit(text, SI_UNITS[name], name)
     if unit != SI:
@@ -92,10 +152,48 @@ def unit_of(name: str, label: str, text: str | None, own: Unit, notes: Notes) ->
     return unit
 
 
+def _known_unit(text: str, name: str) -> Unit | None:
+    try:
+        return parse_unit(text, SI_UNITS[name], name)
+    except ValueError:
+        return None
+
+
+def note_other_unit(short: str, text: str | None, notes: Notes) -> None:
+    """Note that a file states another unit than the one that is given and used."""
+    if text is not None:
+        notes.remarks.append(f"{short} is in {text!r}; the given unit is used instead.")
+
+
+def scaled(unit: Unit, scale: float | None, offset: float | None) -> Unit:
+    """Return the unit of numbers n that stand for ``scale * n + offset`` in another unit."""
+    factor = 1.0 if scale is None else scale
+    return Unit(unit.scale * factor, unit.scale * (offset or 0.0) + unit.offset, unit.text)
+
+
+def without(values: NDArray[Any], void_value: float | None) -> NDArray[Any]:
+    """Return numbers with NaN instead of the one that stands for no value."""
+    if void_value is None:
+        return values
+    # Numbers of 32 bits differ from their decimal text by 6e-8.
+    void = np.isclose(values, void_value, rtol=1e-6, atol=0.0)
+    return np.where(void, np.nan, values) if void.any() else values
+
+
 def coordinate(
-    axis: str, arrays: Iterable[FileArray], given: str | None, dim: str, length: int
+    axis: str,
+    arrays: Iterable[FileArray],
+    length: int,
+    dim: str,
+    notes: Notes,
+    given: str | None = None,
+    own: Unit = SI,
 ) -> FileArray | None:
-    """Return the array of the coordinate of an axis, which has a length and maybe a name."""
+    """Return the coordinate of an axis, which has a length and maybe a name; None without one.
+
+    A list that only counts the samples, of which neither the file nor the user states the unit,
+    is none.
+    """
     every = list(arrays)
     lists = [array for array in every if max(array.shape, default=0) == array.size]
     if given is not None:
@@ -103,48 +201,78 @@ def coordinate(
         if not match:
             raise SourceError(f"{every[0].path}: there is no list {given!r} for {axis}")
     else:
-        match = [one for one in lists if one.short == dim or simple(one.short) in OTHER_NAMES[axis]]
+        match = [one for one in lists if _is_coordinate(one, axis, dim)]
         # The most specific of several names: t may be another number.
-        match.sort(key=lambda one: simple(one.short) == "t")
+        match.sort(key=lambda one: (one.short != dim, simple(one.short) == "t"))
     if not match:
         return None
-    if match[0].size != length:
-        raise SourceError(f"{match[0]}: has {match[0].size} values, expected {length} along {axis}")
-    return match[0]
+    found = match[0]
+    if found.size != length:
+        raise SourceError(f"{found}: has {found.size} values, expected {length} along {axis}")
+    if given is None and own == SI and _only_counts(axis, found):
+        notes.remarks.append(f"{found.short} only counts along {axis}: it is not used.")
+        return None
+    return found
+
+
+def _is_coordinate(array: FileArray, axis: str, dim: str) -> bool:
+    name = simple(array.short)
+    return array.short == dim or name in OTHER_NAMES[axis] or _stated_axis(array) == axis
+
+
+def _only_counts(axis: str, array: FileArray) -> bool:
+    """Return whether a list is 0, 1, 2, ... or 1, 2, 3, ... without a unit of its axis."""
+    if array.unit is not None and _known_unit(array.unit, axis) is not None:
+        return False
+    numbers = _numbers(array)
+    return bool(numbers[0] in (0.0, 1.0) and (np.diff(numbers) == 1.0).all() and numbers.size > 1)
+
+
+def _numbers(array: FileArray) -> NDArray[np.float64]:
+    """Return all values of a coordinate as they are in the file."""
+    return np.asarray(unpack(array.part(), array.attributes), np.float64).reshape(-1)
 
 
 def read_list(axis: str, array: FileArray, own: Unit, notes: Notes) -> NDArray[np.float64]:
     """Return all values of a coordinate in SI; for its unit see `unit_of`."""
     unit = unit_of(axis, str(array), array.unit, own, notes)
-    values = np.asarray(array.part(), np.float64).reshape(-1) * unit.scale + unit.offset
+    values = _numbers(array) * unit.scale + unit.offset
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
         raise SourceError(f"{array}: value {wrong[0]} is {values[wrong[0]]}, expected a number")
     return values
 
 
+def even_positions(axis: str, array: FileArray, own: Unit, notes: Notes) -> NDArray[np.float64]:
+    """Return the centres of columns or rows in m, in the order of the file, by a coordinate."""
+    values = check_even(str(array), read_list(axis, array, own, notes))
+    size = abs(values[-1] - values[0])
+    if array.unit is None and own == SI and size > LARGEST_WITHOUT_UNIT:
+        raise SourceError(
+            f"{array}: extends over {size:.4g} and states no unit, expected up to "
+            f"{LARGEST_WITHOUT_UNIT:g} m"
+        )
+    return values
+
+
+def ascends(array: FileArray) -> bool:
+    """Return whether a coordinate ascends; refuse one that does neither."""
+    steps = np.diff(_numbers(array))
+    if not ((steps > 0).all() or (steps < 0).all()):
+        raise SourceError(f"{array}: neither ascends nor descends")
+    return bool((steps > 0).all())
+
+
 def read_frames(array: FileArray, axes: Sequence[str], frames: slice) -> NDArray[Any]:
     """Return frames as they are in the file, shape (time, y, x), NaN where a number is missing."""
     lengths = dict(zip(axes, array.shape, strict=True))
     key = tuple(frames if axis == "time" else slice(None) for axis in axes)
-    values = _unpacked(array.part(key), array.attributes)
+    values = unpack(array.part(key), array.attributes)
     values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
     values = values if "time" in axes else values[None]
     expected = (len(range(lengths.get("time", 1))[frames]), lengths["y"], lengths["x"])
     if values.shape != expected:
         raise SourceError(f"{array}: has shape {values.shape}, expected {expected}")
-    return values
-
-
-def _unpacked(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
-    """Return numbers that may be packed by NetCDF's conventions, NaN where one is missing."""
-    values = raw
-    scale, offset = (attributes.get(name) for name in ("scale_factor", "add_offset"))
-    if scale is not None or offset is not None:
-        values = raw * float(1.0 if scale is None else scale) + float(offset or 0.0)
-    for name in ("_FillValue", "missing_value"):
-        if attributes.get(name) is not None:
-            values = np.where(raw == raw.dtype.type(attributes[name]), np.nan, values)
     return values
 
 

@@ -88,6 +88,9 @@ def _read(description: MeasurementDescription, file: str) -> Recording:
         interval=description.interval,
         dataset=description.dataset,
         axes=description.axes,
+        scale=description.scale,
+        offset=description.offset,
+        void_value=description.void_value,
     )
 
 
@@ -230,6 +233,11 @@ def _problems(uniform: Recording, recording: Recording) -> Iterator[str]:
     """Yield the reasons why frames of a flat-field source are of no use for a recording."""
     if uniform.quantity != recording.quantity:
         yield f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
+    if uniform.stored != recording.stored:
+        yield (
+            f"is stored along {uniform.stored}, the recording along {recording.stored}: their "
+            "pixels may differ, write both files with the same axes and coordinates"
+        )
     theirs, ours = uniform.integration_time, recording.integration_time
     if theirs is not None and ours is not None and not np.isclose(theirs, ours, rtol=0.01):
         yield (

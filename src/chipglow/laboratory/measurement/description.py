@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -14,7 +15,7 @@ from chipglow.laboratory.measurement.radiometric_calibration import ImagePositio
 from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
 from chipglow.quantities.units import LENGTH, TEMPERATURE, TIME, WAVELENGTHS
 from chipglow.radiometry import Band, ObjectParameters
-from chipglow.text import commented_yaml, described_by
+from chipglow.text import Notes, commented_yaml, described_by
 
 _FRAMES: Final = re.compile(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?")
 
@@ -117,8 +118,21 @@ class MeasurementDescription(Part):
     unit: Annotated[
         str | None,
         Parameter(
-            "Their unit, for files that do not state it.", allowed="none, counts, W/m2/sr, K, degC"
+            "Their unit, instead of the one that the file states.",
+            allowed="none, counts, W/m2/sr, K, degC, degF, cK, 0.01 K, ...",
         ),
+    ] = None
+    scale: Annotated[
+        float | None,
+        Parameter(
+            "Temperature or radiance is scale x number + offset in the unit; none: 1.",
+            over=0.0,
+            allowed="none, 0.04",
+        ),
+    ] = None
+    offset: Annotated[float | None, Parameter("See scale; none: 0.", allowed="none, -40")] = None
+    void_value: Annotated[
+        float | None, Parameter("Number in the file that stands for no value; NaN always does.")
     ] = None
     interval: Annotated[
         float | None, Parameter("Time from frame to frame; none: as the file says.", TIME)
@@ -216,6 +230,13 @@ class MeasurementDescription(Part):
             "object_parameters": self.object_parameters.applied_to(recording.object_parameters),
         }
         said = {name: value for name, value in said.items() if value is not None}
+        stated = recording.pitch
+        if self.pitch is not None and stated is not None and not isclose(self.pitch, stated):
+            remark = (
+                f"The file states a pitch of {1e6 * stated:.6g} µm; the given one of "
+                f"{1e6 * self.pitch:.6g} µm is used instead."
+            )
+            said |= {"position": None, "notes": recording.notes + Notes(remarks=[remark])}
         return replace(recording, **said)
 
 

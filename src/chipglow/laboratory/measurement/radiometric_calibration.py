@@ -17,6 +17,7 @@ from chipglow.camera import (
     Recording,
     replace_bad_pixels,
 )
+from chipglow.io.sources.plausible import doubt_of_size
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.scene import Raster
@@ -76,8 +77,20 @@ class ImagePosition(Part):
             turned = turned[:, ::-1]
         return np.ascontiguousarray(turned)
 
-    def raster(self, shape: tuple[int, int], pitch: float) -> Raster:
-        """Return the grid of the pixels of placed frames with a pitch in m."""
+    def keeps(self, stated: tuple[float, float] | None) -> bool:
+        """Return whether the left and upper edge that a file states apply to placed frames."""
+        is_turned = self.quarter_turns != 0 or self.mirror != "none"
+        return stated is not None and self.tip is None and not is_turned
+
+    def raster(
+        self, shape: tuple[int, int], pitch: float, stated: tuple[float, float] | None = None
+    ) -> Raster:
+        """Return the grid of the pixels of placed frames with a pitch in m.
+
+        `stated` is the left and upper edge in m in coordinates of the file.
+        """
+        if stated is not None and self.keeps(stated):
+            return Raster(*stated, pitch, *shape)
         right, down = (0.0, float(shape[0])) if self.tip is None else self.tip
         return Raster(-right * pitch, down * pitch, pitch, *shape)
 
@@ -110,7 +123,8 @@ def calibrate_recording(
     radiance, flags = map(position.place, developed)
     if calibration is not None:
         lower_limit = max(lower_limit or 0.0, calibration.lowest) or None
-    raster = position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch)
+    shape = radiance.shape[1], radiance.shape[2]
+    raster = position.raster(shape, recording.pitch, recording.position)
     errors = None if calibration is None else calibration.errors
     attributes = _attributes(recording, calibration, position, is_read)
     return Measurement.from_radiance(
@@ -307,10 +321,12 @@ def _notes(
             recording.saturation is None
         ),
         "The origin of coordinates is the image's lower left corner: no tip was given.": (
-            position.tip is None
+            position.tip is None and not position.keeps(recording.position)
         ),
     }
     stated = [text for text, applies in assumed.items() if applies]
+    size = max(recording.signal.shape[1:]) * (recording.pitch or 0.0)
+    stated += doubt_of_size("The image", size, "pitch")
     about_calibration = Notes(warnings=list(calibration.warnings if calibration else ()))
     warnings = Notes(warnings=list(_warnings(recording, calibration, is_read)))
     return recording.notes + Notes(stated) + about_calibration.about("Calibration") + warnings
