@@ -440,21 +440,6 @@ def test_labels_without_a_row_are_counted(tmp_path):
     ]
 
 
-ASSEMBLY = """*ASSEMBLY, NAME=ALL
-*INSTANCE, NAME=CHIP-1, PART=CHIP
-{moved}*END INSTANCE
-*NODE
-101, 9., 9.
-*END ASSEMBLY
-"""
-
-
-def test_one_instance_of_a_part_is_read(tmp_path):
-    path = abaqus(tmp_path)
-    path.write_text(path.read_text() + ASSEMBLY.format(moved=""))
-    assert MeshSource(path).survey().extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
-
-
 def table_of(text):
     return "chip_nodes.csv", lambda _: text
 
@@ -464,11 +449,10 @@ def deck_with(old, new):
 
 
 DAMAGES = {
-    r"\*NODE: .*'nothing'": deck_with("101, 0, 0", "101, nothing, 0"),
-    "B21 is not read": deck_with("CPE4RT", "B21"),
-    r"\*INCLUDE is not read": deck_with("*HEADING", "*INCLUDE, INPUT=/etc/passwd"),
-    "999999, which is none": deck_with("1, 101,", "1, 999999,"),
-    "has no .NODE": deck_with("*NODE", "*NOTE"),
+    r"line 4: \*NODE: 'nothing' is not a number": deck_with("101, 0, 0", "101, nothing, 0"),
+    "node 999999, which is not defined": deck_with("1, 101,", "1, 999999,"),
+    "node 101, which is not defined": deck_with("*NODE", "*NOTE"),
+    "has no .NODE": ("chip.inp", lambda text: text.replace("*EL", "*NOTE")),
     "No columns": table_of(""),
     "expected a table": table_of("label,NT11\n1,2\n"),
     "'hot'": table_of("node,NT11\n101,hot\n"),
@@ -476,8 +460,6 @@ DAMAGES = {
     "Expected 2 fields in line 3, saw 3": table_of("node,NT11\n101,300\n103,300,1\n"),
     "chip_nodes.csv: .*''": table_of("node,NT11,U1\n101,300,0\n103,300\n"),
     "no row of numbers": table_of("node,NT11\n"),
-    "instance that is moved": ("chip.inp", lambda text: text + ASSEMBLY.format(moved="1., 0.\n")),
-    "one instance at most": ("chip.inp", lambda text: text + 2 * ASSEMBLY.format(moved="")),
 }
 
 

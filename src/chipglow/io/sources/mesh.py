@@ -260,7 +260,7 @@ class Meshes:
 
     def remarks(self) -> list[str]:
         """Describe blocks without a temperature, and missing values in the first and last mesh."""
-        blocks, sentences = self.ends[0], []
+        blocks, sentences = self.ends[0], list(self.reader.remarks)
         for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
             if block.grid.n_cells and not self._has_temperature(block):
                 named = block.names[0] if block.names else "a block"
