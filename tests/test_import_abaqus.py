@@ -54,6 +54,7 @@ READ = {
     "rigid line, mass, springs": MESH + TOOL + "*ELEMENT, TYPE=R2D2\n3, 7, 8\n*ELEMENT, TYPE=MASS\n"
     "4, 9\n*ELEMENT, TYPE=SPRINGA\n5, 7, 9\n*ELEMENT, TYPE=CONN2D2\n6, 7, 9\n"
     "*ELEMENT, TYPE=DASHPOTA\n7, 7, 9\n*ELEMENT, TYPE=ROTARYI\n8, 9\n",
+    "pore pressure": MESH.replace("CPE4RT", "CPE4P"),
     "cohesive element": NODES + FIRST + "*ELEMENT, TYPE=COH2D4\n2, 2, 3, 6, 5\n",
     "outputs and materials": MESH + "*NODE OUTPUT\nNT\n*ELEMENT OUTPUT\nPEEQ\n*EL PRINT\n"
     "*AMPLITUDE, INPUT=a.txt\n*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\na, b\n",
@@ -93,6 +94,8 @@ REFUSED = {
     r"line 8: \*ELEMENT: the element type TYPE=EC3D8R is not": NODES
     + "*ELEMENT, TYPE=EC3D8R\n1, 1",
     r"the element type TYPE=PC3D is not read": MESH + "*ELEMENT, TYPE=PC3D\n9, 1\n",
+    r"the element type TYPE=COH2D4P is not read": MESH + "*ELEMENT, TYPE=COH2D4P\n9, 1\n",
+    r"the element type TYPE=C3D15V is not read": MESH + "*ELEMENT, TYPE=C3D15V\n9, 1\n",
     r"the element type TYPE= is not read": MESH + "*ELEMENT\n9, 1\n",
     r"line 9: .*element 1 has 3 nodes, CPE4 has 4": NODES + "*ELEMENT, TYPE=CPE4\n1, 1, 2, 5",
     r"element 1 has 5 nodes, CPE4 has 4": NODES + "*ELEMENT, TYPE=CPE4\n1, 1, 2, 5, 4, 4",

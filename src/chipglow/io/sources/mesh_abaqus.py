@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 Position: TypeAlias = tuple[float, float, float]
 
 _FLAT: Final = re.compile(
-    r"(?:CPE|CPS|CAX|CGAX|COH2D|COHAX|DC2D|DCAX|DS|M3D|R3D|S|STRI)(\d+)(?![\dP])"
+    r"(?:CPE|CPS|CAX|CGAX|COH(?:2D|AX)(?!\d+P)|DC2D|DCAX|DS|M3D|R3D|S|STRI)(\d+)"
 )
-_SOLID: Final = re.compile(r"(?:C3D|COH3D|DC3D|SC)(\d+)(?![\dPV])")
+_SOLID: Final = re.compile(r"(?:C3D(?!\d+V)|COH3D(?!\d+P)|DC3D|SC)(\d+)")
 _WITHOUT_AREA: Final = re.compile(
     r"(?:RB?[23]D2|RAX2|MASS|ROTARYI|HEATCAP|SPRING|DASHPOT|CONN[23]D2|GAP|T[23]D|B[23]\d|PIPE[23]"
     r"|DC1D)"
