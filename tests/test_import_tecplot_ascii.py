@@ -100,7 +100,7 @@ REFUSED = {
     "VARLOCATION=.* is not read": (STRAIN, "=BLOCK", "=BLOCK VARLOCATION=([4-5]=FACECENTERED)"),
     r"VARLOCATION=\(NODAL\) is not read": (STRAIN, "=BLOCK", "=BLOCK, VARLOCATION=(NODAL)"),
     "expected DATAPACKING=BLOCK": (OLD, "F=", "VARLOCATION=([3]=CELLCENTERED), F="),
-    "'X' is there twice": (OLD, '"Y"', '"X"'),
+    "'X' is repeated": (OLD, '"Y"', '"X"'),
     "'B=' is not a name": (OLD, "ZONE", "B= 3\nZONE"),
     "VARIABLES: there are several": (OLD, CELLS, CELLS + HEAD),
     "there is no Y": (OLD, '"Y"', '"Z"'),

@@ -143,7 +143,7 @@ def _names(record: str) -> tuple[str, ...]:
     if wrong := next((plain for _, plain in words if "=" in plain), None):
         raise ValueError(f"{wrong!r} is not a name")
     if repeated := next((name for name in names if names.count(name) > 1), None):
-        raise ValueError(f"{repeated!r} is there twice")
+        raise ValueError(f"{repeated!r} is repeated")
     return names
 
 
