@@ -4,7 +4,7 @@
 
 `codecs` gives the error of the values beside the uncertainty that chipglow predicts from the movie
 alone. `legends` draws a legend beside the field, with and without colour bands and element edges,
-and imports the movie with only the values at the ends of the legend given. A row is right if the
+and imports the movie with the legend's box and the values at its ends. A row is right if the
 true value lies within twice the stated standard uncertainty in at least 90 % of the pixels, or if
 the movie is refused.
 """
@@ -163,10 +163,11 @@ def read_with_map(path, codec, colours, count, shape=SHAPE):
 
 
 def read_with_legend(path, codec, colours, edges, count):
-    """Draw, encode and read a movie whose legend has to be found; SourceError if it is refused."""
+    """Draw, encode and read a movie by the box of its legend; SourceError if it is refused."""
     encode(path, (with_legend(number, colours, edges) for number in range(count)), codec)
     rows, columns = FIELD_SHAPE
-    movie, crop = FieldMovie(str(path), COLDEST, HOTTEST), (0, 0, columns, rows)
+    movie = FieldMovie(str(path), COLDEST, HOTTEST, legend=LEGEND)
+    crop = (0, 0, columns, rows)
     source = MovieSource(movie, pixel=PIXEL, origin=(0.0, rows), crop=crop, interval=1e-6)
     return read_back(source, FIELD_SHAPE)
 

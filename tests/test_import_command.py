@@ -175,7 +175,8 @@ def test_a_movie_needs_no_source_beside_its_section(tmp_path):
     path = tmp_path / "import.yaml"
     path.write_text(
         "kind: movie\n"
-        "movie: {temperature: {file: disc.avi, first: 80 degC, last: 600 degC}, pixel: 1 mm}\n"
+        "movie: {temperature: {file: disc.avi, first: 80 degC, last: 600 degC,\n"
+        "  colours: jet}, pixel: 1 mm}\n"
     )
     source = load_import(path).build().source.source
     assert source.files == str(tmp_path / "disc.avi")

@@ -9,6 +9,7 @@ from exodus_file import write_exodus
 from foam_case import write_foam
 from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
 
+from chipglow.io.importing import Import, prospect
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.mesh import MeshSource
@@ -439,21 +440,6 @@ def test_labels_without_a_row_are_counted(tmp_path):
     ]
 
 
-ASSEMBLY = """*ASSEMBLY, NAME=ALL
-*INSTANCE, NAME=CHIP-1, PART=CHIP
-{moved}*END INSTANCE
-*NODE
-101, 9., 9.
-*END ASSEMBLY
-"""
-
-
-def test_one_instance_of_a_part_is_read(tmp_path):
-    path = abaqus(tmp_path)
-    path.write_text(path.read_text() + ASSEMBLY.format(moved=""))
-    assert MeshSource(path).survey().extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
-
-
 def table_of(text):
     return "chip_nodes.csv", lambda _: text
 
@@ -463,11 +449,10 @@ def deck_with(old, new):
 
 
 DAMAGES = {
-    r"\*NODE: .*'nothing'": deck_with("101, 0, 0", "101, nothing, 0"),
-    "B21 is not read": deck_with("CPE4RT", "B21"),
-    r"\*INCLUDE is not read": deck_with("*HEADING", "*INCLUDE, INPUT=/etc/passwd"),
-    "999999, which is none": deck_with("1, 101,", "1, 999999,"),
-    "has no .NODE": deck_with("*NODE", "*NOTE"),
+    r"line 4: \*NODE: 'nothing' is not a number": deck_with("101, 0, 0", "101, nothing, 0"),
+    "node 999999, which is not defined": deck_with("1, 101,", "1, 999999,"),
+    "node 101, which is not defined": deck_with("*NODE", "*NOTE"),
+    "has no .NODE": ("chip.inp", lambda text: text.replace("*EL", "*NOTE")),
     "No columns": table_of(""),
     "expected a table": table_of("label,NT11\n1,2\n"),
     "'hot'": table_of("node,NT11\n101,hot\n"),
@@ -475,8 +460,6 @@ DAMAGES = {
     "Expected 2 fields in line 3, saw 3": table_of("node,NT11\n101,300\n103,300,1\n"),
     "chip_nodes.csv: .*''": table_of("node,NT11,U1\n101,300,0\n103,300\n"),
     "no row of numbers": table_of("node,NT11\n"),
-    "instance that is moved": ("chip.inp", lambda text: text + ASSEMBLY.format(moved="1., 0.\n")),
-    "one instance at most": ("chip.inp", lambda text: text + 2 * ASSEMBLY.format(moved="")),
 }
 
 
@@ -635,47 +618,22 @@ def test_all_times_of_one_file_are_read(tmp_path, write):
         check_linear(frame, at=number)
 
 
-def two_materials(path, other="temperature_steel", divided=False, whole_name=None):
-    """Two blocks that share nodes, with a field each; what a block has not is written as 0."""
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("temp",), "temperature: 0 in temp, expected kelvin"),
+        (("temperature_graphite", "temperature_steel"), "no field is known as temperature"),
+    ],
+)
+def test_temperatures_of_some_blocks_only_are_refused(tmp_path, names, said):
+    """Exodus has 0 in the blocks to which a variable does not belong."""
     points, hexes = solid()
     left = points[hexes][:, :, 0].mean(axis=1) < 1.0
     blocks = {"graphite": hexes[left], "steel": hexes[~left]}
-    heat = 300.0 + 100.0 * points[:, 0] + 20.0 * points[:, 2]
-    heat = np.stack([heat, heat + 10.0])
-    fields = {}
-    for name, elements in blocks.items():
-        of_block = np.isin(np.arange(len(points)), elements)
-        fraction = np.where(points[:, 0] == 1.0, 0.5 if divided else 1.0, 1.0)
-        fields[f"temperature_{name}"] = np.where(of_block, heat * fraction, 0.0)
-    if whole_name:
-        fields = {whole_name: fields["temperature_graphite"]}
-    return write_exodus(path, points, blocks, [0.0, 1.0], fields)
-
-
-TWO = Raster(0.0, 1.0, 0.1, 10, 20)
-
-
-@pytest.mark.parametrize("divided", [False, True])
-def test_fields_of_two_materials_are_one_temperature(tmp_path, divided):
-    source = MeshSource(two_materials(tmp_path / "two.e", divided=divided), section=0.5)
-    survey = survey_of(source)
-    assert survey.found == {"temperature": "temperature_graphite, temperature_steel"}
-    assert not any(name.startswith("temperature") for name in survey.unused)
-    for number, frame in enumerate(source.frames(TWO)):
-        expected = 310.0 + 100.0 * np.broadcast_to(TWO.x, TWO.shape) + 10.0 * number
-        np.testing.assert_allclose(frame.fields["temperature"], expected, atol=1e-3)
-        assert (frame.material == WORKPIECE).all()
-
-
-def test_a_block_without_a_temperature_is_void_and_never_of_0_kelvin(tmp_path):
-    path = two_materials(tmp_path / "two.e", whole_name="temp")
-    source = MeshSource(path, section=0.5)
-    assert "steel has no temperature: it is treated as void." in survey_of(source).notes.remarks
-    frame = next(source.frames(TWO))
-    right = np.broadcast_to(TWO.x > 1.0, TWO.shape)
-    np.testing.assert_array_equal(frame.material, np.where(right, VOID, WORKPIECE))
-    expected = 310.0 + 100.0 * np.broadcast_to(TWO.x, TWO.shape)
-    np.testing.assert_allclose(frame.fields["temperature"][~right], expected[~right], atol=1e-3)
-    assert np.isnan(frame.fields["temperature"][right]).all()
-    tool = next(MeshSource(path, section=0.5, tool_parts=("steel",)).frames(TWO))
-    np.testing.assert_array_equal(tool.material, np.where(right, TOOL, WORKPIECE))
+    fields = {
+        name: np.where(np.isin(np.arange(len(points)), elements), 300.0, 0.0)[None]
+        for name, elements in zip(names, blocks.values(), strict=False)
+    }
+    path = write_exodus(tmp_path / "two.e", points, blocks, [0.0], fields)
+    with pytest.raises(SourceError, match=said):
+        prospect(Import(MeshSource(path, section=0.5)))

@@ -60,7 +60,7 @@ def _packaged() -> str:
 def source() -> MovieSource:
     """Return the movie as import-movie.md describes it."""
     return MovieSource(
-        FieldMovie(str(MOVIE), COLDEST, HOTTEST),
+        FieldMovie(str(MOVIE), COLDEST, HOTTEST, legend=(272, 20, 288, 220)),
         pixel=2e-6,
         origin=(185.0, 150.0),
         crop=(0, 0, 250, 240),

@@ -1,12 +1,9 @@
 """Legends in a picture: a bar whose colours run along one axis."""
 
-from collections.abc import Iterator
-from itertools import compress
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing
 
 from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
 from chipglow.io.sources.overlays import (
@@ -19,85 +16,93 @@ from chipglow.io.sources.overlays import (
 )
 from chipglow.io.sources.source import SourceError
 
-_SHORTEST: Final = 24
-_NARROWEST: Final = 4
-_EDGE: Final = 8.0  # differences in CIE L*a*b*
-_END: Final = 16.0
-_USUAL: Final = 1.5
-_FLAT: Final = 6.0
-_UNEVEN: Final = 0.15
-_PATH: Final = 60.0
-_DISTINCT: Final = 5
+_EDGE: Final = 8.0  # a difference in CIE L*a*b*
 _BLUR: Final = 3
-_MOST_EDGES: Final = 400
-_MOST_BOXES: Final = 40
-_GAP: Final = 5
-_BEYOND: Final = 4
 _AROUND: Final = 6
 _MOST_PIXELS: Final = 3000
+
+_REACH: Final = 5
+"""Pixels before and behind an end that are examined: fewer than the narrowest band has."""
+
+_LARGEST_OFFSET: Final = 3.5
+"""Pixels by which the colours may end beside the end of the box: codecs blur it by up to 3."""
+
+_LEAST_UNCERTAINTY: Final = 1.0
+"""Standard uncertainty of an end in pixels: an outline may have the colour of the end."""
+
+_DRIFT: Final = 0.3
+"""Largest change of a page's colour, as a fraction of that of the legend over as many pixels."""
+
+_NEAR, _FAR = 4.0, 24.0
+"""Differences from the page, in 8 bits, between which the colours of a scale run evenly."""
+
+_SHORTEST: Final = 4 * _REACH
+"""Pixels of the shortest legend, whose ends do not meet."""
 
 LEAST_EXPLAINED: Final = 0.7
 """Fraction of a picture that must have the colours of its legend."""
 
 
-def find_legend(picture: Picture) -> Box | None:
-    """Return the longest bar of one colour across and many along; None without one."""
-    upright = _upright_bars(picture)
-    lying = ((top, left, bottom, right) for left, top, right, bottom in _upright_bars(
-        picture.transpose(1, 0, 2)
-    ))  # fmt: skip
-    boxes = sorted([*upright, *lying], key=_length_then_narrow, reverse=True)[:_MOST_BOXES]
-    best = max(boxes, key=lambda box: _worth(picture, box), default=None)
-    if best is None:
-        return None
-    # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
-    inward = np.subtract(boxes, best) * (1, 1, -1, -1)
-    within = compress(boxes, np.all((inward >= 0) & (inward <= _BLUR), axis=1))
-    return _extended(picture, min(within, key=lambda box: (box[2] - box[0]) * (box[3] - box[1])))
+def end_uncertainty(picture: Picture, box: Box) -> float:
+    """Return the standard uncertainty of the ends of a legend's colours in a box, in pixels.
 
-
-def is_cut(picture: Picture, box: Box) -> bool:
-    """Return whether the colours continue beyond an end of a legend."""
-    along, first, last = _along(picture, box)
-    return _goes_on(along[last:], along[first:last][::-1]) or _goes_on(
-        along[:first][::-1], along[first:last]
-    )
-
-
-def _goes_on(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> bool:
-    """Return whether colours from an end outward change no more than those from it inward."""
-    if len(beyond) < _BEYOND:
-        return False
-    jump = np.linalg.norm(beyond[:_BEYOND] - inside[0], axis=1).max()
-    run = inside[_BLUR : _BLUR + _BEYOND + 1]
-    usual = np.linalg.norm(run - run[0], axis=1).max()
-    return bool(jump < max(_END, _USUAL * usual))
-
-
-def _along(picture: Picture, box: Box) -> tuple[NDArray[np.float64], int, int]:
-    """Return colours along the middle of a bar to the picture's edges, and where the bar ends."""
-    left, top, right, bottom = box
+    Raises
+    ------
+    SourceError
+        If the colours end more than 3 pixels inside or outside the box.
+    """
+    left, top, right, bottom = check_box("legend", box, *picture.shape[:2])
     upright = bottom - top >= right - left
-    strip = picture[:, left:right] if upright else picture[top:bottom].transpose(1, 0, 2)
-    along = np.median(_middle(lab(strip / 255.0)), axis=1)
-    return (along, top, bottom) if upright else (along, left, right)
-
-
-def _extended(picture: Picture, box: Box) -> Box:
-    """Extend a bar to where its colours do not run on: its sides may be too faint to be seen."""
-    along, first, last = _along(picture, box)
-    steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
-    if steps[first : last - 1].max() > _END:
-        return box
-    jumps = np.flatnonzero(steps > _END)
-    before, after = jumps[jumps < first], jumps[jumps >= last - 1]
-    first = int(before[-1]) + 1 if before.size else 0
-    last = int(after[0]) + 1 if after.size else len(along)
-    left, top, right, bottom = box
-    longer = (
-        (left, first, right, last) if bottom - top >= right - left else (first, top, last, bottom)
+    strip = picture[::-1, left:right] if upright else picture[top:bottom].transpose(1, 0, 2)
+    first, last = (len(picture) - bottom, len(picture) - top) if upright else (left, right)
+    along = np.median(_middle(strip), axis=1)
+    names = ("lower", "upper") if upright else ("left", "right")
+    return max(
+        _uncertainty(along[:first][::-1], along[first:last], names[0], box),
+        _uncertainty(along[last:], along[first:last][::-1], names[1], box),
     )
-    return longer if last - first <= 2 * max(right - left, bottom - top) else box
+
+
+def _uncertainty(
+    beyond: NDArray[np.float64], inside: NDArray[np.float64], name: str, box: Box
+) -> float:
+    """Return the uncertainty of an end, at which both arrays begin, shape (pixels, 3)."""
+    if len(beyond) < _REACH:  # at the border of the picture nothing can be compared
+        return _LEAST_UNCERTAINTY
+    near = np.concatenate([beyond[:_REACH][::-1], inside[:_REACH]])
+    jumps = np.flatnonzero(np.linalg.norm(np.diff(lab(near / 255.0), axis=0), axis=1) > _EDGE)
+    # An outline makes several jumps: the innermost is the legend's.
+    offset = jumps[-1] + 1.0 - _REACH if jumps.size else _start_of_gradient(beyond, inside)
+    if not abs(offset) <= _LARGEST_OFFSET:
+        found = f"{abs(offset):.0f} pixels {'inside' if offset > 0 else 'outside'} it"
+        raise SourceError(
+            f"legend: at the {name} end of the box {list(box)} the colours end "
+            f"{found if np.isfinite(offset) else 'elsewhere'}, expected the edges of the colours "
+            "alone, or colours: the name of their map"
+        )
+    return float(max(abs(offset), _LEAST_UNCERTAINTY))
+
+
+def _start_of_gradient(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> float:
+    """Return where colours leave that of the page, which is that of the legend's end.
+
+    NaN if they are not constant outside, or constant inside as well.
+    """
+    compared = min(len(beyond), 2 * _REACH)
+    drift, change = (np.abs(of[compared - 1] - of[0]).max() for of in (beyond, inside))
+    if drift > _DRIFT * change:
+        return np.nan
+    page = np.median(beyond[_BLUR - 1 : _REACH], axis=0)
+    apart = np.abs(np.concatenate([beyond[:_REACH][::-1], inside]) - page).max(axis=1)
+    reached = np.flatnonzero(apart > _FAR)
+    if not reached.size or reached[0] <= _REACH or apart[: _REACH - _BLUR + 1].max() > _NEAR:
+        return np.nan
+    rising = np.flatnonzero(apart[: reached[0]] > _NEAR)
+    rising = np.append(rising, reached[0])
+    if len(rising) < _BLUR:
+        return float(rising[0] - _REACH)
+    slope, start = np.polyfit(rising, apart[rising], 1)
+    return float(-start / slope - _REACH + 0.5)
 
 
 def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
@@ -115,75 +120,16 @@ def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
     return float((apart < MARK_TOLERANCE).mean())
 
 
-def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
-    """Return how much of the picture a legend explains, in tenths; then `_length_then_narrow`."""
-    scale = ColourScale.from_legend(legend_pixels(picture, box), (0.0, 1.0))
-    return (round(10 * explained(picture, box, scale)), *_length_then_narrow(box))
-
-
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
     """Return medians of the colours along a legend, from its bottom or left end, shape (n, 3)."""
     left, top, right, bottom = check_box("legend", box, *picture.shape[:2])
     bar = picture[top:bottom, left:right]
     bar = bar[::-1] if bottom - top >= right - left else bar.transpose(1, 0, 2)
-    if len(bar) < 2:
-        raise SourceError(f"legend: box {box} is {len(bar)} pixels long, expected 2 or more")
+    if len(bar) < _SHORTEST:
+        raise SourceError(
+            f"legend: box {box} is {len(bar)} pixels long, expected {_SHORTEST} or more"
+        )
     return _unblurred(np.median(_middle(bar), axis=1).astype(np.uint8))
-
-
-def _length_then_narrow(box: Box) -> tuple[int, int]:
-    width, height = box[2] - box[0], box[3] - box[1]
-    return max(width, height) // 8, -min(width, height)
-
-
-def _upright_bars(picture: Picture) -> Iterator[Box]:
-    labs = lab(picture / 255.0)
-    runs = _edges(labs)
-    for index, (first, first_top, first_bottom) in enumerate(runs):
-        for second, second_top, second_bottom in runs[index + 1 :]:
-            top, bottom = max(first_top, second_top), min(first_bottom, second_bottom)
-            width = second - first
-            if width < _NARROWEST or bottom - top < max(_shortest(picture), 2 * width):
-                continue
-            if _is_legend(picture, labs, (first, top, second, bottom)):
-                yield first, top, second, bottom
-
-
-def _edges(labs: NDArray[np.float64]) -> list[tuple[int, int, int]]:
-    """Return long vertical edges: the column right of each, first row, and row after the last."""
-    edge = np.linalg.norm(np.diff(labs, axis=1), axis=2) > _EDGE
-    # A codec, or a colour of the bar like the one beside it, leaves gaps.
-    edge = np.asarray(binary_closing(np.pad(edge, ((_GAP, _GAP), (0, 0))), np.ones((_GAP, 1))))
-    edge = edge[_GAP:-_GAP]
-    shortest = _shortest(labs)
-    result = []
-    for column in np.flatnonzero(edge.sum(axis=0) >= shortest)[:_MOST_EDGES]:
-        changes = np.flatnonzero(np.diff(edge[:, column], prepend=False, append=False))
-        for first, last in changes.reshape(-1, 2):
-            if last - first >= shortest:
-                result.append((int(column) + 1, int(first), int(last)))
-    return result[:_MOST_EDGES]
-
-
-def _shortest(picture: NDArray[Any]) -> int:
-    return max(_SHORTEST, len(picture) // 8)
-
-
-def _is_legend(picture: Picture, labs: NDArray[np.float64], box: Box) -> bool:
-    left, top, right, bottom = box
-    inner = _middle(labs[top:bottom, left:right])
-    along = np.median(inner, axis=1)
-    apart = np.linalg.norm(inner - along[:, None], axis=2).max(axis=1)
-    if (apart > _FLAT).mean() > _UNEVEN:
-        return False
-    path = np.linalg.norm(np.diff(along, axis=0), axis=1).sum()
-    if path < _PATH or len(np.unique(np.round(along / 10), axis=0)) < _DISTINCT:
-        return False
-    try:
-        ColourScale.from_legend(legend_pixels(picture, box), (0.0, 1.0))
-    except SourceError:
-        return False
-    return True
 
 
 def _middle(bar: NDArray[Any]) -> NDArray[Any]:

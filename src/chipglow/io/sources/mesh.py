@@ -16,7 +16,6 @@ from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_flat import FlatMesh, flatten
 from chipglow.io.sources.mesh_reader import Block, MeshReader, check_grid, fields_of
-from chipglow.io.sources.mesh_restricted import label_of, restricted_fields, with_own_fields
 from chipglow.io.sources.source import (
     Source,
     SourceError,
@@ -130,17 +129,12 @@ class Meshes:
     def __init__(self, source: MeshSource) -> None:
         self._source = source
         self.reader = _reader(source)
-        ends = {number: self._read(number) for number in sorted({0, self.reader.count - 1})}
-        self._restricted = restricted_fields(tuple(ends.values()), source.names)
-        self.ends = {n: with_own_fields(blocks, self._restricted) for n, blocks in ends.items()}
+        self.ends = {number: self.read(number) for number in sorted({0, self.reader.count - 1})}
         """The first and the last mesh."""
         self.found = self._find()
         """The file's fields by the names of a scene; a vector of velocity is both components."""
 
-    def read(self, number: int) -> tuple[Block, ...]:
-        return with_own_fields(self._read(number), self._restricted)
-
-    def _read(self, number: int) -> list[Block]:
+    def read(self, number: int) -> list[Block]:
         file = self.reader.file(number)
         with reading(file):
             blocks = self.reader.read(number)
@@ -166,7 +160,6 @@ class Meshes:
     def _find(self) -> dict[str, str]:
         sizes, file = fields_of(self.ends[0]), self.reader.file(0)
         given = {ours: theirs for ours, theirs in self.reader.known.items() if theirs in sizes}
-        given |= {ours: label_of(fields) for ours, fields in self._restricted.items()}
         given |= self._source.names
         for ours, theirs in given.items():
             _check_size(file, ours, theirs, sizes)
@@ -267,7 +260,7 @@ class Meshes:
 
     def remarks(self) -> list[str]:
         """Describe blocks without a temperature, and missing values in the first and last mesh."""
-        blocks, sentences = self.ends[0], []
+        blocks, sentences = self.ends[0], list(self.reader.remarks)
         for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
             if block.grid.n_cells and not self._has_temperature(block):
                 named = block.names[0] if block.names else "a block"

@@ -1,5 +1,6 @@
 """Meshes over time in files of one kind, and the parts that they consist of."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +19,9 @@ _SIZES: Final[Mapping[int, int]] = {
     27: 13, 28: 9, 29: 27, 34: 7,
 }  # fmt: skip
 """Numbers of nodes of VTK's types of elements."""
+
+
+_FORTRAN_EXPONENT: Final = re.compile(r"([-+]?(?:\d+\.\d*|\.\d+|\d+(?=[dDqQ])))[dDqQ]?([-+]?\d+)")
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class MeshReader(ABC):
     count: int
     known: Mapping[str, str] = MappingProxyType({})
     """Names that fields have in this format alone, by the names of a scene."""
+    remarks: list[str]
+    """What is left out, and what the files lack, as far as they have been read."""
 
     def __init__(self, files: Sequence[Path], kind: str) -> None:
         for file in files:
@@ -52,6 +58,7 @@ class MeshReader(ABC):
             check_hdf5(file)
         self.files = files
         self.count = len(files)
+        self.remarks = []
         self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"
 
     def file(self, number: int) -> Path:
@@ -61,6 +68,17 @@ class MeshReader(ABC):
     @abstractmethod
     def read(self, number: int) -> Sequence[Block]:
         """Return the parts of the mesh of a frame."""
+
+
+def number_of(word: str) -> float:
+    """Return a number of a text file; Fortran writes exponents as 0.3D+03 or 0.3+103."""
+    try:
+        return float(word)
+    except ValueError:
+        exponent = _FORTRAN_EXPONENT.fullmatch(word)
+        if exponent is None:
+            raise ValueError(f"{word!r} is not a number") from None
+        return float(f"{exponent[1]}e{exponent[2]}")
 
 
 def grid_of(

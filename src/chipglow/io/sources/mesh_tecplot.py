@@ -1,9 +1,10 @@
 """Meshes of Tecplot: ASCII and binary files, zones of finite elements or of ordered points."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
+from math import prod
 from mmap import mmap
 from pathlib import Path
 from typing import Final
@@ -11,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.mesh_reader import Block, MeshReader
+from chipglow.io.sources.mesh_reader import Block, MeshReader, number_of
 from chipglow.io.sources.source import SourceError, head_of, mapped, naming
 from chipglow.io.sources.tecplot_binary import (
     ELEMENTS,
@@ -24,11 +25,23 @@ from chipglow.io.sources.tecplot_binary import (
 
 ENDINGS: Final = (".dat", ".tec", ".plt")
 
+_RECORD: Final = re.compile(
+    rb"(?mi)^[ \t]*(TITLE|FILETYPE|VARIABLES|ZONE|TEXT|GEOMETRY|CUSTOMLABELS|DATASETAUXDATA"
+    rb"|VARAUXDATA)\b"
+)
+"""First words of the records of an ASCII file; only variables and zones are read."""
+
 _KEY: Final = r'(\w+)\s*=\s*("[^"]*"|\((?:[^()]|\([^()]*\))*\)|[^\s,]+)'
-_ZONE: Final = re.compile(rb"(?mi)^[ \t]*ZONE\b")
+_AUXILIARY: Final = r"(?mi)^\s*AUXDATA\b.*$"
+_COMMENT: Final = r'("[^"]*")|#.*'
 _NUMBER: Final = re.compile(rb"(?m)^[ \t]*[-+.]?\d")
-_ORDERED: Final = (ORDERED, "POINT", "BLOCK")
-_NOT_READ: Final = ("VARSHARELIST", "CONNECTIVITYSHAREZONE", "D", "PASSIVEVARLIST")
+_LOCATION: Final = r"\[([\d,\s-]+)\]=(\w+)"
+_LOCATIONS: Final = ("NODAL", "CELLCENTERED")
+_PACKINGS: Final = ("POINT", "BLOCK")
+_MOST_NUMBERS: Final = 1 << 40  # of a repetition, so that sums of them cannot overflow
+_NOT_READ: Final = (
+    "VARSHARELIST", "CONNECTIVITYSHAREZONE", "D", "PASSIVEVARLIST", "NV", "FACENEIGHBORCONNECTIONS",
+)  # fmt: skip
 
 
 class TecplotReader(MeshReader):
@@ -43,6 +56,10 @@ class TecplotReader(MeshReader):
         self._zones = _zones(files[0]) if len(files) == 1 else ()
         self.times = _times(self._zones) if self._zones else _times_of_series(files)
         self.count = max(len(self.times or ()), len(files))
+        if self.times is None and len(self._zones) > 1:
+            self.remarks.append(
+                f"The {len(self._zones)} zones state no SOLUTIONTIME: they are parts of one mesh."
+            )
 
     def read(self, number: int) -> Sequence[Block]:
         zones = self._zones or _zones(self.file(number))
@@ -75,36 +92,59 @@ def _zones(file: Path) -> tuple[Zone, ...]:
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
     content = mapped(file)
-    starts = [match.start() for match in _ZONE.finditer(content)]
-    names = _names(_text(content[: starts[0] if starts else 0]))
-    zones = []
-    for number, (start, end) in enumerate(pairwise([*starts, len(content)]), start=1):
-        data = _NUMBER.search(content, start, end)
-        if not names or data is None:
-            break
-        head = re.sub(r"^\s*ZONE", "", _text(content[start : data.start()]), flags=re.I)
-        keys = {key.upper(): value.strip('"') for key, value in re.findall(_KEY, head)}
-        with naming(f"{file}: zone {number}: SOLUTIONTIME"):
-            time = float(keys["SOLUTIONTIME"]) if "SOLUTIONTIME" in keys else None
-        read = partial(_load, file, content, number, names, keys, data.start(), end)
-        zones.append(Zone(time, read))
-    if not zones or len(zones) < len(starts):
-        raise SourceError(
-            f"{file}: has no VARIABLES and ZONE with data, expected an ASCII file of Tecplot"
-        )
+    records = [
+        (match[1].upper(), match.start(), match.end()) for match in _RECORD.finditer(content)
+    ]
+    ends = [start for _, start, _ in records[1:]]
+    names: tuple[str, ...] = ()
+    zones: list[Zone] = []
+    for (kind, _, begin), end in zip(records, [*ends, len(content)], strict=True):
+        if kind == b"VARIABLES":
+            with naming(f"{file}: VARIABLES"):
+                if names:
+                    raise ValueError("there are several, expected one")
+                names = _names(_text(content[begin:end]))
+        elif kind == b"ZONE":
+            zones.append(_ascii_zone(file, content, 1 + len(zones), names, begin, end))
+    if not zones:
+        raise _no_zone(file)
     return tuple(zones)
 
 
+def _no_zone(file: Path) -> SourceError:
+    return SourceError(
+        f"{file}: has no VARIABLES and ZONE with data, expected an ASCII file of Tecplot"
+    )
+
+
+def _ascii_zone(
+    file: Path, content: mmap, number: int, names: tuple[str, ...], begin: int, end: int
+) -> Zone:
+    """Return a zone of a record between two bytes of a file."""
+    data = _NUMBER.search(content, begin, end)
+    if not names or data is None:
+        raise _no_zone(file)
+    head = re.sub(_AUXILIARY, "", _text(content[begin : data.start()]))
+    keys = {key.upper(): value.strip('"') for key, value in re.findall(_KEY, head)}
+    with naming(f"{file}: zone {number}: SOLUTIONTIME"):
+        time = number_of(keys["SOLUTIONTIME"]) if "SOLUTIONTIME" in keys else None
+    return Zone(time, partial(_load, file, content, number, names, keys, data.start(), end))
+
+
 def _text(content: bytes) -> str:
-    return re.sub(rb"(?m)^\s*#.*$", b"", content).decode(errors="replace")
+    """Return a header without comments."""
+    return re.sub(_COMMENT, lambda match: match[1] or "", content.decode(errors="replace"))
 
 
-def _names(header: str) -> tuple[str, ...]:
-    found = re.search(r"VARIABLES\s*=(.*?)(?=\n\s*[A-Za-z]+\s*=|\Z)", header, re.S | re.I)
-    if not found:
-        return ()
-    words = re.findall(r'"([^"]*)"|([^\s,"]+)', found.group(1))
-    return tuple((quoted or plain).strip() for quoted, plain in words)
+def _names(record: str) -> tuple[str, ...]:
+    """Return the names of a record of variables, which may be quoted."""
+    words = re.findall(r'"([^"]*)"|([^\s,"]+)', record.strip().removeprefix("="))
+    names = tuple((quoted or plain).strip() for quoted, plain in words)
+    if wrong := next((plain for _, plain in words if "=" in plain), None):
+        raise ValueError(f"{wrong!r} is not a name")
+    if repeated := next((name for name in names if names.count(name) > 1), None):
+        raise ValueError(f"{repeated!r} is repeated")
+    return names
 
 
 def _load(
@@ -117,39 +157,117 @@ def _load(
     end: int,
 ) -> Block:
     """Read a zone with variables of some names between two bytes of a file."""
-    words = re.sub(rb"(?m)^\s*#.*$", b"", content[begin:end]).split()
-    kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", ORDERED))).upper().removeprefix("FE")
     with naming(f"{file}: zone {number}"):
         if unread := [key for key in _NOT_READ if key in keys]:
             raise ValueError(f"{unread[0]} is not read")
-        counts = int(keys.get("I", "1")), int(keys.get("J", "1")), int(keys.get("K", "1"))
-        if kind in _ORDERED:
-            nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
+        kind, centred = _kind(keys), _centred(keys, names)
+        is_block = _is_block(keys, centred)
+        counts = (1, 1, 1)
+        if kind == ORDERED:
+            counts = (
+                _count(keys, "I"),
+                _count(keys, "J", default="1"),
+                _count(keys, "K", default="1"),
+            )
+            nodes, elements, corners = prod(counts), prod(max(c - 1, 1) for c in counts), 0
         else:
-            nodes = int(keys.get("N") or keys["NODES"])
-            elements = int(keys.get("E") or keys["ELEMENTS"])
-        centred = _centred(keys, names)
+            nodes, elements = _count(keys, "N", "NODES"), _count(keys, "E", "ELEMENTS")
+            corners = ELEMENTS[kind][0]
         sizes = [elements if name in centred else nodes for name in names]
-        if min(nodes, elements) < 1 or len(words) < sum(sizes):
-            raise ValueError(f"{len(words)} numbers, expected {sum(sizes)} or more")
-        values = np.array(words[: sum(sizes)], np.float64)
-        if keys.get("DATAPACKING", keys.get("F", "POINT")).upper().endswith("BLOCK"):
-            parts = np.split(values, np.cumsum(sizes)[:-1])
+        values = _numbers(content[begin:end], sum(sizes) + elements * corners)
+        if is_block:
+            parts = np.split(values[: sum(sizes)], np.cumsum(sizes)[:-1])
         else:
-            parts = list(values.reshape(nodes, len(names)).T)
+            parts = list(values[: sum(sizes)].reshape(nodes, len(names)).T)
         columns = dict(zip(names, parts, strict=True))
         title = tuple(filter(None, (keys.get("T", "").strip(), str(number))))
-        if kind in _ORDERED:
+        if kind == ORDERED:
             return block_of(title, columns, centred, ORDERED, counts)
-        cells: NDArray[np.int64] = np.array(words[sum(sizes) :], np.int64) - 1
-        return block_of(title, columns, centred, kind, cells.reshape(elements, ELEMENTS[kind][0]))
+        corner_nodes = values[sum(sizes) :].reshape(elements, corners)
+        cells = corner_nodes.astype(np.int64) - 1
+        if (cells + 1 != corner_nodes).any():
+            raise ValueError("nodes of elements are not whole numbers")
+        return block_of(title, columns, centred, kind, cells)
+
+
+def _kind(keys: Mapping[str, str]) -> str:
+    """Return the type of the elements of a zone, or `ORDERED`."""
+    if "ZONETYPE" in keys:
+        kind = keys["ZONETYPE"].upper().removeprefix("FE")
+    elif "ET" in keys:
+        kind = keys["ET"].upper()
+    elif keys.get("F", "").upper().startswith("FE"):
+        raise ValueError("ET is not stated, expected the type of the elements")
+    else:
+        kind = ORDERED
+    if kind != ORDERED and kind not in ELEMENTS:
+        raise ValueError(
+            f"elements of the type {kind} are not read, expected {', '.join(ELEMENTS)}"
+        )
+    return kind
+
+
+def _count(keys: Mapping[str, str], *names: str, default: str = "not stated") -> int:
+    """Return a positive number that a zone states under one of some names."""
+    stated = next((keys[name] for name in names if name in keys), default)
+    if not stated.isdecimal() or int(stated) < 1:
+        raise ValueError(f"{names[-1]} is {stated}, expected 1 or more")
+    return int(stated)
+
+
+def _is_block(keys: Mapping[str, str], centred: Collection[str]) -> bool:
+    """Return whether a zone has all values of one variable together."""
+    stated = keys.get("DATAPACKING", keys.get("F", "not stated")).upper().removeprefix("FE")
+    if stated not in _PACKINGS:
+        # Older versions take POINT for granted, newer ones BLOCK.
+        raise ValueError(f"DATAPACKING is {stated.lower()}, expected POINT or BLOCK")
+    if centred and stated != "BLOCK":
+        raise ValueError("VARLOCATION has values of elements, expected DATAPACKING=BLOCK")
+    return stated == "BLOCK"
+
+
+def _numbers(content: bytes, expected: int) -> NDArray[np.float64]:
+    """Return as many numbers; ``3*0`` are three zeros."""
+    words = re.sub(rb"#.*", b"", content).replace(b",", b" ").split()
+    try:
+        values = np.array(words, np.float64)
+        repeats = np.ones(len(words), np.int64)
+    except ValueError:
+        pairs = [word.decode(errors="replace").rpartition("*") for word in words]
+        values = np.array([number_of(number) for _, _, number in pairs])
+        repeats = np.array([_repeat(count) if star else 1 for count, star, _ in pairs])
+    if repeats.sum() != expected:
+        raise ValueError(f"{repeats.sum()} numbers, expected {expected}")
+    return np.repeat(values, repeats)
+
+
+def _repeat(count: str) -> int:
+    if not count.isdecimal():
+        raise ValueError(f"{count!r} before * is not a number of repetitions")
+    return min(int(count), _MOST_NUMBERS)
 
 
 def _centred(keys: Mapping[str, str], names: Sequence[str]) -> set[str]:
     """Return names of the variables with values of elements."""
-    centred: set[str] = set()
-    for numbers, place in re.findall(r"\[([\d,\s-]+)\]\s*=\s*(\w+)", keys.get("VARLOCATION", "")):
-        for word in numbers.split(",") if place.upper() == "CELLCENTERED" else ():
-            first, _, last = word.partition("-")
-            centred |= set(names[int(first) - 1 : int(last or first)])
-    return centred
+    stated = "".join(keys.get("VARLOCATION", "").upper().split())
+    found: dict[int, str] = {}
+    if "[" in stated:
+        for numbers, place in re.findall(_LOCATION, stated):
+            found |= dict.fromkeys(_members(numbers, len(names)), place)
+        rest = re.sub(_LOCATION, "", stated)
+    else:
+        found = dict(enumerate(filter(None, re.split("[(),]", stated))))
+        rest = "" if len(found) in (0, len(names)) else stated
+    if rest.strip("(,)") or not set(found.values()) <= set(_LOCATIONS):
+        raise ValueError(f"VARLOCATION={stated} is not read, expected such as ([3-4]=CELLCENTERED)")
+    return {names[at] for at, place in found.items() if place == "CELLCENTERED"}
+
+
+def _members(text: str, count: int) -> Iterator[int]:
+    """Yield the indices of variables such as 3-5,7, which count from 1."""
+    for word in text.split(","):
+        first, _, last = word.partition("-")
+        numbers = range(int(first), int(last or first) + 1)
+        if not numbers or numbers[0] < 1 or numbers[-1] > count:
+            raise ValueError(f"VARLOCATION: there is no variable {word}, expected 1 to {count}")
+        yield from (number - 1 for number in numbers)

@@ -118,8 +118,6 @@ def _open(file: Path) -> Any:
         reader = pyvista.get_reader(str(file), force_ext=_AS.get(suffix, suffix))
         if kind == "OpenFOAM":
             reader.cell_to_point_creation = False  # the case has values of cells alone
-        if kind == "Exodus II":
-            reader.reader.SetGenerateGlobalNodeIdArray(True)
     return reader
 
 

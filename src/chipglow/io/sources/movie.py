@@ -20,19 +20,14 @@ from chipglow.io.sources.colour_scale import (
     colour_uncertainty,
 )
 from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, Placement
-from chipglow.io.sources.legend import (
-    LEAST_EXPLAINED,
-    explained,
-    find_legend,
-    is_cut,
-    legend_pixels,
-)
+from chipglow.io.sources.legend import LEAST_EXPLAINED, end_uncertainty, explained, legend_pixels
 from chipglow.io.sources.moving_pictures import MovieIndex, index_movie, pictures
 from chipglow.io.sources.overlays import (
     Box,
     Colour,
     FieldPicture,
     FieldReader,
+    Legend,
     box_mask,
     check_box,
     find_background,
@@ -58,7 +53,6 @@ Pixel = tuple[float, float]
 """Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
-_ROUNDING: Final = 0.29
 _LOWEST: Final = 0.02
 """Fraction of a scale up to which a colour at the border is taken for its lowest value."""
 
@@ -83,7 +77,7 @@ class FieldMovie(Part):
     colours: Annotated[
         str | None,
         Parameter(
-            "Name of the colour map; none: the legend in the picture is read.",
+            "Name of the colour map; none: the legend in the picture is read, see legend.",
             allowed="none, rainbow, jet, viridis, ... of matplotlib",
         ),
     ] = None
@@ -93,7 +87,8 @@ class FieldMovie(Part):
     legend: Annotated[
         Box | None,
         Parameter(
-            "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
+            "Left, top, right and bottom edge of the legend's colours, in pixels from the upper "
+            "left corner of the picture; none: colours names the map.",
             allowed="none, or [600, 40, 620, 400]",
         ),
     ] = None
@@ -102,6 +97,18 @@ class FieldMovie(Part):
         super().__post_init__()
         if not (self.bands == 0 or 2 <= self.bands <= 256):
             raise ValueError(f"bands: {self.bands!r}, expected 0 or 2 to 256")
+        if self.legend is not None and self.colours is not None:
+            raise ValueError(f"legend: {self.legend} as well as colours, expected one of them")
+
+    def check_scale(self, name: str) -> None:
+        """Refuse a field whose scale is not stated."""
+        if self.legend is None and self.colours is None:
+            raise ValueError(
+                f"movie.{name}.legend: is missing, expected the edges of the legend's colours: "
+                "left, top, right and bottom in pixels from the upper left corner of a frame, as "
+                "an image viewer shows them, such as legend: [600, 40, 620, 400]; or the name of "
+                "their map, such as colours: jet"
+            )
 
     def ends(self, name: str) -> tuple[float, float]:
         """Return the values of a field at the ends of the scale in SI units."""
@@ -140,6 +147,7 @@ class MovieSource(Source, Part):
     title: ClassVar[str] = "a movie"
     endings: ClassVar[tuple[str, ...]] = (
         ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
+        ".png", ".jpg", ".jpeg", ".bmp",
     )  # fmt: skip
     temperature: Annotated[FieldMovie, Parameter("The movie of the temperature.")] = field(
         default_factory=FieldMovie
@@ -222,7 +230,10 @@ class MovieSource(Source, Part):
             )
 
         if self.files:  # the description of an import is whole
-            _ = self._sides, [(self._path(name), m.ends(name)) for name, m in self._movies.items()]
+            _ = self._sides
+            for name, movie in self._movies.items():
+                _ = self._path(name), movie.ends(name)
+                movie.check_scale(name)
 
     @property
     def own_files(self) -> str | None:
@@ -281,7 +292,7 @@ class MovieSource(Source, Part):
             movie = self._movies[name]
             result[name] = replace(
                 colour_uncertainty(reader.scale, values, distance),
-                legend=_uncertainty_of_legend(movie, reader.legend, movie.ends(name)),
+                legend=_uncertainty_of_legend(reader.legend, movie.ends(name)),
                 lines=sqrt(fmean(reader.error_of_filling(read) ** 2 for read in reads)),
             )
         return result
@@ -333,11 +344,12 @@ class MovieSource(Source, Part):
             picture = next(pictures(paths[name], index, (0,)))
             with naming(paths[name]):
                 movie = self._movies[name]
+                movie.check_scale(name)
                 scale, legend, said = _scale(movie, movie.ends(name), picture)
                 background, also = self._background(self._cropped(picture), scale)
                 covered = box_mask(shape, self.covered)
                 if legend is not None:
-                    covered |= box_mask(shape, [legend], _LEGEND_MARGIN)
+                    covered |= box_mask(shape, [legend.box], _LEGEND_MARGIN)
                 readers[name] = FieldReader(
                     scale, background, self.tool_colour, tool,
                     self._cropped(covered), self.overlay_limit, legend,
@@ -408,43 +420,36 @@ class MovieSource(Source, Part):
         return read
 
 
-def _uncertainty_of_legend(movie: FieldMovie, box: Box | None, ends: tuple[float, float]) -> float:
-    """Return the uncertainty of a legend's ends: a pixel if it was found, else its rounding."""
-    if box is None:
+def _uncertainty_of_legend(legend: Legend | None, ends: tuple[float, float]) -> float:
+    """Return the uncertainty of a field by the ends of its legend."""
+    if legend is None:
         return 0.0
-    left, top, right, bottom = box
+    left, top, right, bottom = legend.box
     pixel = abs(ends[1] - ends[0]) / max(right - left, bottom - top)
-    return pixel * (_ROUNDING if movie.legend else 1.0)
+    return pixel * legend.uncertainty
 
 
 def _scale(
     movie: FieldMovie, ends: tuple[float, float], picture: Picture
-) -> tuple[ColourScale, Box | None, list[str]]:
-    """Return the scale of a movie, the place of its legend, and the assumptions."""
-    if movie.colours is not None:
-        return ColourScale.named(movie.colours, ends, movie.bands), None, []
-    box = movie.legend or find_legend(picture)
-    if box is None:
-        raise SourceError(
-            "no legend was found in the first picture, expected the box of one, or a named map"
-        )
-    if not movie.legend and is_cut(picture, box):
-        raise SourceError(
-            f"legend: an end of the one found at {box} does not differ from the pixels next to it, "
-            "expected the box of the legend, or a named map"
-        )
-    scale = ColourScale.from_legend(legend_pixels(picture, box), ends)
+) -> tuple[ColourScale, Legend | None, list[str]]:
+    """Return the scale of a movie, its legend, and the assumptions."""
+    if movie.legend is None:
+        return ColourScale.named(str(movie.colours), ends, movie.bands), None, []
+    box = movie.legend
+    pixels = legend_pixels(picture, box)
+    legend = Legend(box, end_uncertainty(picture, box))
+    scale = ColourScale.from_legend(pixels, ends)
     fraction = explained(picture, box, scale)
     if fraction < LEAST_EXPLAINED:
         raise SourceError(
-            f"legend: the picture has the colours of {box} in {fraction:.0%} of its pixels, "
-            f"expected {LEAST_EXPLAINED:.0%} or more; give the box of the legend, or a named map"
+            f"legend: the picture has the colours of {list(box)} in {fraction:.0%} of its pixels, "
+            f"expected {LEAST_EXPLAINED:.0%} or more; give the edges of the legend's colours, or "
+            "the name of their map"
         )
     kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
-    found = "" if movie.legend else f"Legend found at {box} (left, top, right, bottom). "
     first, last = ends
     limits = f"{first:g} at its lower or left end, {last:g} at the other"
-    return scale, box, [f"{found}Legend of {kind}, {limits}."]
+    return scale, legend, [f"Legend of {kind}, {limits}."]
 
 
 def _values(read: Mapping[str, FieldPicture]) -> NDArray[np.float32]:

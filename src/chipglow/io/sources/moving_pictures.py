@@ -19,7 +19,7 @@ _MOST_PIXELS: Final = 1 << 26
 # No playlists, scripts or numbered files: a movie may not lead to other files or to the network.
 _FORMATS: Final = (
     "avi,mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,gif,apng,mpeg,mpegvideo,mpegts,asf,flv,ogg,nut,ivf,"
-    "yuv4mpegpipe,h264,hevc,m4v,mjpeg"
+    "yuv4mpegpipe,h264,hevc,m4v,mjpeg,png_pipe,jpeg_pipe,bmp_pipe"
 )
 _OPTIONS: Final = {
     "protocol_whitelist": "file",

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,16 @@ Box = tuple[int, int, int, int]
 
 Colour = tuple[int, int, int]
 """Red, green and blue of 0 to 255."""
+
+
+class Legend(NamedTuple):
+    """Place of a legend in a picture."""
+
+    box: Box
+    """Edges of its colours as stated."""
+    uncertainty: float
+    """Standard uncertainty of their ends in pixels."""
+
 
 MARK_TOLERANCE: Final = 10.0
 """Tolerance of the colours of background and tool, in CIE L*a*b*."""
@@ -67,8 +77,8 @@ class FieldReader:
     """Where something else is drawn, shape (y, x)."""
     limit: float
     """Distance from the scale in CIE L*a*b* beyond which a colour is a line or text."""
-    legend: Box | None = None
-    """Place at which the scale was read."""
+    legend: Legend | None = None
+    """Legend from which the scale was read."""
 
     def __post_init__(self) -> None:
         for name, colours in (("background", self.background), ("tool_colour", self._tools)):

@@ -23,7 +23,7 @@ from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
 from chipglow.io.cameras.stacks import MissingError
 from chipglow.io.column_file import read_bad_pixels
-from chipglow.io.sources.source import files_of
+from chipglow.io.sources.file_names import files_of
 from chipglow.laboratory.measurement.calibration_file import load_calibration
 from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
 from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
