@@ -571,8 +571,10 @@ def _range_warnings(
     """Yield a sentence for each image and place of which the camera shows too little."""
     for name, one in measurements.items():
         flags = one.flags[shown]
-        outside = [float(np.mean(flags & f != 0)) for f in (Flag.UNDER_RANGE, Flag.SATURATED)]
-        yield from outside_warnings(f"Image of {name}", *outside, most=_DARK_IMAGE)
+        below, saturated = (
+            float(np.mean(flags & flag != 0)) for flag in (Flag.UNDER_RANGE, Flag.SATURATED)
+        )
+        yield from outside_warnings(f"Image of {name}", below, saturated, _DARK_IMAGE)
     columns = (data[key].values for key in ("place", "seen_surface", "below_range", "saturated"))
     for place, surface, below, saturated in dict.fromkeys(zip(*columns, strict=True)):
         yield from outside_warnings(f"{_capitalised(place)} ({surface})", below, saturated)
