@@ -2,6 +2,7 @@ from . import (
     analysis as analysis,
     app as app,
     camera as camera,
+    correction as correction,
     cutting as cutting,
     io as io,
     laboratory as laboratory,
@@ -40,6 +41,7 @@ from .camera import (
     ShotNoise as ShotNoise,
     Veil as Veil,
 )
+from .correction import Correction as Correction, Zone as Zone, correct as correct
 from .cutting import (
     AISI_1045 as AISI_1045,
     FLOW_LAWS as FLOW_LAWS,

@@ -14,6 +14,7 @@ from chipglow.correction.file import (
 )
 from chipglow.correction.known import known_zones as known_zones
 from chipglow.correction.places import place_frame as place_frame, places_of as places_of
+from chipglow.correction.scene_object import observed_scene as observed_scene
 from chipglow.correction.zones import (
     Motion as Motion,
     ObservedObject as ObservedObject,

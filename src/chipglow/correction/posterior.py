@@ -1,11 +1,13 @@
 """The most probable radiance of the parts, and draws from its distribution (Gauss-Newton, CG)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import numpy as np
+from numba import get_num_threads
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
@@ -22,10 +24,10 @@ _CONVERGED: Final = 3e-3
 """Change of the logarithm of radiance, 0.3 %, below which the steps end: 0.2 K at 1000 K."""
 
 _MOST_STEPS: Final = 8
-_STEP_TOLERANCE: Final = 1e-2
-_DRAW_TOLERANCE: Final = 3e-2
-"""Relative residuals of steps and of draws: a step is repeated, and 3 % of a draw of an error is
-far below the scatter of a standard deviation from a few draws."""
+_STEP_TOLERANCE: Final = 3e-2
+_DRAW_TOLERANCE: Final = 1e-2
+_CHANGE_TOLERANCE: Final = 1e-3
+"""Relative residuals of steps, which are repeated, of draws, and of changes by single errors."""
 
 _RIDGE: Final = 1e-8
 """Weak weight of all values, so that parts without data and without neighbours are determined."""
@@ -103,7 +105,7 @@ class Problem:
         x = self._start()
         posterior = self._maximum(x, _MOST_STEPS, check)
         for _ in range(_ROUNDS):
-            draws = [posterior.draw(generator) for _ in range(_DRAWS_PER_ROUND)]
+            draws = posterior.draws(generator, _DRAWS_PER_ROUND)
             check()
             values = (self.curvature.matrix @ draw for draw in draws)
             uncertain = sum(value**2 for value in values) / _DRAWS_PER_ROUND
@@ -175,10 +177,6 @@ class Posterior:
         """Return the right side of `solved` for a change of the measured radiance."""
         return self._sent_back(self.pixel_weights * image)
 
-    def changed(self, image: Array) -> Array:
-        """Return the change of the solution with a change of the measured radiance, (part,)."""
-        return self.solved(self.response(image), _DRAW_TOLERANCE)
-
     def solved(self, right: Array, tolerance: float) -> Array:
         """Solve with the Hessian by preconditioned conjugate gradients."""
         size = self.x.size
@@ -198,13 +196,25 @@ class Posterior:
         matrix = self.problem.curvature.matrix
         return np.asarray(matrix.T @ (np.sqrt(self.prior_weights) * curvatures))
 
-    def draw(self, generator: np.random.Generator) -> Array:
-        """Return a draw of the solution's error (perturbation of data and prior), (part,)."""
-        return self.draw_of(self.noise_response(generator) + self.prior_response(generator))
+    def draws(self, generator: np.random.Generator, count: int) -> list[Array]:
+        """Return draws of the solution's error (perturbation of data and prior), (part,) each."""
+        responses = [
+            self.noise_response(generator) + self.prior_response(generator) for _ in range(count)
+        ]
+        return self.drawn_all(responses)
 
-    def draw_of(self, right: Array) -> Array:
-        """Return the change of the solution for a drawn right side."""
-        return self.solved(right, _DRAW_TOLERANCE)
+    def drawn_all(self, right_sides: Iterable[Array]) -> list[Array]:
+        """Return the changes of the solution for drawn right sides."""
+        return self._solved_all(right_sides, _DRAW_TOLERANCE)
+
+    def changed_all(self, images: Iterable[Array]) -> list[Array]:
+        """Return the changes of the solution with changes of the measured radiance."""
+        return self._solved_all([self.response(image) for image in images], _CHANGE_TOLERANCE)
+
+    def _solved_all(self, right_sides: Iterable[Array], tolerance: float) -> list[Array]:
+        """Solve for right sides, several at a time."""
+        with ThreadPoolExecutor(get_num_threads()) as pool:
+            return list(pool.map(lambda right: self.solved(right, tolerance), right_sides))
 
     def bias(self) -> Array:
         """Return the decrease of the solution by the prior, estimated from the solution, (part,).
@@ -239,16 +249,37 @@ class Posterior:
         return np.asarray(data + prior + _RIDGE * change)
 
     def factor(self) -> Any:
-        """Return factors of the Hessian without blur."""
+        """Return factors of the Hessian with a narrow blur, which couples close parts only."""
         matrix, parts = self.problem.curvature.matrix, self.problem.parts
-        weight = self.pixel_weights.ravel()[parts.pixel]
-        # A detail of two pixels or more has this part of its energy in the image of its cells.
-        data = weight * self.sent**2 / parts.area / (2 * CELLS_PER_PIXEL**2)
+        cells = parts.cells.rows * parts.cells.columns
+        sent = sparse.csr_array(
+            (self.sent, (parts.cell, np.arange(parts.size))), (cells, parts.size)
+        )
+        image = _narrow_image(*parts.pixels.shape) @ sent
+        data = image.T @ sparse.diags_array(self.pixel_weights.ravel()) @ image
         prior = matrix.T @ sparse.diags_array(self.prior_weights) @ matrix
-        whole = sparse.csc_array(prior + sparse.diags_array(data + _RIDGE))
+        whole = sparse.csc_array(prior + data + _RIDGE * sparse.eye_array(parts.size))
         return splu(
             whole,
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
+
+
+@lru_cache(maxsize=2)
+def _narrow_image(rows: int, columns: int) -> Any:
+    """Return the sparse array (pixel, cell) of an image with a blur of two cells' width."""
+    down, across = (_narrow_line(count) for count in (rows, columns))
+    return sparse.csr_array(sparse.kron(down, across))
+
+
+def _narrow_line(pixels: int) -> Any:
+    """Return the weights (pixel, cell) of cells along a line, blurred by 1/4, 1/2, 1/4."""
+    cells = CELLS_PER_PIXEL * pixels
+    beside = np.full(cells - 1, 0.25)
+    middle = np.full(cells, 0.5)
+    middle[[0, -1]] = 0.75  # the edge continues
+    blur = sparse.diags_array([beside, middle, beside], offsets=[-1, 0, 1])
+    mean = sparse.kron(sparse.eye_array(pixels), np.full((1, CELLS_PER_PIXEL), 1 / CELLS_PER_PIXEL))
+    return mean @ blur

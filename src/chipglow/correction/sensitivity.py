@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
-from math import inf
+from math import inf, sqrt
 from typing import Final
 
 import numpy as np
@@ -86,7 +86,7 @@ def smoothing_effect(posterior: Posterior, generator: np.random.Generator) -> Ef
 
 
 def _drawn(source: str, posterior: Posterior, right_sides: list[Array]) -> Effect:
-    changes = np.stack([posterior.draw_of(right) for right in right_sides])
+    changes = np.stack(posterior.drawn_all(right_sides))
     return Effect(source, changes / np.sqrt(len(right_sides)), len(right_sides))
 
 
@@ -104,7 +104,7 @@ def systematic_effects(
     }
     for source, changes in images.items():
         if changes:
-            yield Effect(source, np.stack([posterior.changed(image) for image in changes]))
+            yield Effect(source, np.stack(posterior.changed_all(changes)))
 
 
 def texture_effect(
@@ -115,7 +115,7 @@ def texture_effect(
     if not any(zone.texture for zone in zones):
         return
     parts = posterior.problem.parts
-    draws = []
+    images = []
     for _ in range(DRAWS):
         relative = np.zeros(parts.size)
         for number, zone in enumerate(zones):
@@ -123,8 +123,9 @@ def texture_effect(
             if zone.texture and own.size:
                 field = _grainy_field(zone.grain, parts, generator)
                 relative[own] = zone.texture * field[parts.cell[own]] / parts.emissivity[own]
-        draws.append(posterior.changed(posterior.seen(posterior.sent * relative)))
-    yield Effect("texture", np.stack(draws) / np.sqrt(DRAWS), DRAWS)
+        images.append(posterior.seen(posterior.sent * relative))
+    changes = np.stack(posterior.changed_all(images))
+    yield Effect("texture", changes / np.sqrt(DRAWS), DRAWS)
 
 
 def _grainy_field(grain: float, parts: Parts, generator: np.random.Generator) -> Array:
@@ -205,14 +206,16 @@ def _range_images(posterior: Posterior) -> list[Array]:
 
 
 def _border_image(posterior: Posterior) -> Array:
-    """Return the change if the radiance beyond the image resembles what each pixel sees in it.
+    """Return the standard uncertainty of the image by the radiance beyond it.
 
-    The solution takes it as that of the edge, as cameras do.
+    The solution takes it as that of the edge, as cameras do. It may as well resemble what each
+    pixel sees within the image: all values between the two are equally probable.
     """
     formation = posterior.problem.formation
     within = replace(formation, beyond="nothing")
     fraction = within.forward(np.ones(formation.samples.shape))
-    return within.forward(posterior.light) / fraction - formation.forward(posterior.light)
+    similar = within.forward(posterior.light) / fraction
+    return np.asarray((similar - formation.forward(posterior.light)) / sqrt(3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,11 +239,10 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     the stated uncertainty remains.
     """
     parts, turn_radius = posterior.problem.parts, _turn_radius(posterior.problem.parts)
-    images, responses = [], []
-    for direction in np.eye(3):
-        image = _motion_image(posterior, known.observed, direction, turn_radius)
-        images.append(image)
-        responses.append(posterior.changed(image))
+    images = [
+        _motion_image(posterior, known.observed, direction, turn_radius) for direction in np.eye(3)
+    ]
+    responses = posterior.changed_all(images)
     weights = posterior.pixel_weights
     information = np.eye(3) / known.outline_uncertainty**2
     unexplained = [

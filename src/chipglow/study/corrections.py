@@ -1,23 +1,14 @@
 """Correction of measurements of a study: camera, emissivity and outlines are those of its scene."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from chipglow.camera import Camera, Measurement
-from chipglow.correction import Correction, SampledObject, Zone, correct, joined
-from chipglow.correction.zones import NOTHING
-from chipglow.quantities import Array
+from chipglow.correction import Correction, correct, joined, observed_scene
 from chipglow.quantities.units import COLDEST
-from chipglow.scene import Material, Scene
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
-from chipglow.surface import FeatureSurface, ModifiedSurface, Surface, UniformSurface
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
-
-METAL, TOOL = "chip and workpiece", "tool"
-"""Zones of a study's scene."""
 
 
 def correct_study(
@@ -67,7 +58,7 @@ def correct_study(
             raise ValueError(f"chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
         corrected = []
         for frame, start in enumerate(measurement.times.tolist()):
-            observed = observed_object(scene, camera, surfaces[name], start, emissivity_uncertainty)
+            observed = observed_scene(scene, camera, surfaces[name], start, emissivity_uncertainty)
             corrected.append(
                 correct(
                     Measurement(measurement.data.isel(time=[frame])),
@@ -82,49 +73,6 @@ def correct_study(
             )
             progress("correction", (frame + 1) / len(measurement))
     return joined(corrected).with_notes(fitted.notes + _assumed(emissivity_uncertainty))
-
-
-def observed_object(
-    scene: Scene, camera: Camera, surface: Surface, start: float, uncertainty: float = 0.0
-) -> SampledObject:
-    """Return zones and emissivity of a scene during an exposure that begins at `start` in s."""
-    plain = replace(camera, reflected=None)
-    seen = plain.expose(scene, surface.without_texture(), start).mean_radiance
-    black = plain.expose(scene, UniformSurface(1.0), start).mean_radiance
-    material = scene.frame(scene.frame_at(start + camera.integration_time / 2)).material
-    shines = (seen > 0) & (black > 0)
-    emissivity = np.divide(seen, black, out=np.zeros_like(seen), where=shines)
-    labels = np.where(material == Material.TOOL, 1, 0).astype(np.int16)
-    labels[~shines] = NOTHING
-    deviations = _texture(surface)
-    zones = tuple(
-        Zone(
-            name,
-            _mean_of(emissivity[labels == number]),
-            None,
-            uncertainty,
-            deviation,
-            getattr(_bare(surface), "grain", 20e-6),
-        )
-        for number, (name, deviation) in enumerate(zip((METAL, TOOL), deviations, strict=True))
-    )
-    return SampledObject(zones, scene.raster, labels, emissivity)
-
-
-def _mean_of(values: Array) -> float | None:
-    return float(values.mean()) if values.size else None
-
-
-def _bare(surface: Surface) -> Surface:
-    return surface.bare if isinstance(surface, ModifiedSurface) else surface
-
-
-def _texture(surface: Surface) -> tuple[float, float]:
-    """Return the standard deviations of the emissivity of chip and tool."""
-    bare = _bare(surface)
-    if not isinstance(bare, FeatureSurface):
-        return 0.0, 0.0
-    return bare.chip.standard_deviation, bare.tool.standard_deviation
 
 
 def _surroundings(camera: Camera) -> Estimate:

@@ -1,0 +1,61 @@
+"""A scene as an observed object: zones and emissivity during one exposure."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from chipglow.camera import Camera
+from chipglow.correction.zones import NOTHING, SampledObject, Zone
+from chipglow.quantities import Array
+from chipglow.scene import Material, Scene
+from chipglow.surface import FeatureSurface, ModifiedSurface, Surface, UniformSurface
+
+METAL, TOOL = "chip and workpiece", "tool"
+"""Zones of a scene."""
+
+_GRAIN: Final = 20e-6
+"""Length in m of the texture of a surface that states none: the paper's."""
+
+
+def observed_scene(
+    scene: Scene, camera: Camera, surface: Surface, start: float, uncertainty: float = 0.0
+) -> SampledObject:
+    """Return zones and emissivity of a scene during an exposure that begins at `start` in s."""
+    plain = replace(camera, reflected=None)
+    seen = plain.expose(scene, surface.without_texture(), start).mean_radiance
+    black = plain.expose(scene, UniformSurface(1.0), start).mean_radiance
+    material = scene.frame(scene.frame_at(start + camera.integration_time / 2)).material
+    shines = (seen > 0) & (black > 0)
+    emissivity = np.divide(seen, black, out=np.zeros_like(seen), where=shines)
+    labels = np.where(material == Material.TOOL, 1, 0).astype(np.int16)
+    labels[~shines] = NOTHING
+    deviations = _texture(surface)
+    zones = tuple(
+        Zone(
+            name,
+            _mean_of(emissivity[labels == number]),
+            None,
+            uncertainty,
+            deviation,
+            getattr(_bare(surface), "grain", _GRAIN),
+        )
+        for number, (name, deviation) in enumerate(zip((METAL, TOOL), deviations, strict=True))
+    )
+    return SampledObject(zones, scene.raster, labels, emissivity)
+
+
+def _mean_of(values: Array) -> float | None:
+    return float(values.mean()) if values.size else None
+
+
+def _bare(surface: Surface) -> Surface:
+    return surface.bare if isinstance(surface, ModifiedSurface) else surface
+
+
+def _texture(surface: Surface) -> tuple[float, float]:
+    """Return the standard deviations of the emissivity of chip and tool."""
+    bare = _bare(surface)
+    if not isinstance(bare, FeatureSurface):
+        return 0.0, 0.0
+    return bare.chip.standard_deviation, bare.tool.standard_deviation
