@@ -81,7 +81,8 @@ def correct(
 ) -> None:
     """Determine the true temperature of every pixel, with its uncertainty."""
     from chipglow.cli.progress import progress_bars
-    from chipglow.correction import ROOM, draw_correction, place_frame, places_of, write_correction
+    from chipglow.correction import ROOM, place_frame, places_of, write_correction
+    from chipglow.correction.figure import draw_correction
     from chipglow.laboratory.emissivity import load_regions, reflected_temperature
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_frame

@@ -7,7 +7,6 @@ from chipglow.correction.correction import (
     CorrectionFlag as CorrectionFlag,
     joined as joined,
 )
-from chipglow.correction.figure import draw_correction as draw_correction
 from chipglow.correction.file import (
     read_correction as read_correction,
     write_correction as write_correction,
