@@ -1,4 +1,4 @@
-"""The numbers of a report: each formula against values that are computed in another way."""
+"""Numbers in reports: each formula against values that are computed in another way."""
 
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -167,7 +167,7 @@ def test_a_number_that_scatters_states_a_deviation_without_degrees_of_freedom(ke
 
 @pytest.mark.parametrize("key", MEASURED)
 def test_uncertainty_and_degrees_of_freedom_are_those_of_the_guide(key):
-    """Of four valleys there are three intervals: every number of the period has n - 2 = 2."""
+    """Of four valleys there are three intervals: the period and its relatives have n - 2 = 2."""
     expected = MEASURED[key]
     assert shown(key) == pytest.approx((expected.x, expected.u, expected.df), rel=ROUNDING)
 
@@ -219,6 +219,21 @@ def test_a_contact_is_truncated_within_three_samples_of_the_upper_or_left_border
     assert not is_truncated(4, 4)
     assert is_truncated(2, 4)
     assert is_truncated(4, 2)
+
+
+def test_a_mean_of_contacts_is_a_least_length_if_one_of_them_is_truncated(chip_analysis):
+    first = chip_analysis.cut.segments[0]
+    whole = [replace(first, contact_length=length) for length in (100e-6, 150e-6)]
+    truncated = replace(first, contact_length=900e-6)
+
+    def row(segments):
+        cut = replace(chip_analysis.cut, segments=tuple(segments))
+        rows = result_rows(replace(chip_analysis, cut=cut))
+        return next(row for row in rows if row.key == "contact_length_um")
+
+    assert not row(whole).is_least
+    assert row([*whole, truncated]).is_least
+    assert row([*whole, truncated]).cells["mean"] == "more than 383 µm"
 
 
 def test_values_and_differences_are_shown_in_units():

@@ -1,4 +1,4 @@
-"""The numbers of a report that describe the cut, the chip and the camera.
+"""Numbers that describe the cut, the chip and the camera in a report.
 
 Each is one function, which returns its value in SI, and one entry of a table, which states its key
 in summary.json and the unit and decimals in which it is shown. Their titles and explanations stand

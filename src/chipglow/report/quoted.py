@@ -31,7 +31,7 @@ class Sides(NamedTuple):
 
 
 class Quoted:
-    """Numbers of an analysis by the names that texts use."""
+    """An analysis as texts quote it, by the names that they use."""
 
     def __init__(self, analysis: Analysis) -> None:
         self._analysis, self._data = analysis, analysis.data

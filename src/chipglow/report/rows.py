@@ -33,7 +33,7 @@ _READING_UNITS: Final = {
     "psf_portion_degC": "K",
     "psf_fraction_percent": "%",
 }
-"""Units of what is known of a reading, by the ends of its keys; errors are differences in K."""
+"""By the ends of the keys of a reading; errors are differences of temperatures."""
 
 _FINEST_SPREAD: Final = 1e-6
 """Uncertainty below which numbers are equal but for the rounding of the computation."""
@@ -201,7 +201,8 @@ def _segment_row(facts: Facts, entry: Entry[Segment], cut: Cut) -> Row:
     every = np.array([entry.shown(segment).number for segment in cut.segments])
     finite = every[np.isfinite(every)]
     draws = Distribution(finite, ("segment",), limits=(0.0, inf)) if finite.size else None
-    is_least = entry.is_truncated(cut.segments[0], facts.analysis.raster)
+    raster = facts.analysis.raster
+    is_least = any(entry.is_truncated(segment, raster) for segment in cut.segments)
     return _row(
         facts,
         _Heading(entry.key, entry.unit, texts()["rows"][entry.key]),

@@ -17,11 +17,11 @@ class ShownUnit:
     zero: float = 0.0
 
     def number(self, value: float) -> float:
-        """Return the number in this unit of a value in SI."""
+        """Return a value in SI as a number in this unit."""
         return self.per_si * (value - self.zero)
 
     def difference(self, value: float) -> float:
-        """Return the number of a difference in SI, such as an uncertainty."""
+        """Return a difference in SI, such as an uncertainty, as a number in this unit."""
         return self.per_si * value
 
 
@@ -49,5 +49,5 @@ SHOWN_UNITS: Final[Mapping[str, ShownUnit]] = MappingProxyType(
 
 
 def in_unit(value: float, unit: str) -> float:
-    """Return the number in a unit of `SHOWN_UNITS` of a value in SI."""
+    """Return a value in SI as a number in a unit of `SHOWN_UNITS`."""
     return SHOWN_UNITS[unit].number(float(value))

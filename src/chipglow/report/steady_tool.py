@@ -53,7 +53,7 @@ class ToolRow:
 
 
 class _Number(NamedTuple):
-    """A number of an analysis that a steady tool may change."""
+    """A quantity that a steady tool may change."""
 
     key: str
     unit: str
