@@ -72,7 +72,7 @@ def test_the_report_shows_both_and_what_the_paper_misses(own, steady, undrawn, t
     report = write_report(own, tmp_path, "A study", text, {}, study=Study(), steady=steady)
     page = " ".join(report.read_text(encoding="utf-8").split())
     assert "Tool at steady-state temperature" in page
-    assert "100 K below the measured one" in page
+    assert "100 ± 5 K below the measured one" in page
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     schema = json.loads((tmp_path / "summary.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(summary, schema)

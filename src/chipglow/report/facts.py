@@ -1,8 +1,8 @@
-"""The values of an analysis that texts, expressions and figures of its report read."""
+"""The values of an analysis that texts and figures of its report read."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import nan
 from typing import Any, Final
 
@@ -18,19 +18,17 @@ from chipglow.analysis import (
     band_chart,
     band_with,
     headlines,
-    image_error,
-    line_change,
-    line_error,
-    line_steepest,
     read_straight_band,
     sensitivity_error,
     sensitivity_psf_fraction,
 )
+from chipglow.camera import FlatFieldCalibration
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
 from chipglow.report import paper
-from chipglow.report.page import expression, template, texts
-from chipglow.scene import Material, sample
+from chipglow.report.page import template, texts
+from chipglow.report.quoted import Quoted
+from chipglow.scene import sample
 
 Array = NDArray[np.float64]
 
@@ -56,41 +54,39 @@ class Facts:
         analysis, data, cut = self.analysis, self.data, self.analysis.cut
         camera = analysis.camera
         values = {
-            "KELVIN": KELVIN,
-            "VOID": Material.VOID,
             "analysis": analysis,
             "attribution_reference": getattr(analysis.plan.attribution, "reference", ""),
-            "calibration": camera.calibration(camera.pixels(analysis.raster).shape),
             "camera": camera,
             "cause": data.exposure.attrs["title"],
             "chip": cut.chip if cut else None,
-            "contact_reaches_border": self.contact_reaches_border,
             "cut": cut,
             "data": data,
             "exposure": time_text(camera.integration_time),
             "facts": self,
             "forces": cut.forces if cut else None,
-            "image_error": image_error(data),
             "is_compared": self.is_compared,
             "largest_cause": self.largest_cause,
-            "line_change": partial(line_change, data),
-            "line_error": partial(line_error, data),
-            "line_steepest": partial(line_steepest, data),
             "lines": list(data.line.values) if "line" in data else [],
-            "lower_limit": None if camera.lower_limit is None else camera.lower_limit - KELVIN,
             "pitch": camera.pitch,
             "plan": analysis.plan,
             "psf": camera.psf,
             "psf_fractions": self.psf_fractions,
+            "quoted": Quoted(analysis),
+            "reference": texts()["references"][analysis.plan.reference],
             "scene_fields": [name for name in SCENE_FIELDS if name in data],
             "series": self.series,
-            "shown": data.isel(instant=data.attrs["shown_instant"]),
             "starts": self.starts,
             "surfaces": list(data.surface.values),
             "time": time_text(analysis.frame.time, ".4g"),
             "widths": data.psf_width.values if "psf_width" in data else (),
         }
         return {**values, "definition": template(texts()["definition"]).render(values)}
+
+    @cached_property
+    def calibration(self) -> FlatFieldCalibration | None:
+        """The calibration of the camera's detector, if it has one."""
+        camera = self.analysis.camera
+        return camera.calibration(camera.pixels(self.analysis.raster).shape)
 
     @property
     def cut(self) -> Cut:
@@ -156,7 +152,7 @@ class Facts:
             blur = f"{psf}, {1e6 * psf.fwhm:.3g} µm wide at half maximum, {order}"
         bits = camera.detector.bits if camera.detector else None
         lowest = "no lower limit" if limit is None else f"from {limit - KELVIN:.0f} °C"
-        calibration = camera.calibration(pixels.shape)
+        calibration = self.calibration
         highest = f" to {calibration.full_temperature - KELVIN:.0f} °C" if calibration else ""
         reflected = camera.reflected
         settings = {
@@ -178,11 +174,6 @@ class Facts:
     def text(self, text: str, **values: Any) -> str:
         """Return a text with the values of the analysis and further ones, in one line."""
         return " ".join(template(text).render({**self.context, **values}).split())
-
-    def value(self, text: str, **values: Any) -> float:
-        """Return the number that an expression gives; NaN if it is unknown."""
-        value = expression(text)({**self.context, **values})
-        return nan if value is None else float(value)
 
     def read_curves(self) -> list[Array]:
         """Return where errors are read in the shown exposure: points in m, of shape (n, 2)."""
@@ -227,13 +218,6 @@ class Facts:
         if not widths[0] <= psf.fwhm <= widths[-1]:
             return None, None
         return fraction.mean, float(np.interp(psf.fwhm, widths, values)) / 100
-
-    def contact_reaches_border(self) -> bool:
-        """Return whether the contact ends at the border of the view."""
-        cut, raster = self.cut, self.analysis.raster
-        x, y = cut.segments[0].tool.rake_point(cut.segments[0].contact_length)
-        left, _, _, top = raster.extent
-        return bool(y > top - 3 * raster.spacing or x < left + 3 * raster.spacing)
 
 
 def time_text(seconds: float, form: str = ".3g") -> str:

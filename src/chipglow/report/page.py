@@ -1,18 +1,18 @@
-"""The Jinja2 environment of the report: its page, and the texts and expressions in YAML."""
+"""The Jinja2 environment of the report: its page, and the texts in YAML."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
-from math import degrees, isfinite
+from math import isfinite
 from typing import Any, Final
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup, escape
 
 from chipglow.drawing.drawing import data_url, png
 from chipglow.quantities.format import quantity_text, readable
+from chipglow.report.shown_units import in_unit
 from chipglow.text.yaml_file import parse_yaml
 
 _IMPORT: Final = '{% from "sentences.txt" import gaussian_widths, main_cause, wings with context %}'
@@ -34,12 +34,6 @@ def template(text: str) -> Template:
 
 
 @cache
-def expression(text: str) -> Callable[[Mapping[str, Any]], Any]:
-    """Return the function of an expression."""
-    return environment().compile_expression(text)
-
-
-@cache
 def environment() -> Environment:
     """Return the environment; it escapes text on the page only."""
     made = Environment(
@@ -49,21 +43,31 @@ def environment() -> Environment:
     )
     made.filters |= {
         "data_url": lambda image: data_url(png(image)),
-        "degrees": degrees,
-        "mean": lambda values: float(np.mean(list(values))),
-        "median": lambda values: float(np.median(list(values))),
+        "bare": _bare,
+        "in_unit": _in_unit,
         "number": _number,
-        "percent": lambda fraction: _number(100 * fraction, "%"),
         "shown": _shown,
         "um": lambda length: f"{length * 1e6:.3g} µm" if isfinite(length) else "of unknown length",
     }
+    made.tests["known"] = isfinite
     made.tests["numeric"] = lambda text: any(map(str.isdigit, text))
     return made
 
 
 def _number(value: float, unit: str, decimals: int = 0) -> str:
+    """Return a number that is in its unit already."""
     number = float(value)
     return quantity_text(number, unit, decimals) if isfinite(number) else "an unknown value"
+
+
+def _in_unit(value: float, unit: str, decimals: int = 0) -> str:
+    """Return a value in SI as a number with its unit."""
+    return _number(in_unit(value, unit), unit, decimals)
+
+
+def _bare(value: float, unit: str) -> str:
+    """Return a value in SI as a number in a unit, without the unit."""
+    return f"{in_unit(value, unit):g}".replace("-", "−")
 
 
 def _shown(text: str) -> Markup:

@@ -58,7 +58,8 @@ TABLE_1: Final = {name: Emissivity(*values) for name, values in _TEXTS["table_1"
 
 def table_2(cutting: Any) -> list[tuple[str, str, str]]:
     """Return the settings of the cutting simulation: name, the paper's value, the study's."""
-    values = {"cutting": cutting, "tool": cutting.tool}
+    frames = cutting.duration / cutting.window.interval
+    values = {"cutting": cutting, "tool": cutting.tool, "frames": frames}
     return [
         (name, paper, environment().from_string(template).render(values))
         for name, paper, template in _TEXTS["table_2"]

@@ -4,18 +4,19 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import floor, inf, isfinite, log10, nan
-from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from chipglow.analysis import Analysis, Distribution, Headline, one_draw
+from chipglow.analysis import Analysis, Cut, Distribution, Headline, one_draw
 from chipglow.analysis.distribution import student_factor
 from chipglow.drawing.scales import KELVIN
+from chipglow.laboratory.chip import Segment
 from chipglow.quantities.format import quantity_text
-from chipglow.report import paper
+from chipglow.report import numbers, paper
 from chipglow.report.facts import Facts
+from chipglow.report.numbers import Entry, Source
 from chipglow.report.page import texts
 from chipglow.report.paper import PAPER, PaperValue
 
@@ -25,6 +26,14 @@ MAIN: Final = ("rake", "band", "band_worst")
 _ACROSS: Final = ("rake", "band")
 """Readings of a cut where its line of the same name crosses rake face or ridge."""
 
+_READING_UNITS: Final = {
+    "error_degC": "K",
+    "true_error_degC": "K",
+    "corrected_error_degC": "K",
+    "psf_portion_degC": "K",
+    "psf_fraction_percent": "%",
+}
+"""By the ends of the keys of a reading; errors are differences of temperatures."""
 
 _FINEST_SPREAD: Final = 1e-6
 """Uncertainty below which numbers are equal but for the rounding of the computation."""
@@ -110,6 +119,14 @@ class Row:
         return f"why-{self.key}" if self.explanation else general
 
 
+class _Heading(NamedTuple):
+    """Key and unit of a row, and the templates of its quantity and its explanation."""
+
+    key: str
+    unit: str
+    texts: Mapping[str, str]
+
+
 def result_rows(analysis: Analysis, study: Any = None) -> list[Row]:
     """Return all errors of an analysis and, for a cut, period, forces, contact and shear band."""
     rows = all_rows(Facts(analysis, study))
@@ -136,39 +153,66 @@ def all_rows(facts: Facts) -> dict[str, list[Row]]:
     errors = [_reading(facts, name) for name in names if cut or name in facts.headlines]
     return {
         "errors": [row for pair in errors for row in pair],
-        "cut": [*_number_rows(facts, "forces"), *_segment_rows(facts)] if cut else [],
-        "chip": _number_rows(facts, "chip"),
-        "camera": _number_rows(facts, "camera"),
+        "cut": [*_forces(facts, cut), *_segments(facts, cut)] if cut else [],
+        "chip": _chip(facts, cut) if cut else [],
+        "camera": _camera(facts),
     }
 
 
-def _number_rows(facts: Facts, group: str) -> list[Row]:
-    """Return the rows of numbers that were not drawn; none where they are not known."""
-    if facts.context["calibration" if group == "camera" else group] is None:
+def _forces(facts: Facts, cut: Cut) -> list[Row]:
+    if cut.forces is None:
         return []
-    rows = []
-    for key, template in texts()["rows"][group].items():
-        value, uncertainty, freedom = (
-            facts.value(template.get(name, "none")) for name in ("value", "uncertainty", "freedom")
-        )
-        more: Any = {"uncertainty": known(uncertainty), "freedom": known(freedom)}
-        rows.append(_row(facts, key, template, value, **more))
-    return rows
+    return [_number_row(facts, entry, cut.forces) for entry in numbers.FORCES]
 
 
-def _segment_rows(facts: Facts) -> Iterator[Row]:
-    """Yield rows of values of every segment; the first belongs to the one draw."""
-    for key, template in texts()["rows"]["segments"].items():
-        every = np.array(
-            [facts.value(template["value"], segment=one) for one in facts.cut.segments]
-        )
-        finite = every[np.isfinite(every)]
-        draws = Distribution(finite, ("segment",), limits=(0.0, inf)) if finite.size else None
-        mean = draws.mean if draws else nan
-        is_least = bool(facts.value(template.get("is_least", "0")))
-        yield _row(
-            facts, key, template, mean, draws=draws, one_draw=known(every[0]), is_least=is_least
-        )
+def _segments(facts: Facts, cut: Cut) -> list[Row]:
+    return [_segment_row(facts, entry, cut) for entry in numbers.SEGMENT]
+
+
+def _chip(facts: Facts, cut: Cut) -> list[Row]:
+    if cut.chip is None:
+        return []
+    return [_number_row(facts, entry, cut.chip) for entry in numbers.CHIP]
+
+
+def _camera(facts: Facts) -> list[Row]:
+    if facts.calibration is None:
+        return []
+    camera = numbers.CalibratedCamera(facts.analysis.camera, facts.calibration)
+    return [_number_row(facts, entry, camera) for entry in numbers.CAMERA]
+
+
+def _number_row(facts: Facts, entry: Entry[Source], source: Source) -> Row:
+    """Return the row of a number that was not drawn."""
+    value = entry.shown(source)
+    return _row(
+        facts,
+        _Heading(entry.key, entry.unit, texts()["rows"][entry.key]),
+        value.number,
+        names={"value": value.number, "uncertainty": value.uncertainty},
+        decimals=entry.decimals,
+        uncertainty=known(value.uncertainty),
+        freedom=known(value.freedom),
+    )
+
+
+def _segment_row(facts: Facts, entry: Entry[Segment], cut: Cut) -> Row:
+    """Return the row of a value of every segment; the first belongs to the one draw."""
+    every = np.array([entry.shown(segment).number for segment in cut.segments])
+    finite = every[np.isfinite(every)]
+    draws = Distribution(finite, ("segment",), limits=(0.0, inf)) if finite.size else None
+    raster = facts.analysis.raster
+    is_least = any(entry.is_truncated(segment, raster) for segment in cut.segments)
+    return _row(
+        facts,
+        _Heading(entry.key, entry.unit, texts()["rows"][entry.key]),
+        draws.mean if draws else nan,
+        names={"is_least": is_least},
+        decimals=entry.decimals,
+        draws=draws,
+        one_draw=known(every[0]),
+        is_least=is_least,
+    )
 
 
 def _reading(facts: Facts, name: str) -> Iterator[Row]:
@@ -201,7 +245,7 @@ def _drawn(
     facts: Facts, name: str, kind: str, draws: Distribution | None, one: float, **more: Any
 ) -> Row:
     """Return a row of a reading; `kind` names its texts if it has no special ones."""
-    key, readings = f"{slug(name)}_{kind}", texts()["rows"]["readings"]
+    key, readings = f"{slug(name)}_{kind}", texts()["readings"]
     if key not in readings and draws:
         more["decimals"] = _decimals(draws)
     reading = facts.data.sel(reading=name)
@@ -212,24 +256,24 @@ def _drawn(
     names = {"id": name, "name": name, "surface": surface, "where": where}
     more |= {"draws": draws, "one_draw": known(one)}
     mean = draws.mean if draws else nan
-    return _row(facts, key, readings.get(key, readings[kind]), mean, names, **more)
+    heading = _Heading(key, _READING_UNITS[kind], readings.get(key, readings[kind]))
+    return _row(facts, heading, mean, names, reading=name, **more)
 
 
 def _row(
     facts: Facts,
-    key: str,
-    template: Mapping[str, Any],
+    heading: _Heading,
     here: float,
-    names: Mapping[str, str] = MappingProxyType({}),
+    names: Mapping[str, Any],
+    reading: str = "",
     **more: Any,
 ) -> Row:
     """Return a row; if the study is the paper's with the published value and its comparison."""
-    quantity, text = (facts.text(template[name], **names) for name in ("quantity", "text"))
-    more = {"decimals": template.get("decimals", 0), "explanation": text} | more
-    row = Row(key, quantity, template["unit"], known(here), **more)
+    key = heading.key
+    quantity, text = (facts.text(heading.texts[name], **names) for name in ("quantity", "text"))
+    row = Row(key, quantity, heading.unit, known(here), explanation=text, **more)
     if not facts.is_compared:
         return row
-    reading = names.get("id")
     series = facts.series(reading, row.unit) if reading in MAIN else None
     widths = facts.data.psf_width.values if series is not None else np.empty(0)
     compared = paper.comparison(key, row.draws, row.unit, widths, series)
@@ -250,10 +294,13 @@ def _parts(facts: Facts, name: str, found: Headline) -> Mapping[str, Distributio
 
 def main_readings(facts: Facts) -> Iterator[str]:
     """Yield the first error at every place with every surface; of a cut its main ones."""
+    is_cut = facts.analysis.cut is not None
     places = set()
     for name, found in facts.headlines.items():
         place = (found.place, found.surface)
-        if name in MAIN if facts.analysis.cut is not None else place not in places:
+        is_main_of_cut = is_cut and name in MAIN
+        is_first_at_place = not is_cut and place not in places
+        if is_main_of_cut or is_first_at_place:
             places.add(place)
             yield name
 
