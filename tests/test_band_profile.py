@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import typed
+from drawn import in_a_notebook, legend_of, on_given_axes, on_new_axes, points_of
 from hypothesis import given, settings, strategies as st
 from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
@@ -292,3 +293,22 @@ def test_a_cold_strip_below_the_edge_does_not_hide_a_band(depth):
     middle = (along > 60e-6) & (along < 250e-6)
     assert middle.sum() > 50
     assert np.abs(across[middle]).max() < 0.5 * PITCH
+
+
+@pytest.mark.parametrize("count", [2, 13])  # over 12, a colour bar names the frames
+def test_a_profile_is_drawn_by_frame_and_shown_with_its_notes(count):
+    image = BandImage(deviation=20e-6).temperature()
+    profile = band_profile(measured([image + k for k in range(count)]), TOOL, reference=0)
+    axes = on_given_axes(profile)
+    assert legend_of(axes) == legend_of(on_new_axes(profile))
+    if count == 2:
+        along, celsius = points_of(axes, legend_of(axes)[1])
+        np.testing.assert_allclose(along, 1e6 * profile.distance)
+        np.testing.assert_allclose(celsius, profile.temperature[1] - 273.15)
+    else:
+        assert legend_of(axes) == ["fully developed"]
+        assert axes.figure.axes[1].get_ylabel() == "time / µs"
+    columns, rows, sentences = in_a_notebook(profile)
+    assert columns[:3] == ["time_us", "stage", "distance_um"]
+    assert rows[0][1] == "fully developed"
+    assert sentences == [*profile.notes.warnings, *profile.notes.assumed]

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from analytic_chip import AnalyticChip
 from command import chipglow, refused
+from drawn import in_a_notebook
 from figure6 import figure_6
 from GTC import multiple_ureal, set_correlation, ureal
 from scipy import stats
@@ -652,3 +653,16 @@ def test_readings_without_a_temperature_are_stated(plate):
     study = changed(study, {"camera.lower_limit": None, "analysis.regions": small})
     notes = study_budget(study, ("hot",), 100, 2).notes
     assert any("hot, mean: in some draws the place has no pixel" in one for one in notes.warnings)
+
+
+def test_a_budget_is_drawn_as_a_figure_and_shown_by_its_summary(plate):
+    study = study_of(plate, **{"surface.emissivity": {"standard": "0.02"}})
+    found = study_budget(study, ("middle",), trials=100, samples=8)
+    (axes,) = found.plot().axes
+    widths = [bar.get_width() for bar in axes.patches]
+    assert widths[-1] == found.budget.estimate.standard_uncertainty[0]  # all together
+    assert widths[0] == found.to_frame().contribution_K.max()
+    columns, rows, sentences = in_a_notebook(found)
+    assert columns == list(found.summary().columns)
+    assert rows[0][:2] == ["middle, pixel", f"{found.budget.estimate.values[0]:.6g}"]
+    assert sentences == [*found.notes.warnings, *found.notes.assumed]

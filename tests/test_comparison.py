@@ -8,6 +8,7 @@ from math import erf, hypot, sqrt
 import numpy as np
 import pytest
 from command import typed
+from drawn import in_a_notebook
 from hypothesis import given, strategies as st
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from PIL import Image
@@ -377,3 +378,17 @@ def test_e_n_holds_as_often_as_it_says():
     # The standard deviation of the fraction of 80 squares is 3 %.
     assert known.size > 70
     assert (known <= 1).mean() == pytest.approx(0.93, abs=0.08)
+
+
+def test_a_comparison_is_drawn_as_a_figure_and_shown_by_its_fits():
+    image = BandImage(deviation=20e-6).temperature()
+    result = compare(frames(image, 2), {"set <1>": frames(image + 5.0)}, TOOL, stated=STATED)
+    figure = result.plot()
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles[0].startswith("at the rake face") and titles[1] == "along the shear band"
+    assert len(result.to_frame()) == sum(part.measured.values.size for part in parts(result))
+    columns, rows, sentences = in_a_notebook(result)
+    assert columns == result.fits.columns.tolist()
+    assert [row[1] for row in rows] == ["set <1>"] * len(result.fits)
+    assert rows[0][2] == f"{result.fits.bias_K[0]:.6g}"
+    assert sentences == [*result.notes.warnings, *result.notes.assumed]

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from command import chipglow
+from drawn import in_a_notebook, legend_of, on_given_axes, on_new_axes, points_of
 from scipy.constants import c, h, k
 from scipy.integrate import quad
 
@@ -173,3 +174,16 @@ analysis: {{exposures: 1, points: {{middle: [0 um, 0 um]}}}}
     ]  # fmt: skip
     assert table.read_text(encoding="utf-8").startswith("camera.integration_time,bias_K")
     assert picture.stat().st_size > 10_000
+
+
+def test_a_design_is_drawn_and_shown_with_the_best_setting_first(heating):
+    found = design(study_of(heating), {"camera.integration_time": TIMES[:3]}, draws=16)
+    axes = on_given_axes(found)
+    assert legend_of(axes) == legend_of(on_new_axes(found))
+    time = found.settings[found.best]["camera.integration_time"]
+    x, y = points_of(axes, f"best: integration time {1e6 * time:g} us")
+    np.testing.assert_array_equal([x, y], found.objectives[[found.best]].T)
+    columns, rows, sentences = in_a_notebook(found)
+    assert columns == list(found.to_frame().columns)
+    assert rows[0][0] == f"{time:.6g}" and rows[0][3] == "0"
+    assert sentences == [*found.notes.warnings, *found.notes.assumed]

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 import yaml
 from command import typed
+from drawn import in_a_notebook, legend_of, on_given_axes, on_new_axes, points_of
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from hypothesis import given, settings, strategies as st
 
@@ -461,3 +462,50 @@ def test_a_map_of_several_temperatures_has_a_line_in_each_pixel():
     drawn = np.array([surface.redrawn(k).at(RASTER)[5, 5] for k in range(1, 401)])
     assert drawn.std() == pytest.approx(surface.uncertainty[5, 5], rel=0.11)
     assert surface.redrawn(0) is surface
+
+
+def test_a_map_is_a_row_for_each_pixel_and_a_picture():
+    image = measured(table_1(), frames=3, noise=0.5)
+    image.data["flags"].values[:, 0, 1] = Flag.DEAD
+    found = em.determine_emissivity([image], HEATING)
+    frame = found.to_frame()
+    assert len(frame) == RASTER.rows * RASTER.columns
+    assert np.isnan(frame.emissivity[1])
+    x, y = RASTER.x[5], RASTER.y[2]  # third row, sixth column
+    (pixel,) = frame[np.isclose(frame.x_um, 1e6 * x) & np.isclose(frame.y_um, 1e6 * y)].index
+    assert pixel == 2 * RASTER.columns + 5
+    assert frame.emissivity[pixel] == found.emissivity[2, 5]
+    assert frame.standard_uncertainty[pixel] == found.estimate.standard_uncertainty[2, 5]
+    expected = found.radiance_temperature[2, 5] - CELSIUS
+    assert frame.radiance_temperature_degC[pixel] == expected
+    for axes in (on_given_axes(found), on_new_axes(found)):
+        (picture,) = axes.get_images()
+        np.testing.assert_array_equal(picture.get_array().filled(np.nan), found.emissivity)
+    columns, rows, _ = in_a_notebook(found)
+    assert columns == list(frame.columns)
+    assert rows[0][2:4] == [f"{found.emissivity[0, 0]:.6g}", f"{frame.standard_uncertainty[0]:.6g}"]
+
+
+@pytest.mark.parametrize("kelvins", [(0.0,), (0.0, 100.0)])
+def test_emissivities_of_regions_are_drawn_with_their_uncertainty(kelvins):
+    heatings = [em.Heating(TRUTH + more, reflected_uncertainty=5.0) for more in kelvins]
+    images = [measured(table_1(), reference=one.reference) for one in heatings]
+    found = em.determine_emissivities(images, heatings, REGION_LIST)
+    axes = on_given_axes(found)
+    names = [*(region.name for region in REGION_LIST), "chip body"]  # of both bodies
+    if len(kelvins) == 1:
+        bars = axes.containers[0]
+        np.testing.assert_allclose(bars.lines[0].get_ydata(), found.to_frame()["mean"])
+        low, high = (line.get_ydata() for line in bars.lines[1])
+        u = [float(row.estimate.standard_uncertainty) for row in found.rows[0]]
+        np.testing.assert_allclose(high - low, 4 * np.array(u))
+        assert [tick.get_text() for tick in axes.get_xticklabels()] == names
+    else:
+        assert legend_of(axes) == names
+        celsius, means = points_of(axes, "shear band")
+        np.testing.assert_allclose(celsius, [one.reference - CELSIUS for one in heatings])
+        np.testing.assert_allclose(means, [rows[2].mean for rows in found.rows])
+    assert on_new_axes(found).get_ylabel() == "emissivity"
+    columns, rows, sentences = in_a_notebook(found)
+    assert columns[0] == "region" and [row[0] for row in rows] == names * len(kelvins)
+    assert sentences == [*found.notes.warnings, *found.notes.assumed]

@@ -5,6 +5,7 @@ from math import cos, degrees, radians, sqrt
 
 import numpy as np
 import pytest
+from drawn import in_a_notebook
 from synthetic_edge import (
     FWHM_PER_SIGMA,
     PITCH,
@@ -449,3 +450,14 @@ def test_a_width_on_a_node_of_its_table_is_found():
     model = GaussianTailModel()
     for fwhm in np.linspace(8e-6, 16e-6, 200):
         assert model.fwhm(np.array([fwhm, 0.0, 0.72])) == pytest.approx(fwhm, rel=1e-9)
+
+
+def test_a_knife_edge_is_drawn_as_a_figure_and_shown_as_a_table(clean):
+    titles = [axes.get_title(loc="left") for axes in clean.plot().axes]
+    assert {"edge-spread function", "line-spread function", "modulation transfer function"} <= set(
+        titles
+    )
+    columns, rows, sentences = in_a_notebook(clean)
+    assert columns[:2] == ["model", "fwhm_um"]
+    assert rows[0][:2] == [clean.best.model.name, f"{1e6 * clean.fwhm:.6g}"]
+    assert sentences == [*clean.notes.warnings, *clean.notes.assumed]

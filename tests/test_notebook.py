@@ -119,12 +119,16 @@ def test_a_picture_of_a_frame(shown, frame, label, title):
 def test_a_picture_on_given_axes_without_a_tool():
     figure, axes = plt.subplots(1, 2)
     for at, shown in zip(axes, (scene(tool=None), measurement(tool=None)), strict=True):
-        assert shown.plot(axes=at) is at
+        assert shown.plot(ax=at) is at
         assert not at.get_lines()
     assert plt.get_fignums() == [figure.number]
 
 
 def test_numerics_do_not_import_matplotlib():
-    imported = "import sys, chipglow; chipglow.Camera, chipglow.Scene"
+    imported = (
+        "import sys, chipglow; chipglow.Camera, chipglow.Scene, chipglow.rake_grid;"
+        "import chipglow.laboratory.comparison, chipglow.laboratory.emissivity;"
+        "import chipglow.laboratory.psf, chipglow.analysis"
+    )
     check = "assert 'matplotlib' not in sys.modules"
     subprocess.run([sys.executable, "-c", f"{imported}; {check}"], check=True)

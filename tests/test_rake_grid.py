@@ -4,6 +4,7 @@ from math import radians
 
 import numpy as np
 import pytest
+from drawn import in_a_notebook, legend_of, on_given_axes, on_new_axes, points_of
 from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import Flag, Measurement
@@ -188,3 +189,19 @@ def test_a_file_that_is_no_tool_is_one_error(tmp_path, text, message):
     (tmp_path / "tool.yaml").write_text(text)
     with pytest.raises(DescriptionError, match=message):
         load_tool(tmp_path / "tool.yaml")
+
+
+def test_a_grid_is_drawn_by_depth_and_shown_with_its_warnings():
+    flags = np.zeros((2, *RASTER.shape), np.uint8)
+    flags[1, :40] = Flag.UNDER_RANGE
+    frames = measured(linear_image(), linear_image() + 8.0, flags=flags)
+    grid = rake_grid(frames, ToolGeometry(), depth=3 * 18e-6)
+    axes = on_given_axes(grid)
+    assert legend_of(axes) == legend_of(on_new_axes(grid)) == ["9 µm", "27 µm", "45 µm"]
+    middle = points_of(axes, "27 µm")  # the curves of the other depths are moved aside
+    np.testing.assert_allclose(middle[0], 1e6 * grid.along)
+    np.testing.assert_allclose(middle[1], grid.frame_mean[1] - 273.15)
+    columns, rows, sentences = in_a_notebook(grid)
+    assert columns[:4] == ["time_us", "depth_um", "along_um", "mean_degC"]
+    assert rows[0][3] == f"{grid.mean[0, 0, 0] - 273.15:.6g}"
+    assert grid.notes.warnings[0] in sentences

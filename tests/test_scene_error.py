@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chipglow, refused
+from drawn import in_a_notebook, on_given_axes, on_new_axes
 from undrawn import leave_undrawn
 
 from chipglow.analysis import (
@@ -19,6 +20,7 @@ from chipglow.analysis import (
     headline,
     image_error,
     line_error,
+    line_psf_portion,
     readings_frame,
 )
 from chipglow.camera import Camera, GaussianPSF
@@ -253,3 +255,46 @@ def test_one_emissivity_is_enough(folder):
 def test_what_cannot_be_is_one_sentence(folder, arguments, words):
     refused(("error", *arguments, "--out", "refused"), *words)
     assert not (folder / "refused").exists()
+
+
+def test_an_analysis_answers_by_its_methods():
+    result = found(places=(MIDDLE, ACROSS))
+    one = result.headline("middle, pixel")
+    np.testing.assert_array_equal(
+        one.error.values, headline(result.data, "middle, pixel").error.values
+    )
+    expected = (
+        "'rake' is not known in every draw, expected one of: hottest pixel, peak; middle, pix"
+    )
+    with pytest.raises(ValueError, match=expected):
+        result.headline("rake")
+    line = result.line("across")
+    np.testing.assert_array_equal(line.error, line_error(result.data, "across"))
+    np.testing.assert_array_equal(line.psf_portion, line_psf_portion(result.data, "across"))
+    assert line.distance.values[-1] == pytest.approx(80e-6)
+    assert line.error.units == "K"
+    with pytest.raises(ValueError, match="line: 'rake' is unknown, expected one of: across"):
+        result.line("rake")
+    assert result.to_frame().equals(readings_frame(result.data))
+    columns, rows, sentences = in_a_notebook(result)
+    assert columns == list(result.to_frame().columns)
+    assert [row[1] for row in rows] == result.to_frame().place.tolist()
+    assert sentences == [*result.warnings, *result.missing, *result.assumed]
+
+
+def test_the_error_of_an_analysis_is_drawn_with_its_places():
+    surfaces = {"dark": UniformSurface(0.3), "bright": UniformSurface(0.9)}
+    plan = Plan(exposures=1, phases=1, places=(MIDDLE, ACROSS))
+    result = analyse(plate(), surfaces, CAMERA, plan)
+    for name, axes in {
+        "dark": on_new_axes(result),
+        "bright": on_given_axes(result, "bright"),
+    }.items():
+        error = image_error(result.data).sel(surface=name).values
+        np.testing.assert_array_equal(axes.get_images()[0].get_array(), error)
+        assert axes.get_title(loc="left") == f"error, {name}"
+        drawn = [line.get_xydata() for line in axes.get_lines()]
+        np.testing.assert_allclose(drawn[0], [[30.0, 0.0]], atol=1e-9)  # µm
+        np.testing.assert_allclose(drawn[1], 1e6 * np.array(ACROSS.corners))
+    with pytest.raises(ValueError, match="'grey' is unknown, expected one of dark, bright"):
+        result.plot("grey")

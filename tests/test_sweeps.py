@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chipglow
+from drawn import in_a_notebook
 
 from chipglow.analysis import headlines
 from chipglow.io import write_scene
 from chipglow.io.atomic import exclusive
-from chipglow.quantities import changed, setting_at
-from chipglow.report.sweep_figure import draw_sweep
+from chipglow.quantities import changed
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, Sweep, errors, study_text, sweep
 from chipglow.study.sweeps import _key, axis
@@ -292,9 +292,8 @@ def test_the_figure_draws_each_point_over_each_setting(study, tmp_path):
         "camera.pitch": ("3 um", "9 um"),
         "camera.integration_time": ("2 us", "3 us", "4 us"),
     }
-    data = sweep(study, vary, tmp_path / "out", at=("hot",), workers=0).to_xarray()
-    quantities = {path: setting_at(study, path).parameter.quantity for path in vary}
-    figure = draw_sweep(data, quantities)
+    result = sweep(study, vary, tmp_path / "out", at=("hot",), workers=0)
+    data, figure = result.to_xarray(), result.plot()
     assert [panel.get_xlabel() for panel in figure.axes] == [
         "fwhm / µm", "pitch / µm", "integration time / µs",
     ]  # fmt: skip
@@ -336,3 +335,27 @@ def test_the_command_writes_table_arrays_and_figure(command):
     records = [json.loads(path.read_text()) for path in (out / "points").iterdir()]
     assert sorted(stored) == sorted(one["readings"][PLACE]["error"] for one in records)
     assert "PATH=VALUES" in chipglow(*command, "--vary", "pitch", code=2).stderr
+
+
+def test_an_opened_sweep_is_drawn_in_its_units_and_shown_with_what_failed(study, tmp_path):
+    vary = {"camera.integration_time": ("2 us", "3 us", "40 us")}
+    sweep(study, vary, tmp_path / "out", at=("hot",), workers=0)
+    opened = Sweep.open(tmp_path / "out")
+    (axes,) = opened.plot().axes
+    assert axes.get_xlabel() == "integration time / µs"
+    np.testing.assert_allclose(list(axes.lines[0].get_xdata()), [2.0, 3.0, 40.0])
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), opened.to_xarray().error.values[:, 0])
+    columns, rows, (failure,) = in_a_notebook(opened)
+    assert columns == list(opened.to_frame().columns)
+    assert [row[0] for row in rows] == ["0", "1"]
+    assert failure == f"Point 2 failed: {opened.failed[2]}"
+
+
+def test_a_sweep_without_a_computed_point_says_so(study, tmp_path):
+    sweep(study, {"camera.pitch": PITCHES[:1]}, tmp_path / "out", at=("hot",), workers=0)
+    for file in (tmp_path / "out" / "points").iterdir():
+        file.unlink()
+    opened = Sweep.open(tmp_path / "out")
+    assert in_a_notebook(opened)[1:] == ([], ["1 of 1 points are not computed yet."])
+    with pytest.raises(ValueError, match="no point is computed, so there is nothing to draw"):
+        opened.plot()

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import typed, words
+from drawn import in_a_notebook, on_given_axes, on_new_axes, points_of
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 
 from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement, fit_calibration
 from chipglow.io import write_measurement
 from chipglow.laboratory import emissivity as em
-from chipglow.scene import Area
+from chipglow.scene import Area, Polygon, Region
 from chipglow.uncertainty import Estimate, from_xarray
 
 ROOM = 293.0
@@ -428,3 +429,26 @@ def test_a_region_without_emissivity_and_another_band_are_warned_about(folder):
     write_measurement(Measurement(other), folder / "other.nc")
     expected = "Warning: Emissivities measured in 3.8 µm to 5.1 µm are taken to hold in"
     assert expected in said("e.nc", "other.nc")
+
+
+def test_temperatures_of_regions_are_drawn_with_their_intervals():
+    emissivity = em.EmissivityLine.constant(0.42, 0.02)
+    left, right = Polygon.rectangle((0, 0), (9, 30)), Polygon.rectangle((20, 0), (29, 30))
+    regions = [Region("a", left), Region("b", right)]
+    found = em.true_temperatures([image()], regions, emissivity)
+    axes = on_given_axes(found)
+    names, true = points_of(axes, "true temperature, 95 % interval")
+    assert list(names) == ["a", "b"]
+    frame = found.to_frame()
+    np.testing.assert_allclose(true, frame.true_temperature_K - CELSIUS)
+    _, radiance = points_of(axes, "radiance temperature")
+    np.testing.assert_allclose(radiance, frame.radiance_temperature_K - CELSIUS)
+    (bars,) = axes.containers
+    low, high = (line.get_ydata() for line in bars.lines[1])
+    np.testing.assert_allclose(low, frame.low_K - CELSIUS)
+    np.testing.assert_allclose(high, frame.high_K - CELSIUS)
+    assert on_new_axes(found).get_ylabel() == "temperature / °C"
+    columns, rows, sentences = in_a_notebook(found)
+    assert columns == list(frame.columns)
+    assert [row[0] for row in rows] == ["a", "b"]
+    assert sentences == [*found.notes.warnings, *found.notes.assumed]

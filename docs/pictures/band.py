@@ -13,7 +13,6 @@ import chipglow
 from chipglow.laboratory.chip import band_profile
 from chipglow.laboratory.chip.figures import draw_band_profile
 from chipglow.laboratory.comparison import Comparison, StatedUncertainties, compare
-from chipglow.laboratory.comparison.figure import draw_comparison
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
@@ -41,7 +40,7 @@ def main() -> None:
     }
     stated = StatedUncertainties(emissivity=0.05)
     result = compare(measured, simulated, measured.tool, stated=stated)
-    draw_comparison(result).savefig(HERE / "compare.png", dpi=150)
+    result.plot().savefig(HERE / "compare.png", dpi=150)
     tell(result)
 
 

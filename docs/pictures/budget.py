@@ -9,7 +9,6 @@ from pathlib import Path
 import matplotlib
 
 from chipglow.quantities import changed
-from chipglow.report.budget_figure import draw_budget
 from chipglow.study import Study, study_budget
 
 matplotlib.use("Agg")
@@ -33,7 +32,7 @@ def main() -> None:
     print(result.summary().to_string(), result.groups().to_string(), sep="\n")
     print(result.to_frame().drop(columns="source").to_string())
     print(result.surrogates, result.budget.monte_carlo.trials)
-    draw_budget(result).savefig(Path(__file__).with_name("budget.png"), dpi=100)
+    result.plot().savefig(Path(__file__).with_name("budget.png"), dpi=100)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ import sample_files
 
 import chipglow
 from chipglow.laboratory.comparison import StatedUncertainties
-from chipglow.laboratory.comparison.figure import draw_comparison
 
 files = sample_files.folder("compare")
 measured = chipglow.read_measurement(files / "measured.nc")
@@ -35,7 +34,7 @@ simulated = {
 result = chipglow.compare(
     measured, simulated, measured.tool, stated=StatedUncertainties(emissivity=0.05)
 )
-figure = draw_comparison(result)
+figure = result.plot()
 
 # %%
 # The sentences that ``chipglow compare`` prints:

@@ -22,13 +22,13 @@ Source: ISO 12233; ISO 15529. More: :doc:`/do/knife-edge`.
 from samples.edges import edge, measured
 
 from chipglow import AnnularAperturePSF, GaussianPSF, Measurement, edge_image, knife_edge
-from chipglow.laboratory.psf.figure import draw_knife_edge, sentences
+from chipglow.laboratory.psf.figure import sentences
 from chipglow.quantities.format import uncertain_text
 
 mirror = AnnularAperturePSF(4.45e-6)
 image = measured(edge(5.0, mirror), 573.15, 873.15, 1)
 found = knife_edge([edge_image(image, "knife edge")])
-figure = draw_knife_edge(found)
+figure = found.plot()
 
 # %%
 # The true width, and what was found:

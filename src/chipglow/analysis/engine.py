@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from chipglow.analysis.attribution import attribute, read_attribution
@@ -18,7 +19,14 @@ from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
 from chipglow.analysis.outside import fractions_outside, outside_warnings
 from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
-from chipglow.analysis.reductions import headlines
+from chipglow.analysis.reductions import (
+    Headline,
+    headline,
+    headlines,
+    line_error,
+    line_psf_portion,
+    readings_frame,
+)
 from chipglow.camera import Camera, Flag, GaussianPSF, Measurement
 from chipglow.camera.exposure import sparse_frames, surroundings_radiance
 from chipglow.laboratory.chip import (
@@ -34,6 +42,10 @@ from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sa
 from chipglow.scene.frame import FILLED, QUALITY
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.surface import EmissivityField, Surface
+from chipglow.text import Notes, result_html
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PSF_ORDERS: Final = ("detector", "optics")
 """Where the point spread function acts: on the pixels' grid as in the paper, or before them."""
@@ -72,7 +84,7 @@ class Analysis(Brief):
     Parameters
     ----------
     data : xarray.Dataset
-        Every number, in SI units; `chipglow.analysis.reductions` reads it.
+        Every number, in SI units; the methods and `chipglow.analysis.reductions` read it.
     plan : Plan
         The plan of the analysis.
     camera : Camera
@@ -110,6 +122,88 @@ class Analysis(Brief):
     missing: tuple[str, ...]
     failed: Mapping[str, str]
     assumed: tuple[str, ...] = ()
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names of the surfaces with readings; all if nothing is read."""
+        seen = set(self.data.seen_surface.values.tolist())
+        return tuple(name for name in self.measurements if name in seen) or tuple(self.measurements)
+
+    def headline(self, name: str) -> Headline:
+        """Return a reading over all draws, in K, such as ``rake`` or ``band`` of a cut.
+
+        Raises
+        ------
+        ValueError
+            If there is no such reading, or it is unknown in some draw.
+        """
+        found = headline(self.data, name)
+        if found is None:
+            known = "; ".join(headlines(self.data)) or "none"
+            raise ValueError(
+                f"reading: {name!r} is not known in every draw, expected one of: {known}"
+            )
+        return found
+
+    def line(self, name: str) -> xr.Dataset:
+        """Return ``error`` and ``psf_portion`` in K along a line, over the draws and ``point``.
+
+        The coordinate ``distance`` is in m.
+
+        Raises
+        ------
+        ValueError
+            If there is no such line.
+        """
+        lines = self.data.line.values.tolist() if "line" in self.data.dims else []
+        if name not in lines:
+            known = "; ".join(lines) or "none"
+            raise ValueError(f"line: {name!r} is unknown, expected one of: {known}")
+        parts = {
+            "error": line_error(self.data, name),
+            "psf_portion": line_psf_portion(self.data, name),
+        }
+        return xr.Dataset({key: part.assign_attrs(units="K") for key, part in parts.items()})
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row for each reading: reference, error, its scatter, and the PSF's portion."""
+        return readings_frame(self.data)
+
+    def plot(self, surface: str | None = None, ax: "Axes | None" = None) -> "Axes":
+        """Draw the error of every pixel in the shown exposure, and where errors are read.
+
+        Parameters
+        ----------
+        surface : str, optional
+            Surface, by default the first with readings.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on, new ones by default.
+
+        Raises
+        ------
+        ValueError
+            If there is no such surface.
+        """
+        from chipglow.analysis.figure import plot_error
+
+        if surface is not None and surface not in self.measurements:
+            known = ", ".join(self.measurements)
+            raise ValueError(f"surface: {surface!r} is unknown, expected one of {known}")
+        return plot_error(self, surface or self.surfaces[0], ax)
+
+    def _repr_html_(self) -> str:
+        failed = [f"{title}: failed: {reason}" for title, reason in self.failed.items()]
+        notes = Notes(list(self.assumed), [*self.warnings, *self.missing, *failed])
+        return result_html("Analysis", self.to_frame(), notes)
+
+    def read_curves(self) -> list[Array]:
+        """Return where errors are read in the shown exposure: points in m, of shape (n, 2)."""
+        if self.cut is None:
+            outlines = (place.outline() for place in self.places)
+            return [points for points in outlines if points is not None]
+        lines = self.data.isel(exposure=0).sel(line=["rake", "band"])
+        points = np.stack([lines.line_x.values, lines.line_y.values], axis=-1)
+        return [one[np.isfinite(one).all(axis=1)] for one in points]
 
 
 @dataclass(frozen=True, eq=False)

@@ -216,13 +216,13 @@ class Measurement:
         kelvin = self.data["radiance_temperature"][frame].values
         return np.asarray(kelvin, np.float64) - ZERO_CELSIUS
 
-    def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
+    def plot(self, frame: int = 0, ax: "Axes | None" = None) -> "Axes":
         """Plot the radiance temperature of one frame in °C over x and y in µm, with the tool.
 
         Pixels without a radiance temperature are grey. New axes are made by default.
         """
         time, label = float(self.times[frame]), "radiance temperature / °C"
-        return plot_image(self.celsius(frame), self.raster, self.tool, label, time, axes)
+        return plot_image(self.celsius(frame), self.raster, self.tool, label, time, ax)
 
     @cached_property
     def calibration_errors(self) -> CalibrationErrors | None:

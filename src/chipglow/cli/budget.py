@@ -37,7 +37,6 @@ def budget(
     """State the uncertainty of the error of a single reading, and what it comes from."""
     from chipglow.cli.progress import progress_bars
     from chipglow.laboratory.result_file import write_frame
-    from chipglow.report.budget_figure import draw_budget
     from chipglow.study import load_study, study_budget
     from chipglow.text import Notes
 
@@ -49,7 +48,7 @@ def budget(
     finish(
         result.notes,
         (out, lambda path: write_frame(result.to_frame(), path)),
-        (plot, figure(draw_budget, result)),
+        (plot, figure(result.plot)),
     )
 
 

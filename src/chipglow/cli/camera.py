@@ -170,7 +170,7 @@ def psf(
     """Determine the point spread function and MTF of a camera from images of an edge."""
     from chipglow.laboratory import psf as lab
     from chipglow.laboratory.measurement import load_measurement
-    from chipglow.laboratory.psf.figure import draw_knife_edge, sentences
+    from chipglow.laboratory.psf.figure import sentences
 
     window = _region(region)
     images = [lab.load_edge(path, settings or (), window) for path in edges]
@@ -193,7 +193,7 @@ def psf(
     finish(
         result.notes,
         (out, lambda path: lab.write_psf(result, path, kernel)),
-        (plot, figure(draw_knife_edge, result)),
+        (plot, figure(result.plot)),
     )
 
 

@@ -61,7 +61,6 @@ def compare(
     from chipglow.laboratory import comparison as lab
     from chipglow.laboratory.chip import chosen_tool, read_curve
     from chipglow.laboratory.comparison.comparison import COVERAGE
-    from chipglow.laboratory.comparison.figure import draw_comparison
     from chipglow.laboratory.measurement import load_measurement
 
     if not 0.0 <= emissivity_uncertainty < 1.0:
@@ -93,7 +92,7 @@ def compare(
     finish(
         whole.notes + notes + result.notes,
         (out, partial(_write, result, force)),
-        (plot, figure(draw_comparison, result)),
+        (plot, figure(result.plot)),
     )
 
 
@@ -101,8 +100,7 @@ def _write(result: "lab.Comparison", force: bool, out: Path) -> None:
     from chipglow.drawing import drawing
     from chipglow.io import atomic_folder
     from chipglow.laboratory import comparison as lab
-    from chipglow.laboratory.comparison.figure import draw_comparison
 
     with atomic_folder(out, force) as folder:
         lab.write_comparison(result, folder)
-        drawing.save(draw_comparison(result), folder, "comparison")
+        drawing.save(result.plot(), folder, "comparison")

@@ -7,7 +7,7 @@ from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     import pandas as pd
 
@@ -58,8 +58,6 @@ def sweep(
     from chipglow.cli.progress import progress_bars
     from chipglow.io import write_dataset
     from chipglow.laboratory.result_file import write_frame
-    from chipglow.quantities import setting_at
-    from chipglow.report.sweep_figure import draw_sweep
     from chipglow.study import Method, load_study, sweep as compute
     from chipglow.study.workers import connected
     from chipglow.text import Notes
@@ -79,10 +77,9 @@ def sweep(
             progress=progress,
         )
     frame, screen = result.to_frame(), current()
-    quantities = {path: setting_at(loaded, path).parameter.quantity for path in axes}
     if len(frame) <= _MAX_ROWS:
         numbers = ["error_K ± uncertainty_K", "psf_portion_K", "true_error_K"]
-        screen.table("points", _with_units(frame, quantities), [*axes, "reading", *numbers])
+        screen.table("points", _with_units(frame, result.quantities), [*axes, "reading", *numbers])
     count, failed = len(result.keys), result.failed
     screen.say(f"{count} points: {count - len(failed)} computed, {len(failed)} failed.")
     reasons = [f"point {index}: {reason}" for index, reason in failed.items()]
@@ -91,7 +88,7 @@ def sweep(
         Notes(warnings=[*reasons[:_MAX_FAILURES], *_range_warnings(frame)]),
         (out / "sweep.csv", lambda path: write_frame(frame, path)),
         (out / "sweep.nc", lambda path: write_dataset(data, path)),
-        (out / "sweep.png" if len(frame) else None, figure(draw_sweep, data, quantities)),
+        (out / "sweep.png" if len(frame) else None, figure(result.plot)),
     )
 
 
@@ -115,9 +112,8 @@ def design(
     """Find the settings of camera and surface with the smallest bias and uncertainty."""
     from chipglow.cli.progress import progress_bars
     from chipglow.laboratory.result_file import write_frame
-    from chipglow.quantities import setting_at
-    from chipglow.report.design_figure import draw_design
     from chipglow.study import Method, design as search, load_study
+    from chipglow.study.design_figure import draw_design
     from chipglow.text import Notes
 
     loaded, axes, screen = load_study(study), dict(map(_axis, vary)), current()
@@ -133,7 +129,6 @@ def design(
             saturated,
             progress,
         )
-    quantities = {path: setting_at(loaded, path).parameter.quantity for path in axes}
     frame = result.to_frame()
     columns = {
         "|bias| / K": "bias_K",
@@ -144,7 +139,7 @@ def design(
         "own": "own",
         "excluded": "is_excluded",
     }
-    best = _with_units(frame[frame.regret_K.notna()].head(_MAX_ROWS), quantities)
+    best = _with_units(frame[frame.regret_K.notna()].head(_MAX_ROWS), result.quantities)
     best = best.assign(is_excluded=best.excluded != "")
     screen.table("settings", best, {path: path for path in axes} | columns)
     count, total = len(result.settings), int(result.draws.sum())
@@ -155,14 +150,12 @@ def design(
     )
     reasons = list(dict.fromkeys(result.reasons.values()))
     notes = result.notes + Notes(warnings=[f"excluded: {one}" for one in reasons[:_MAX_FAILURES]])
-    finish(
-        notes,
-        (out, lambda path: write_frame(frame, path)),
-        (plot, figure(draw_design, result, quantities)),
-    )
+    finish(notes, (out, lambda path: write_frame(frame, path)), (plot, figure(draw_design, result)))
 
 
-def _with_units(frame: "pd.DataFrame", quantities: "dict[str, Quantity | None]") -> "pd.DataFrame":
+def _with_units(
+    frame: "pd.DataFrame", quantities: "Mapping[str, Quantity | None]"
+) -> "pd.DataFrame":
     """Return the frame with the settings as text in their units."""
     from chipglow.quantities import value_text
 

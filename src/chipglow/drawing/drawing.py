@@ -64,6 +64,17 @@ def new_figure(
     return figure
 
 
+def axes_or_new(
+    ax: Axes | None, layout: Literal["constrained", "compressed"] = "constrained"
+) -> Axes:
+    """Return axes, or those of a new figure that a notebook shows."""
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot as plt  # takes long, and only notebooks need it
+
+    return plt.subplots(layout=layout)[1]
+
+
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
     """Return an empty figure of the page's width for rows of images of a width in inches."""
     panel = panel_width * raster.rows / raster.columns

@@ -43,10 +43,9 @@ class Facts:
         self.analysis, self.data = analysis, analysis.data
         self.study = study
         self.is_compared = analysis.cut is not None and study is not None and study.is_papers
-        cut, names = analysis.cut, list(analysis.measurements)
+        cut = analysis.cut
         self.starts = len(cut.one_segment) if cut else self.data.sizes["instant"]
-        seen = self.data.seen_surface.values
-        self.read_surfaces = [name for name in names if name in seen] or names
+        self.read_surfaces = list(analysis.surfaces)
 
     @cached_property
     def context(self) -> Mapping[str, Any]:
@@ -174,15 +173,6 @@ class Facts:
     def text(self, text: str, **values: Any) -> str:
         """Return a text with the values of the analysis and further ones, in one line."""
         return " ".join(template(text).render({**self.context, **values}).split())
-
-    def read_curves(self) -> list[Array]:
-        """Return where errors are read in the shown exposure: points in m, of shape (n, 2)."""
-        if self.analysis.cut is None:
-            outlines = (place.outline() for place in self.analysis.places)
-            return [points for points in outlines if points is not None]
-        lines = self.data.isel(exposure=0).sel(line=["rake", "band"])
-        points = np.stack([lines.line_x.values, lines.line_y.values], axis=-1)
-        return [one[np.isfinite(one).all(axis=1)] for one in points]
 
     def heat_limits(self, celsius: Array) -> tuple[float, float]:
         """Return ends of a scale of temperatures, the lower near the camera's lower limit."""

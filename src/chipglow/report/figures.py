@@ -19,6 +19,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
+from chipglow.analysis.figure import draw_error, error_limit
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
@@ -128,26 +129,23 @@ def error_images(facts: Facts) -> Figure:
     """Draw the error and the contribution of the PSF to it, with the places of the readings."""
     analysis, names = facts.analysis, facts.read_surfaces
     flagged = facts.data.flagged.sel(surface=names)
-    seen = flagged if bool(flagged.all()) else ~flagged
     figure = drawing.image_figure(analysis.raster, 2.5, rows=len(names))
     rows = figure.subplots(len(names), 2, sharex=True, sharey=True, squeeze=False)
     for column, (title, images) in enumerate(
         (("error", image_error(facts.data)), ("PSF contribution", image_psf_portion(facts.data)))
     ):
         images = images.sel(surface=names)
-        limit = scales.round_limit(images.where(seen).values, 99.0, 10.0)
+        limit = error_limit(images, flagged)
         for axes, name in zip(rows[:, column], names, strict=True):
-            raster = analysis.measurements[name].raster
-            ImagePanel(
+            panel = ImagePanel(
                 of_surface(facts, title, name),
                 f"{title} / K",
                 images.sel(surface=name).values,
                 (-limit, limit),
                 scales.SIGNED,
-            ).draw(figure, axes, raster, analysis.tool)
+            )
+            draw_error(figure, axes, analysis, name, panel)
             axes.label_outer()
-            drawing.veil(axes, flagged.sel(surface=name).values, raster)
-            _draw_marks(axes, facts)
     return figure
 
 
@@ -264,19 +262,6 @@ def _draws(values: Array) -> Array:
     """Return one row per draw, without those of textures that a surface does not have."""
     rows = values.reshape(-1, values.shape[-1])
     return np.asarray(rows[np.isfinite(rows).any(axis=1)])
-
-
-def _draw_marks(axes: Axes, facts: Facts) -> None:
-    """Draw where the errors are read, and the ridge of the band of a cut."""
-    factor, _ = drawing.length_unit(facts.analysis.raster)
-    for points in facts.read_curves():
-        if len(points) == 1:
-            axes.plot(*(points[0] * factor), "+", color=GREEN, markersize=9, markeredgewidth=1.6)
-        else:
-            drawing.draw_line(axes, points, GREEN, factor=factor)
-    if facts.analysis.cut is not None:
-        ridge = facts.analysis.cut.band.ridge.points * factor
-        axes.plot(*ridge.T, color="black", linestyle="--", linewidth=0.8)
 
 
 def _draw_published(axes: Axes, line: str) -> None:

@@ -139,7 +139,7 @@ def _curves(facts: Facts, factor: float) -> Iterator[Curve]:
     for i, instant in enumerate(cut.one_segment if cut else ()):
         if instant.band is not None:
             yield Curve(_points(factor * instant.band.ridge.points), "ridge", i)
-    for points in facts.read_curves():
+    for points in facts.analysis.read_curves():
         if len(points) > 1:
             yield Curve(_points(factor * points), "line", still if cut else None)
         else:

@@ -35,15 +35,12 @@ def plot_image(
     tool: Tool | None,
     label: str,
     time: float,
-    axes: "Axes | None",
+    ax: "Axes | None",
 ) -> "Axes":
     """Draw temperatures in °C with the tool's outline and a colour bar."""
     from chipglow.drawing import drawing
 
-    if axes is None:
-        from matplotlib import pyplot as plt
-
-        axes = plt.subplots(layout="compressed")[1]
+    axes = drawing.axes_or_new(ax, "compressed")
     limits = (np.nanmin(celsius), np.nanmax(celsius)) if np.isfinite(celsius).any() else (0.0, 1.0)
     picture = drawing.show_image(axes, celsius, raster, tool, "inferno", limits)
     axes.set_title(f"{1e6 * time:.6g} µs", loc="left")

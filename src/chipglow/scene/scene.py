@@ -163,11 +163,11 @@ class Scene:
         """Return the temperature of one frame in °C, shape (y, x); meaningless without material."""
         return np.asarray(self._read("temperature", frame), np.float64) - ZERO_CELSIUS
 
-    def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
+    def plot(self, frame: int = 0, ax: "Axes | None" = None) -> "Axes":
         """Draw the temperature of one frame in °C over x and y in µm, with the tool's outline."""
         time = float(self.times[frame])
         shown = self._shown(frame)
-        return plot_image(shown, self.raster, self.tool, "temperature / °C", time, axes)
+        return plot_image(shown, self.raster, self.tool, "temperature / °C", time, ax)
 
     def _shown(self, frame: int) -> NDArray[np.float64]:
         """Temperature of one frame in °C, NaN where there is no material."""

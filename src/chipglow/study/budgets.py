@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pandas as pd
@@ -31,10 +31,13 @@ from chipglow.study.fitting import fit, surfaces_on
 from chipglow.study.running import Progress, cut, fitted_study, silent
 from chipglow.study.schema import Study
 from chipglow.surface import Surface
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Budget, Estimate, Input, Inputs, budget, first_order
 from chipglow.uncertainty.budget import VALIDATED, check_numbers
 from chipglow.uncertainty.surrogate import Surrogate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SCENE, SURFACE, CAMERA = "scene", "surface", "camera"
 """Groups of inputs, unless the study names others."""
@@ -135,6 +138,18 @@ class StudyBudget:
                     }
                 )
         return pd.DataFrame(rows)
+
+    def plot(self) -> "Figure":
+        """Draw the largest contributions to the uncertainty of each reading, and their total.
+
+        Returns a figure, as each reading has its own panel.
+        """
+        from chipglow.study.budget_figure import draw_budget
+
+        return draw_budget(self)
+
+    def _repr_html_(self) -> str:
+        return result_html("StudyBudget", self.summary(), self.notes)
 
     def indices(self) -> xr.Dataset:
         """Return Sobol's indices over ``reading`` and ``group``."""

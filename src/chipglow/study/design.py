@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pandas as pd
@@ -10,14 +10,25 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from chipglow.analysis.single import BELOW, RANDOM, SATURATED
-from chipglow.quantities import Array, Brief, setting_at
+from chipglow.quantities import Array, Brief, Quantity, setting_at
 from chipglow.scene import Scene
 from chipglow.study.budgets import check_draws, errors_of, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
 from chipglow.study.schema import Study
-from chipglow.study.sweeps import Method, axis, in_si, point_text, points_of, studies_at
-from chipglow.text import Notes
+from chipglow.study.sweeps import (
+    Method,
+    axis,
+    in_si,
+    point_text,
+    points_of,
+    quantity_of,
+    studies_at,
+)
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Input, Inputs
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _KEPT: Final = 4
 """A round keeps one setting of this many, and draws this many times as often."""
@@ -49,6 +60,8 @@ class Design(Brief):
         Why a setting, by its number, is impossible or beyond a limit.
     notes : Notes
         Assumptions and warnings.
+    quantities : mapping
+        Quantity of each varied setting by its path; None without a unit.
     """
 
     settings: tuple[Mapping[str, Any], ...]
@@ -60,6 +73,7 @@ class Design(Brief):
     draws: NDArray[np.int64]
     reasons: Mapping[int, str]
     notes: Notes
+    quantities: Mapping[str, Quantity | None]
 
     @property
     def objectives(self) -> Array:
@@ -115,6 +129,18 @@ class Design(Brief):
         )
         order = np.lexsort([frame.regret_K, frame.excluded != ""])
         return frame.iloc[order]
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw bias and uncertainty of each setting, the Pareto front, and the best setting.
+
+        New axes are made by default.
+        """
+        from chipglow.study.design_figure import plot_design
+
+        return plot_design(self, ax)
+
+    def _repr_html_(self) -> str:
+        return result_html("Design", self.to_frame(), self.notes)
 
 
 def design(
@@ -176,6 +202,7 @@ def design(
     unique = [n for n, one in enumerate(settings) if one not in settings[:n]]
     labels = ["own settings", *map(point_text, points)]
     cases = {labels[n]: studies[n] for n in unique}
+    quantities = {path: quantity_of(study, path) for path in axes}
     with fitted_study(study, progress, False) as fitted:
         search = _Search(cases, fitted.scene, tuple(at), study.seed)
         counts = [draws]
@@ -190,7 +217,7 @@ def design(
         notes = fitted.notes + Notes(_inputs(study).truncated)
     if any(path.startswith("cutting.") for path in study.uncertainty.inputs):
         notes = notes + Notes(["The scene is exact: uncertain settings of the cut are left out."])
-    return search.result([settings[n] for n in unique], below, saturated, notes)
+    return search.result([settings[n] for n in unique], below, saturated, notes, quantities)
 
 
 class _Search:
@@ -249,14 +276,19 @@ class _Search:
         """Return the numbers of the best settings, and the study's own; at first all."""
         if not self.numbers:
             return list(range(len(self.studies)))
-        found = self.result([{}] * len(self.studies), below, saturated, Notes())
+        found = self.result([{}] * len(self.studies), below, saturated, Notes(), {})
         allowed = np.array([n not in found.reasons for n in range(len(self.studies))])
         ranks = _ranks(found.objectives, allowed)
         order = np.lexsort([found.objectives.sum(axis=1), ranks, ~allowed])
         return sorted({0, *(n for n in order[:count].tolist() if allowed[n])})
 
     def result(
-        self, settings: Sequence[Mapping[str, Any]], below: float, saturated: float, notes: Notes
+        self,
+        settings: Sequence[Mapping[str, Any]],
+        below: float,
+        saturated: float,
+        notes: Notes,
+        quantities: Mapping[str, Quantity | None],
     ) -> Design:
         """Return bias, uncertainty and excluded settings as they are known."""
         shape = len(settings), len(self.names)
@@ -276,7 +308,18 @@ class _Search:
                     reasons[n] = f"{self.labels[n]}: {worst}: {parts.max():.0%} of it is {state}"
             if not np.isfinite(bias[n]).all():
                 reasons[n] = f"{self.labels[n]}: a place is not in every image"
-        return Design(tuple(settings), self.names, bias, spread, lost, full, draws, reasons, notes)
+        return Design(
+            settings=tuple(settings),
+            readings=self.names,
+            bias=bias,
+            expanded_uncertainty=spread,
+            below=lost,
+            saturated=full,
+            draws=draws,
+            reasons=reasons,
+            notes=notes,
+            quantities=quantities,
+        )
 
 
 def _inputs(study: Study) -> Inputs:

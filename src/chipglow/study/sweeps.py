@@ -3,13 +3,13 @@
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache, cached_property
 from hashlib import sha256
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import pandas as pd
@@ -20,10 +20,14 @@ from scipy.stats import qmc
 from chipglow.analysis import Analysis, headlines
 from chipglow.io.atomic import atomic_path, exclusive
 from chipglow.io.digest import content_digest
-from chipglow.quantities import adapter, changed, setting_at
+from chipglow.quantities import Quantity, adapter, changed, setting_at
 from chipglow.study.running import Progress, cut, is_cut, run, scene_inputs
 from chipglow.study.schema import Study
 from chipglow.study.workers import Client, local_client, on_client
+from chipglow.text import Notes, result_html
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Method: TypeAlias = Literal["grid", "latin-hypercube", "sobol"]
 """All combinations of the values, or samples between the first and the last value."""
@@ -58,6 +62,8 @@ class Sweep:
         Names of the points' files: digests of study, scene and version.
     is_grid : bool
         Whether the points are all combinations of the values.
+    quantities : mapping
+        Quantity of each varied setting by its path; None without a unit.
     """
 
     folder: Path
@@ -65,6 +71,7 @@ class Sweep:
     settings: tuple[Mapping[str, Any], ...]
     keys: tuple[str, ...]
     is_grid: bool
+    quantities: Mapping[str, Quantity | None]
 
     @classmethod
     def open(cls, folder: str | Path) -> "Sweep":
@@ -80,7 +87,11 @@ class Sweep:
         """Return the sweep that a text like that of `DESCRIPTION` states."""
         stated = json.loads(text)
         points, keys = tuple(stated["settings"]), tuple(stated["keys"])
-        return cls(folder, stated["axes"], points, keys, stated["is_grid"])
+        quantities = {
+            path: None if one is None else Quantity(**one)
+            for path, one in stated["quantities"].items()
+        }
+        return cls(folder, stated["axes"], points, keys, stated["is_grid"], quantities)
 
     @cached_property
     def records(self) -> tuple[Mapping[str, Any] | None, ...]:
@@ -110,6 +121,29 @@ class Sweep:
         names = [*(f"{number}_K" for number in NUMBERS), *FRACTIONS]
         frame = pd.DataFrame(rows, columns=["point", *self.axes, "reading", *names])
         return frame.astype(dict.fromkeys(names, np.float64))
+
+    def plot(self) -> "Figure":
+        """Draw the error of each reading over the settings: a curve, or a map over two.
+
+        Returns a figure, as each reading has its own panels.
+
+        Raises
+        ------
+        ValueError
+            If no point is computed.
+        """
+        from chipglow.study.sweep_figure import draw_sweep
+
+        data = self.to_xarray()
+        if not data.sizes["reading"]:
+            raise ValueError("sweep: no point is computed, so there is nothing to draw")
+        return draw_sweep(data, self.quantities)
+
+    def _repr_html_(self) -> str:
+        warnings = [f"Point {index} failed: {reason}" for index, reason in self.failed.items()]
+        if self.missing:
+            warnings.append(f"{len(self.missing)} of {len(self.keys)} points are not computed yet.")
+        return result_html("Sweep", self.to_frame(), Notes(warnings=warnings))
 
     def to_xarray(self) -> xr.Dataset:
         """Return `NUMBERS` in K and `FRACTIONS` over settings and ``reading``; NaN if unknown.
@@ -202,6 +236,7 @@ def sweep(
     study = changed(study, {"analysis.psf_widths": ("8 um",), "attribution": None})
     studies = studies_at(study, points)
     settings = [{path: in_si(study, path, one[path]) for path in one} for one in points]
+    quantities = {path: quantity_of(study, path) for path in axes}
     digest = cache(content_digest)  # each file is read once
     keys = [_key(one, at, digest) for one in studies]
     description = {
@@ -209,6 +244,7 @@ def sweep(
         "settings": settings,
         "keys": keys,
         "is_grid": method == "grid",
+        "quantities": {path: one and asdict(one) for path, one in quantities.items()},
     }
     text = json.dumps(description, indent=1)
     _check_folder(folder)
@@ -353,11 +389,19 @@ def point_text(point: Mapping[str, Any]) -> str:
 
 def in_si(study: Study, path: str, value: Any) -> Any:
     """Return the value of a setting in SI; as it was given without a unit or if it is a range."""
+    quantity = quantity_of(study, path)
     try:
-        quantity = setting_at(study, path).parameter.quantity
         return quantity.parse(value) if quantity and isinstance(value, str) else value
-    except (LookupError, ValueError):
+    except ValueError:
         return value
+
+
+def quantity_of(study: Study, path: str) -> Quantity | None:
+    """Return the quantity of a setting; None without a unit, or if the study lacks the setting."""
+    try:
+        return setting_at(study, path).parameter.quantity
+    except LookupError:
+        return None
 
 
 def _key(

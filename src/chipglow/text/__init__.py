@@ -14,6 +14,7 @@ from chipglow.text.named_table import (
     has_names_of_columns as has_names_of_columns,
     read_named_table as read_named_table,
 )
+from chipglow.text.notebook import result_html as result_html
 from chipglow.text.notes import Notes as Notes
 from chipglow.text.own_data import check_own_data as check_own_data
 from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
 from math import isfinite, nan, sqrt
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,11 @@ from chipglow.laboratory.chip.tool_position import (
 )
 from chipglow.quantities import Array, Brief
 from chipglow.scene import Line, Tool, sample
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, to_xarray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 POSITION: Final = "position"
 """Name of the component of uncertainty that the place of a curve makes."""
@@ -115,6 +118,18 @@ class BandProfile(Brief):
         }
         table = budget_table(self.to_dataset(), names, self.estimate, BAND_BUDGET)
         return table.dropna(subset="x_um", ignore_index=True)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the temperature along the band in °C, one curve for each frame.
+
+        New axes are made by default.
+        """
+        from chipglow.laboratory.chip.figures import plot_band_profile
+
+        return plot_band_profile(self, ax)
+
+    def _repr_html_(self) -> str:
+        return result_html("BandProfile", self.to_frame(), self.notes)
 
     def to_dataset(self) -> xr.Dataset:
         """Return every point of each frame's band as arrays in SI units."""

@@ -1,11 +1,11 @@
 """Analysis grid and shear band on the image, and their profiles (the paper's Figures 7 and 9)."""
 
-from typing import Final
+from typing import Any, Final
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing, scales
@@ -40,10 +40,19 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _draw_grid(figure, left, measurement, grid)
         _draw_profiles(right, grid)
-        partly = ((grid.frame_count > 0) & (grid.frame_count < grid.times.size)).any()
-        title = "depth into the chip" + "; hollow: usable in some frames only" * bool(partly)
-        figure.legend(loc="outside lower right", ncols=grid.depth.size, title=title)
+        right.set_title(f"b) profiles\n{_bars(grid)}")
+        figure.legend(loc="outside lower right", ncols=grid.depth.size, title=_depths(grid))
     return figure
+
+
+def plot_rake_grid(grid: RakeGrid, ax: Axes | None) -> Axes:
+    """Draw the profiles of a grid along the rake face."""
+    with drawing.style():
+        axes = drawing.axes_or_new(ax)
+        _draw_profiles(axes, grid)
+        axes.set_title(_bars(grid))
+        axes.legend(title=_depths(grid), ncols=2)
+    return axes
 
 
 def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeGrid) -> None:
@@ -86,47 +95,70 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
         hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
         axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
     axes.set(xlabel="distance along the rake face / µm", ylabel="radiance temperature / °C")
+
+
+def _bars(grid: RakeGrid) -> str:
+    """Return what the bars and bands of the profiles show."""
     over = f"between {grid.times.size} frames" if grid.times.size > 1 else "in a square"
     bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
-    axes.set_title(f"b) profiles\nbars: standard deviation {over}{bands}")
+    return f"bars: standard deviation {over}{bands}"
+
+
+def _depths(grid: RakeGrid) -> str:
+    """Return the title of the legend of the profiles."""
+    partly = ((grid.frame_count > 0) & (grid.frame_count < grid.times.size)).any()
+    return "depth into the chip" + "; hollow: usable in some frames only" * bool(partly)
 
 
 def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile) -> Figure:
     """Draw the curves on the image of the reference, and the temperature along them."""
-    first, last = profile.times[[0, -1]]
-    colours = _COLOURS((profile.times - first) / max(last - first, 1e-12))
     with drawing.style():
         figure = drawing.new_figure(_BAND_HEIGHT)
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
-        _draw_curves(figure, left, measurement, tool, profile, colours)
-        for frame, colour in enumerate(colours):
-            _draw_profile(right, profile, frame, colour)
-        right.set_xlabel("distance from the cutting edge / µm")
-        right.set_ylabel("radiance temperature / °C")
+        _draw_curves(figure, left, measurement, tool, profile)
+        handles = _draw_along(figure, right, profile)
         right.set_title("b) along the band, ± 1 standard uncertainty")
-        if profile.times.size > _MOST_NAMES:
-            handles = [
-                right.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
-                for s in Stage
-                if s in profile.stage and s is not Stage.NONE
-            ]
-            # Too many curves to name each: a colour bar shows their times.
-            span = matplotlib.colors.Normalize(1e6 * first, 1e6 * last)
-            key = matplotlib.cm.ScalarMappable(span, _COLOURS)
-            figure.colorbar(key, ax=right, label="time / µs", aspect=25)
-        else:
-            handles = right.get_legend_handles_labels()[0]
         figure.legend(handles=handles, loc="outside lower center", ncols=_LEGEND_COLUMNS)
     return figure
 
 
+def plot_band_profile(profile: BandProfile, ax: Axes | None) -> Axes:
+    """Draw the temperature along the band in each frame."""
+    with drawing.style():
+        axes = drawing.axes_or_new(ax)
+        handles = _draw_along(axes.figure, axes, profile)
+        axes.set_title("along the shear band, ± 1 standard uncertainty")
+        axes.legend(handles=handles)
+    return axes
+
+
+def _colours(profile: BandProfile) -> Array:
+    """Return the colour of each frame by its time, shape (frames, 4)."""
+    first, last = profile.times[[0, -1]]
+    return np.asarray(_COLOURS((profile.times - first) / max(last - first, 1e-12)))
+
+
+def _draw_along(figure: FigureBase, axes: Axes, profile: BandProfile) -> list[Any]:
+    """Draw the temperature along the band in each frame; return what the legend names."""
+    for frame, colour in enumerate(_colours(profile)):
+        _draw_profile(axes, profile, frame, colour)
+    axes.set_xlabel("distance from the cutting edge / µm")
+    axes.set_ylabel("radiance temperature / °C")
+    if profile.times.size <= _MOST_NAMES:
+        return list(axes.get_legend_handles_labels()[0])
+    # Too many curves to name each: a colour bar shows their times.
+    span = matplotlib.colors.Normalize(*(1e6 * profile.times[[0, -1]]))
+    key = matplotlib.cm.ScalarMappable(span, _COLOURS)
+    figure.colorbar(key, ax=axes, label="time / µs", aspect=25)
+    return [
+        axes.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
+        for s in Stage
+        if s in profile.stage and s is not Stage.NONE
+    ]
+
+
 def _draw_curves(
-    figure: Figure,
-    axes: Axes,
-    measurement: Measurement,
-    tool: Tool,
-    profile: BandProfile,
-    colours: Array,
+    figure: Figure, axes: Axes, measurement: Measurement, tool: Tool, profile: BandProfile
 ) -> None:
     away = np.abs(profile.offset)
     frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
@@ -134,7 +166,7 @@ def _draw_curves(
     image = measurement.data["radiance_temperature"][number].values - ZERO_CELSIUS
     title = f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference"
     _panel(title, image).draw(figure, axes, measurement.raster, tool, "bottom")
-    for points, colour in zip(profile.points, colours, strict=True):
+    for points, colour in zip(profile.points, _colours(profile), strict=True):
         axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
     drawing.draw_line(axes, profile.reference.points, scales.BLUE)
     drawing.crop(axes, profile.points, measurement.raster, _AROUND)

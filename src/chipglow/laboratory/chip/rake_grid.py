@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
@@ -32,8 +32,11 @@ from chipglow.laboratory.chip.tool_position import (
 from chipglow.quantities import Array, Brief
 from chipglow.scene import Raster, Tool
 from chipglow.scene.tool_outline import tool_attributes
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, to_xarray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PIXELS: Final = 3.0
 """Side of the paper's squares in pixels."""
@@ -115,6 +118,18 @@ class RakeGrid(Brief):
             **{"standard_deviation": "standard_deviation_K", "count": "usable_pixels"},
         }
         return budget_table(self.to_dataset(), names, self.estimate, RAKE_BUDGET)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the mean over the frames along the rake face in °C, one curve for each depth.
+
+        New axes are made by default.
+        """
+        from chipglow.laboratory.chip.figures import plot_rake_grid
+
+        return plot_rake_grid(self, ax)
+
+    def _repr_html_(self) -> str:
+        return result_html("RakeGrid", self.to_frame(), self.notes)
 
     def to_dataset(self) -> xr.Dataset:
         """Return every square of every frame as arrays in SI units."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isnan, nan, radians, sqrt
-from typing import Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,11 @@ from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part, uncertainty_text
 from chipglow.quantities.units import LENGTH, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Tool, sample
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Component, Estimate, draw
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COVERAGE: Final = 2.0
 """Factor between standard and expanded uncertainty: about 95 %."""
@@ -110,6 +113,18 @@ class Comparison(Brief):
         """Return every value of each simulation; one row each."""
         readings = [one for one in (self.grid, self.band) if one is not None]
         return pd.concat([one.to_frame(self.labels) for one in readings], ignore_index=True)
+
+    def plot(self) -> "Figure":
+        """Draw measured and simulated temperatures, and their differences with uncertainties.
+
+        Returns a figure, as it has several panels.
+        """
+        from chipglow.laboratory.comparison.figure import draw_comparison
+
+        return draw_comparison(self)
+
+    def _repr_html_(self) -> str:
+        return result_html("Comparison", self.fits, self.notes)
 
     @property
     def best(self) -> pd.DataFrame:

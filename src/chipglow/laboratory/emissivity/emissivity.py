@@ -5,9 +5,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from math import hypot, inf, isfinite, nan, sqrt
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera import Flag, Measurement
@@ -29,7 +30,11 @@ from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part
 from chipglow.quantities.units import KELVINS, TEMPERATURE_DIFFERENCE
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, propagate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 COMMON: Final = ("reference", "reflected", "calibration")
 """Causes of error common to all pixels, frames and images."""
@@ -157,6 +162,28 @@ class EmissivityMap(Brief):
             degrees_of_freedom=count - 1.0,
             pooled=False,
         )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return every pixel, row by row from the top left; NaN where flagged."""
+        x, y = np.moveaxis(self.raster.centres, -1, 0)
+        columns = {
+            "x_um": 1e6 * x,
+            "y_um": 1e6 * y,
+            "emissivity": self.emissivity,
+            "standard_uncertainty": self.estimate.standard_uncertainty,
+            "radiance_temperature_degC": self.radiance_temperature - ZERO_CELSIUS,
+        }
+        return pd.DataFrame({name: values.ravel() for name, values in columns.items()})
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the emissivity over x and y; flagged pixels are grey. New axes by default."""
+        from chipglow.laboratory.emissivity.figure import plot_emissivity_map
+
+        return plot_emissivity_map(self, ax)
+
+    def _repr_html_(self) -> str:
+        notes = Notes(warnings=list(self.estimate.warnings))
+        return result_html("EmissivityMap", self.to_frame(), notes)
 
     def of(self, area: Area) -> "RegionEmissivity":
         """Compute the mean emissivity of an area."""

@@ -1,6 +1,6 @@
 """Figure of an emissivity determination: image, regions, map and lines."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import cycle
 from typing import Any, Final
 
@@ -12,6 +12,8 @@ from matplotlib.patheffects import withStroke
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
+from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
+from chipglow.laboratory.emissivity.temperature import RegionTemperatures
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Raster, Region
 
@@ -19,6 +21,8 @@ _PANEL_WIDTH: Final = 2.7
 _AROUND: Final = 0.75
 _LINES: Final = 2.6
 _SLENDER: Final = 3.0
+_BESIDE: Final = 0.2
+"""Margin beside the first and the last region, in widths of the axes."""
 
 
 def draw_emissivity(
@@ -27,11 +31,10 @@ def draw_emissivity(
     """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
     temperature = found.radiance_temperature - ZERO_CELSIUS
-    heat, values = (scales.ends(one, 0.5, 99.5) for one in (temperature, found.emissivity))
-    title = f"emissivity, object at {found.heating.reference - ZERO_CELSIUS:.4g} °C"
+    heat = scales.ends(temperature, 0.5, 99.5)
     panels = (
         ImagePanel("radiance temperature", "°C", temperature, heat, scales.HEAT),
-        ImagePanel(title, "emissivity", found.emissivity, values),
+        _emissivity_panel(found),
     )
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
     with drawing.style():
@@ -42,8 +45,67 @@ def draw_emissivity(
             axes.label_outer()
             _draw_regions(axes, regions, raster, named=panel is panels[0])
         if lines:
-            _draw_lines(parts[1].subplots(), lines, _colours(regions))
+            colours = _colours(regions)
+            _draw_lines(parts[1].subplots(), lines, [colours[line.feature] for line in lines])
     return figure
+
+
+def plot_emissivity_map(found: EmissivityMap, ax: Axes | None) -> Axes:
+    """Draw the emissivity of every pixel."""
+    with drawing.style():
+        axes = drawing.axes_or_new(ax, "compressed")
+        _emissivity_panel(found).draw(axes.figure, axes, found.raster)
+    return axes
+
+
+def plot_region_emissivities(found: RegionEmissivities, ax: Axes | None) -> Axes:
+    """Draw the emissivity of each region, over the temperature if there are several."""
+    with drawing.style():
+        axes = drawing.axes_or_new(ax)
+        if found.lines:
+            _draw_lines(axes, found.lines, scales.COLOURS)
+            return axes
+        (rows,) = found.rows
+        names, means = [row.name for row in rows], np.array([row.mean for row in rows])
+        expanded = np.array([2 * float(row.estimate.standard_uncertainty) for row in rows])
+        axes.errorbar(names, means, expanded, fmt="o", markersize=4, capsize=3, color=scales.BLUE)
+        axes.margins(x=_BESIDE)
+        celsius = found.maps[0].heating.reference - ZERO_CELSIUS
+        axes.set_title(f"object at {celsius:.4g} °C; bars: 2 standard uncertainties")
+        axes.set(xlabel="region", ylabel="emissivity")
+    return axes
+
+
+def plot_region_temperatures(found: RegionTemperatures, ax: Axes | None) -> Axes:
+    """Draw the true temperature of each region with its interval, and what the camera shows."""
+    rows = found.rows
+    names = [row.name for row in rows]
+    true = np.array([float(row.estimate.values) for row in rows])
+    low, high = (
+        np.array([float(getattr(row.distribution, end)) for row in rows]) for end in ("low", "high")
+    )
+    measured = np.array([row.radiance_temperature for row in rows])
+    with drawing.style():
+        axes = drawing.axes_or_new(ax)
+        middle, half = (high + low) / 2 - ZERO_CELSIUS, (high - low) / 2
+        axes.errorbar(names, middle, half, fmt="none", capsize=3, color=scales.VERMILLION)
+        for kelvins, label, marker, colour in (
+            (true, "true temperature, 95 % interval", "o", scales.VERMILLION),
+            (measured, "radiance temperature", "s", scales.GREY),
+        ):
+            axes.plot(
+                names, kelvins - ZERO_CELSIUS, marker, markersize=5, color=colour, label=label
+            )
+        axes.margins(x=_BESIDE)
+        axes.set(xlabel="region", ylabel="temperature / °C")
+        axes.legend()
+    return axes
+
+
+def _emissivity_panel(found: EmissivityMap) -> ImagePanel:
+    title = f"emissivity, object at {found.heating.reference - ZERO_CELSIUS:.4g} °C"
+    limits = scales.ends(found.emissivity, 0.5, 99.5)
+    return ImagePanel(title, "emissivity", found.emissivity, limits)
 
 
 def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: bool) -> None:
@@ -69,9 +131,8 @@ def _colours(regions: Sequence[Region]) -> dict[str, str]:
     return dict(zip(features, cycle(scales.COLOURS), strict=False))
 
 
-def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[str, str]) -> None:
-    for line in lines:
-        colour = colours[line.feature]
+def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Sequence[str]) -> None:
+    for line, colour in zip(lines, cycle(colours), strict=False):
         celsius = np.array(line.temperatures) - ZERO_CELSIUS
         axes.errorbar(
             celsius,

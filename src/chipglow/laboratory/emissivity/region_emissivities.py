@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,10 @@ from chipglow.laboratory.emissivity.observations import check_same_pixels, uncer
 from chipglow.quantities import ZERO_CELSIUS, Brief
 from chipglow.scene import Region, areas, shared_pixels
 from chipglow.surface import Origin
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,6 +47,18 @@ class RegionEmissivities(Brief):
     def to_frame(self) -> pd.DataFrame:
         """Return every region at every temperature; one row each."""
         return pd.DataFrame(_row(row) for of in self.rows for row in of)
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the mean emissivity of each region with 2 standard uncertainties.
+
+        With several heatings, over the true temperature. New axes are made by default.
+        """
+        from chipglow.laboratory.emissivity.figure import plot_region_emissivities
+
+        return plot_region_emissivities(self, ax)
+
+    def _repr_html_(self) -> str:
+        return result_html("RegionEmissivities", self.to_frame(), self.notes)
 
     def line_frame(self) -> pd.DataFrame:
         """Return the emissivity over the temperature; a row for each region."""

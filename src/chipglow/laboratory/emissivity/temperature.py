@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf, isnan, sqrt
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from uuid import uuid4
 
 import numpy as np
@@ -32,8 +32,11 @@ from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import HOTTEST
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Region, areas
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Estimate, Limits, MonteCarlo, monte_carlo, propagate
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TEMPERATURE_BUDGET: Final = (*COMMON, "emissivity", "drift", UNIFORMITY, "repeatability", "noise")
 """Lines of the budget of a true temperature."""
@@ -207,6 +210,18 @@ class RegionTemperatures:
             }
             for row in self.rows
         )
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw true temperature with its 95 % interval, and radiance temperature, by region.
+
+        New axes are made by default.
+        """
+        from chipglow.laboratory.emissivity.figure import plot_region_temperatures
+
+        return plot_region_temperatures(self, ax)
+
+    def _repr_html_(self) -> str:
+        return result_html("RegionTemperatures", self.to_frame(), self.notes)
 
 
 def true_temperatures(

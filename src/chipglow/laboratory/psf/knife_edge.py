@@ -8,7 +8,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, cosh, degrees, exp, hypot, log, sqrt
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
@@ -43,9 +43,12 @@ from chipglow.laboratory.psf.psf_models import (
 )
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
 from chipglow.quantities import Array, Brief
-from chipglow.text import Notes
+from chipglow.text import Notes, result_html
 from chipglow.uncertainty import Cause, Component
 from chipglow.uncertainty.estimate import factor
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FIT: Final = "psf fit"
 """Name of the component that the noise of the images makes."""
@@ -156,6 +159,18 @@ class KnifeEdge:
             }
             for fit, weight in zip(self.fits, self.weights, strict=True)
         )
+
+    def plot(self) -> "Figure":
+        """Draw images, edge- and line-spread functions with the best fit, and the MTF.
+
+        Returns a figure, as it has several panels.
+        """
+        from chipglow.laboratory.psf.figure import draw_knife_edge
+
+        return draw_knife_edge(self)
+
+    def _repr_html_(self) -> str:
+        return result_html("KnifeEdge", self.to_frame(), self.notes)
 
     def edge_frame(self) -> pd.DataFrame:
         """Return the images; one row each."""

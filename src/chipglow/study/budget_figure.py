@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from chipglow.drawing import drawing, scales
-from chipglow.study import StudyBudget
-from chipglow.study.budgets import CAMERA, SCENE, SURFACE
+from chipglow.study.budgets import CAMERA, SCENE, SURFACE, StudyBudget
 
 _LARGEST: Final = 6
 _HEIGHT: Final = 0.22

@@ -4,15 +4,33 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing, scales
 from chipglow.quantities import Quantity, value_text
-from chipglow.study import Design
+from chipglow.study.design import Design
 
 
-def draw_design(result: Design, quantities: Mapping[str, Quantity | None]) -> Figure:
+def draw_design(result: Design) -> Figure:
     """Draw every setting by bias and uncertainty, the Pareto front, and the best setting."""
+    with drawing.style():
+        figure = drawing.new_figure(4.2)
+        _draw_settings(figure.subplots(), result)
+        figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def plot_design(result: Design, ax: Axes | None) -> Axes:
+    """Draw the same on axes, with the legend in them."""
+    with drawing.style():
+        axes = drawing.axes_or_new(ax)
+        _draw_settings(axes, result)
+        axes.legend()
+    return axes
+
+
+def _draw_settings(axes: Axes, result: Design) -> None:
     bias, uncertainty = result.objectives.T
     excluded = [number in result.reasons for number in range(len(bias))]
     front = sorted(result.is_pareto.nonzero()[0].tolist(), key=lambda number: bias[number])
@@ -27,19 +45,15 @@ def draw_design(result: Design, quantities: Mapping[str, Quantity | None]) -> Fi
     }
     if result.best is not None:
         best = result.settings[result.best]
-        name = "best: " + ", ".join(setting_text(path, best[path], quantities) for path in best)
+        texts = (setting_text(path, best[path], result.quantities) for path in best)
+        name = f"best: {', '.join(texts)}"
         marks[name] = ([result.best], {"marker": "*", "color": scales.VERMILLION, "markersize": 14})
-    with drawing.style():
-        figure = drawing.new_figure(4.2)
-        panel = figure.subplots()
-        for label, (chosen, style) in marks.items():
-            x, y = bias[chosen], uncertainty[chosen]
-            if np.isfinite(x).any():
-                panel.plot(x, y, label=label, **{"linestyle": "none", **style})
-        panel.set_xlabel("magnitude of the bias / K")
-        panel.set_ylabel("expanded uncertainty (k = 2) / K")
-        figure.legend(loc="outside lower center", ncols=2)
-    return figure
+    for label, (chosen, style) in marks.items():
+        x, y = bias[chosen], uncertainty[chosen]
+        if np.isfinite(x).any():
+            axes.plot(x, y, label=label, **{"linestyle": "none", **style})
+    axes.set_xlabel("magnitude of the bias / K")
+    axes.set_ylabel("expanded uncertainty (k = 2) / K")
 
 
 def setting_text(path: str, value: object, quantities: Mapping[str, Quantity | None]) -> str:
