@@ -43,7 +43,7 @@ PAPER_FIGURES = {
     "figure-11-error-lines": "Figure 11",
 }
 FIGURES = {
-    *PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness", "bands",
+    *PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness",
     "attribution", "attribution-lines",
 }  # fmt: skip
 PAPERS = Study()
@@ -544,7 +544,7 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, undrawn, tmp_pa
     assert row.one_draw == one_draw(result.data, "rake").error
     assert "outside the image" in row.explanation
     names = {path.stem for path in (tmp_path / "figures").iterdir()}
-    assert names == FIGURES - {"figure-2-psf", "forces", "bands"}
+    assert names == FIGURES - {"figure-2-psf", "forces"}
     assert "failed" not in Page((tmp_path / "report.html").read_text(encoding="utf-8")).text
     assert "segment_period_us" not in {row.key for row in result_rows(bare)}
     forces = result.cut.forces

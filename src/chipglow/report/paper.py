@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 _TEXTS: Final = texts("paper")
 SOFTWARE: Final[str] = template(_TEXTS["software"]).render(version=__version__)
 CITATION: Final[str] = _TEXTS["citation"]
-BAND_KEYS: Final = ("band_error_degC", "band_worst_error_degC", "band_psf_fraction_percent")
-"""Rows of the three numbers on the shear band."""
 
 QUICK: Final[str] = _TEXTS["quick"]
 """Remark on the quick study."""

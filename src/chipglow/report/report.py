@@ -60,7 +60,6 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "attribution-lines": attribution.profiles,
     "over-time": figures.over_time,
     "psf-sensitivity": figures.psf_sensitivity,
-    "bands": cut_figures.bands,
     "forces": cut_figures.forces,
     "chip-thickness": cut_figures.chip_thickness,
 }
