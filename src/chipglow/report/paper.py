@@ -44,9 +44,6 @@ PAPER: Final[Mapping[str, PaperValue]] = {
 }
 """The values of Heigel and Whitenton (2010) that a study is compared with, by the report's rows."""
 
-RAKE_MISSING: Final = PaperValue(**_TEXTS["rake_missing"])
-"""Difference of the paper's measured and simulated profile at the rake face, in K."""
-
 FIGURES: Final[Mapping[str, tuple[str, str]]] = _TEXTS["figures"]
 """The figures of the paper by the report's figures, and what is the same and different."""
 

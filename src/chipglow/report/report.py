@@ -19,7 +19,6 @@ from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
 from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
-from chipglow.report.steady_tool import tool_rows
 from chipglow.report.summary import Summary, summary
 from chipglow.report.tables import tables
 from chipglow.text import json_schema
@@ -74,7 +73,6 @@ def write_report(
     provenance: Mapping[str, str],
     remarks: Sequence[str] = (),
     study: Any = None,
-    steady: Analysis | None = None,
 ) -> Path:
     """Write the results of an analysis into a folder.
 
@@ -97,8 +95,6 @@ def write_report(
         Assumptions and warnings to consider before quoting a number, one sentence each.
     study : chipglow.study.Study, optional
         The study; the paper's values are shown if it is the paper's.
-    steady : Analysis, optional
-        Analysis of the same study with a steady tool, for comparison.
 
     Returns
     -------
@@ -113,11 +109,10 @@ def write_report(
     """
     facts = Facts(analysis, study)
     rows = all_rows(facts)
-    tool = tool_rows(analysis, steady) if steady else []
     (folder / "study.yaml").write_text(study_text, encoding="utf-8")
     _write_arrays(analysis.data, provenance, folder / "results.nc")
     attributed = attribution.contributions(facts)
-    _write_numbers(summary(rows, tool, analysis, provenance, attributed), folder)
+    _write_numbers(summary(rows, analysis, provenance, attributed), folder)
     (folder / "figures").mkdir()
     values = {
         "title": title,
@@ -130,12 +125,10 @@ def write_report(
         "camera_settings": facts.settings,
         "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
-        **tables(facts, rows, tool),
+        **tables(facts, rows),
         "scene": study.scene if study else None,
-        "is_quick": facts.is_compared and study == type(study).quick(),
         "software": paper.SOFTWARE,
         "citation": paper.CITATION,
-        "rake_missing": paper.RAKE_MISSING,
         "version": __version__,
     }
     path = folder / "report.html"
