@@ -124,6 +124,32 @@ def measurement(facts: Facts) -> Figure:
     return figure
 
 
+def exposure(facts: Facts) -> Figure:
+    """Draw reference, measurement and error of the shown exposure, and where errors are read."""
+    analysis, names = facts.analysis, facts.read_surfaces
+    shown = facts.data.isel(instant=facts.data.attrs["shown_instant"]).sel(surface=names)
+    reference = shown.reference_temperature - KELVIN
+    measured = shown.radiance_temperature - KELVIN
+    error = measured - reference
+    heat = facts.heat_limits(reference.values)
+    largest = scales.round_limit(error.values, 99.0, 10.0)
+    figure = drawing.image_figure(analysis.raster, 2.2, rows=len(names))
+    rows = figure.subplots(len(names), 3, sharex=True, sharey=True, squeeze=False)
+    for row, name in zip(rows, names, strict=True):
+        panels = (
+            ("reference", reference, "temperature / °C", heat, scales.HEAT),
+            ("measured", measured, "temperature / °C", heat, scales.HEAT),
+            ("error", error, "error / K", (-largest, largest), scales.SIGNED),
+        )
+        for axes, (title, images, label, limits, colours) in zip(row, panels, strict=True):
+            image = images.sel(surface=name).values.astype(np.float64)
+            panel = ImagePanel(of_surface(facts, title, name), label, image, limits, colours)
+            panel.draw(figure, axes, analysis.measurements[name].raster, analysis.tool, "bottom")
+            _draw_marks(axes, facts)
+            axes.label_outer()
+    return figure
+
+
 def error_images(facts: Facts) -> Figure:
     """Draw the error and the contribution of the PSF to it, with the places of the readings."""
     analysis, names = facts.analysis, facts.read_surfaces

@@ -17,7 +17,6 @@ from chipglow.report import attribution, cut_figures, figures, paper
 from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
-from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
 from chipglow.report.summary import Summary, summary
 from chipglow.report.tables import tables
@@ -44,6 +43,7 @@ class Failure(NamedTuple):
 
 
 _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
+    "exposure": figures.exposure,
     "psf": figures.point_spread,
     "heated-chips": cut_figures.heated_chips,
     "heated-tool": cut_figures.heated_tool,
@@ -62,7 +62,7 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "forces": cut_figures.forces,
     "chip-thickness": cut_figures.chip_thickness,
 }
-"""All figures in the order of the paper, then further ones."""
+"""The figure of the answer, all figures in the order of the paper, then further ones."""
 
 
 def write_report(
@@ -123,7 +123,6 @@ def write_report(
         "attribution": list(attribution.sentences(facts)),
         "note": facts.text(texts()["note"]),
         "camera_settings": facts.settings,
-        "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
         **tables(facts, rows),
         "scene": study.scene if study else None,
