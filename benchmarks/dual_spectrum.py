@@ -1,9 +1,8 @@
 """An infrared image and a visible picture of one chip, with a known map between them.
 
-`registration_libraries.py` registers such pairs. The geometry is NIST's (Heigel and Whitenton,
-2010): infrared 160 x 120 pixels of 6 um, and a visible camera with finer pixels that looks through
-the same optics. What is bright differs: infrared by temperature and emissivity, visible by
-reflection and texture.
+The geometry is NIST's (Heigel and Whitenton, 2010): infrared 160 x 120 pixels of 6 um, and a
+visible camera with finer pixels that looks through the same optics. What is bright differs:
+infrared by temperature and emissivity, visible by reflection and texture.
 """
 
 from dataclasses import dataclass, replace
@@ -81,27 +80,6 @@ class DualSpectrum(View):
     band_spacing: float = 130e-6
     tool: Tool = TOOL
     middle = (FINE.left + COLUMNS * PITCH / 2, FINE.top - ROWS * PITCH / 2)
-
-    @classmethod
-    def drawn(cls, seed):
-        """Draw an experiment with random settings.
-
-        The chip's brightness is 0.4 to 1 beside the workpiece's 0.45 and the tool's 0.30.
-        """
-        draw = np.random.default_rng([seed, 3]).uniform
-        return cls(
-            seed,
-            noise=10 ** draw(-3.0, -1.7),
-            visible_noise=draw(1.0, 12.0),
-            pitch=1.5e-6 * draw(0.88, 1.15),
-            turn=radians(draw(-3.5, 3.5)),
-            stretch=draw(0.97, 1.03),
-            shift=(draw(-80.0, 80.0), draw(-60.0, 60.0)),
-            chip_brightness=draw(0.4, 1.0),
-            grain=draw(0.05, 0.25),
-            band_spacing=draw(90e-6, 180e-6),
-            tool=ToolGeometry(rake_angle=radians(draw(-12.0, 6.0))),
-        )
 
     @cached_property
     def infrared(self):

@@ -9,7 +9,17 @@ from chipglow.cutting import workpiece
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.material import ROOM_TEMPERATURE
-from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
+from chipglow.cutting.momentum import (
+    CHANGE_X,
+    CHANGE_Y,
+    NODE_VALUES,
+    SUMS,
+    VELOCITY_VALUES,
+    VELOCITY_X,
+    VELOCITY_Y,
+    Step,
+    advance_with,
+)
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.cutting.recording import held_energy
 from chipglow.scene import ToolGeometry
@@ -48,7 +58,6 @@ class Block:
             heat_mass=mass,
             volume=self.spacing**2,
             time_step=courant * cell / self.sound,
-            kept=1.0,
             shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
             bulk_modulus=float(material.bulk_modulus_at(ROOM_TEMPERATURE)),
             stiffness=50e9,
@@ -94,6 +103,21 @@ class Block:
             self.step_on(now)
             self.force /= now
             steps -= now
+
+    def advance_with_the_grid(self, steps):
+        """Advance points that take the grid's velocity (APIC), with the sums of all steps.
+
+        Points take the change of the grid's velocity: from rest, that is all of it.
+        """
+        self.sort()
+        sums = np.zeros(SUMS)
+        for _ in range(steps):
+            self.points["own_vx"] = self.points["own_vy"] = 0.0
+            self.velocity[..., CHANGE_X] = self.velocity[..., VELOCITY_X]
+            self.velocity[..., CHANGE_Y] = self.velocity[..., VELOCITY_Y]
+            self.step_on(1)
+            sums += self.sums
+        self.sums[:] = sums
 
     def sort(self):
         spare = np.zeros_like(self.points, POINT)

@@ -62,7 +62,6 @@ PROGRAMS = {
         "--draws 2 --angles 45 --study chip.yaml",
         {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
     ),
-    "registration_libraries.py": ("--pairs 1 --only scikit-image", {"| scikit-image |": 5}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 5}),
     "stability.py": ("--seeds 1", {"| normal | 9.9 ": 6, "| noise | 10 ": 6}),
     "sweeps.py": ("--tasks 4 --points 6 --kills 1", {"| 1 |": 4, "| 2 |": 4, "| 6 | ": 6}),
@@ -78,7 +77,6 @@ NEEDED = {
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),
     "rasterise.py": ("pyvista",),
-    "registration_libraries.py": ("skimage",),
     "sweeps.py": ("distributed",),
 }
 # Programs that fork, spawn processes or drive a browser run in a process of their own.

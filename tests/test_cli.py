@@ -164,16 +164,18 @@ def test_a_damaged_scene_in_the_cache_is_computed_again(folder, runs):
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
     seen = []
 
-    def note(study, out, force, resume, agreed, remarks=(), steady_tool=False):
-        seen.append((study, str(out), force, resume, agreed, list(remarks), steady_tool))
+    def note(study, out, force, resume, agreed, remarks=()):
+        seen.append((study, str(out), force, resume, agreed, list(remarks)))
 
     monkeypatch.setattr("chipglow.cli.results.write_results", note)
     chipglow("reproduce", "--steady-tool")
     chipglow("reproduce", "--quick", "--out", "quick", "--resume", "--yes")
     assert seen == [
-        (Study(), "chipglow-paper", False, False, False, [], True),
-        (Study.quick(), "quick", False, True, True, [QUICK], False),
+        (Study().with_steady_tool(), "chipglow-paper", False, False, False, []),
+        (Study.quick(), "quick", False, True, True, [QUICK]),
     ]
+    # The paper's values stand beside those of any tool's temperature.
+    assert seen[0][0].is_papers
 
 
 COMMANDS = typer.main.get_command(app).commands

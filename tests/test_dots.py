@@ -200,7 +200,7 @@ def test_the_command_registers_by_dots(tmp_path, monkeypatch):
     measured = Measurement.from_radiance(radiance, Band(3.8e-6, 5.1e-6), times, RASTER)
     write_measurement(measured, "infrared.nc")
     Image.fromarray(SMALL.visible).save("visible.png")
-    command = "register infrared.nc visible.png --method dots --out map.yaml --overlay over.png"
+    command = "register infrared.nc visible.png --dots --out map.yaml --overlay over.png"
     output = words(typed(command).output)
     assert "Infrared: 19 bright dots with a radius of" in output
     assert "Visible: 19 dark dots with a radius of" in output

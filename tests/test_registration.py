@@ -1,4 +1,4 @@
-"""Infrared on visible: maps from points and from the images, and the clocks of both cameras."""
+"""Infrared on visible: maps from points, and the clocks of both cameras."""
 
 from math import cos, radians, sin
 
@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from camera_files import cine
 from command import refusal, typed, words
-from dual_spectrum import DualSpectrum
 from hypothesis import given, settings, strategies as st
 from PIL import Image
 from scipy.stats import f, t
 
 from chipglow.camera import Measurement
 from chipglow.io import read_measurement, write_measurement
-from chipglow.laboratory.measurement.camera_file import load_measurement
 from chipglow.laboratory.registration import (
     align_times,
-    fit_images,
     fit_points,
     load_registration,
     read_pictures,
@@ -127,59 +124,6 @@ def test_the_warped_image_has_each_sensor_where_the_map_says():
     here = (column >= 0) & (row >= 0) & (column < SHAPE[1]) & (row < SHAPE[0])
     assert here.mean() > 0.2
     assert (warped[row[here], column[here]] == image.ravel()[here]).all()
-
-
-# Images
-
-
-@pytest.fixture(scope="module")
-def cropped(tmp_path_factory):
-    """Files of a part of a pair round the tool's tip, and what the command says of them."""
-    folder = tmp_path_factory.mktemp("cropped")
-    pair, top, left, raster = DualSpectrum(stretch=1.0), 20, 30, RASTER
-    part = Raster(raster.left + left * 6e-6, raster.top - top * 6e-6, 6e-6, 80, 100)
-    whole = pair.infrared
-    measured = Measurement.from_radiance(
-        whole.radiance[:, top : top + 80, left : left + 100], whole.band, whole.times, part
-    )
-    write_measurement(measured, folder / "infrared.nc")
-    visible = pair.visible[4 * top : 4 * (top + 80), 4 * left : 4 * (left + 100)]
-    Image.fromarray(visible).save(folder / "visible.png")
-    files = f"{folder}/infrared.nc {folder}/visible.png --out {folder}/map.yaml"
-    said = typed(f"register {files} --model similarity --method mutual-information").output
-    return folder, pair, np.array([4.0 * left, 4.0 * top]), words(said)
-
-
-def test_images_of_unlike_contrast_come_within_the_stated_uncertainty(cropped):
-    """Through the command: bright flanks and dark gaps beside hot bands and a hot rake face."""
-    folder, pair, corner, output = cropped
-    found = load_registration(folder / "map.yaml")
-    assert (found.method, found.model) == ("mutual-information", "similarity")
-    assert found.notes.warnings == []
-    part = Raster(RASTER.left + 180e-6, RASTER.top - 120e-6, 6e-6, 80, 100)
-    places = np.stack(np.meshgrid(part.x, part.y), axis=-1).reshape(-1, 2)
-    off = found.pixels(places) + corner - pair.pixels(places)
-    error = np.sqrt((off**2).sum(axis=1).mean()) * pair.pitch
-    typical, _ = found.uncertainty(part)
-    # Half a pixel for each of four parameters is in the uncertainty whatever the images say.
-    assert 4e-6 < typical < 9e-6
-    assert error < 2 * typical
-    assert "Warning" not in output
-    assert "Assumed: The visible picture is not mirrored" in output
-    score, chance = (
-        float(output.split(text)[1].split()[0].rstrip(".,"))
-        for text in ("Score of the placement: ", "unrelated images at most ")
-    )
-    assert score > 2 * chance
-
-
-def test_images_of_other_things_are_doubtful(cropped):
-    measured = load_measurement(cropped[0] / "infrared.nc")
-    image = measured.radiance[0].reshape(40, 2, 50, 2).mean(axis=(1, 3))
-    other = np.random.default_rng(4).normal(100.0, 10.0, (80, 100))
-    coarse = Raster(RASTER.left, RASTER.top, 12e-6, 40, 50)
-    found = fit_images(image, coarse, other, "similarity").registration
-    assert "no better than that of unrelated images" in " ".join(found.notes.warnings)
 
 
 # Clocks

@@ -15,22 +15,22 @@ BAR, WIDTH = 600e-6, 40e-6
 MICRO = 1e-6
 
 
-def spinning_block(steps=600, every=20, kept=1.0):
+def spinning_block(advance=Block.advance, steps=600, every=20):
     """Steps, and relative change of momentum (x, y) and angular momentum of a free block."""
-    block = Block((100e-6, 60e-6), kept=kept)
+    block = Block((100e-6, 60e-6))
     block.set_velocity(lambda x, y: 3.0 - SPIN * y, lambda x, y: -2.0 + SPIN * x)
-    block.advance(1)
+    advance(block, 1)
     start = np.array(block.momentum())
     changes = []
     for _ in range(0, steps, every):
-        block.advance(every)
+        advance(block, every)
         changes.append(np.array(block.momentum()) / start - 1.0)
     return np.arange(every, steps + 1, every), np.array(changes)
 
 
 def momentum():
     steps, changes = spinning_block()
-    _, of_the_grid = spinning_block(kept=0.0)
+    _, of_the_grid = spinning_block(Block.advance_with_the_grid)
 
     def draw(figure):
         axes = figure.subplots()

@@ -81,7 +81,6 @@ from .laboratory.psf import (
 from .laboratory.registration import (
     align_times as align_times,
     fit_dots as fit_dots,
-    fit_images as fit_images,
     fit_points as fit_points,
     load_registration as load_registration,
     simultaneous_frames as simultaneous_frames,

@@ -15,8 +15,7 @@ and how far they miss says how surely it is known.
 What you see: the infrared image with the tool's outline and six points, and the visible picture
 with the infrared image laid over it; then both in turns.
 
-Without points the map is found by a target's dots, or by what both images have in common:
-:doc:`/do/registration`.
+Without points the map is found by a target's dots: :doc:`/do/registration`.
 """
 
 import numpy as np

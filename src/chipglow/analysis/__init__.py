@@ -58,13 +58,6 @@ from chipglow.analysis.reductions import (
     with_errors as with_errors,
 )
 from chipglow.analysis.single import SingleReadings as SingleReadings
-from chipglow.analysis.straight_band import (
-    READINGS as READINGS,
-    StraightBand as StraightBand,
-    band_chart as band_chart,
-    band_with as band_with,
-    read_straight_band as read_straight_band,
-)
 from chipglow.analysis.wavelengths import (
     CAUSES as CAUSES,
     Spot as Spot,

@@ -37,6 +37,11 @@ def draw_error(
     raster = analysis.measurements[surface].raster
     panel.draw(figure, axes, raster, analysis.tool)
     drawing.veil(axes, analysis.data.flagged.sel(surface=surface).values, raster)
+    draw_marks(axes, analysis)
+
+
+def draw_marks(axes: Axes, analysis: Analysis) -> None:
+    """Draw the points and lines at which errors are read, and the ridge of the shear band."""
     factor, _ = drawing.length_unit(analysis.raster)
     for points in analysis.read_curves():
         if len(points) == 1:

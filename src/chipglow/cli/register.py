@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from chipglow.laboratory import registration as lab
 
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
-Method: TypeAlias = Literal["points", "dots", "mutual-information"]
 
 
 def register(
@@ -30,17 +29,18 @@ def register(
             "visible_column, visible_row.",
         ),
     ] = None,
-    model: Annotated[Model, typer.Option(help="Type of the map.")] = "affine",
-    method: Annotated[
-        Method | None,
+    dots: Annotated[
+        bool,
         typer.Option(
-            help="Default: points if given, otherwise mutual-information; dots belong to a "
-            "target, e.g. a heated plate with holes."
+            "--dots", help="Use the dots of a target in both, such as a heated plate with holes."
         ),
-    ] = None,
+    ] = False,
     known: Annotated[
         Path | None, opt.value("FILE", "Use a map written by --out, e.g. of a target.", "--map")
     ] = None,
+    model: Annotated[
+        Model, typer.Option(help="Type of the map to fit by points or dots.")
+    ] = "affine",
     tool: Annotated[
         Path | None,
         opt.value(
@@ -83,7 +83,8 @@ def register(
 
     if pairs is not None and align is None:
         raise ValueError("--pairs requires --align")
-    _check_method(method, points, known)
+    if [points is not None, dots, known is not None].count(True) != 1:
+        raise ValueError("expected one of --points FILE, --dots and --map FILE")
     region = None if align is None else _region(align)
     if region and visible_interval is None and visible.suffix.lower() in PICTURE_SUFFIXES:
         raise ValueError(f"--align requires --visible-interval: {visible} contains no times")
@@ -93,16 +94,19 @@ def register(
     _check_frame("--visible-frame", visible_frame, pictures.times.size)
     picture = pictures.signal[visible_frame]
     outline = measured.tool if tool is None else load_tool(tool)
-    fit: lab.PointFit | lab.DotFit | lab.ImageFit | None = None
+    marks: lab.PointFit | None = None
     if known is not None:
         registration = lab.load_registration(known)
+    elif points is not None:
+        marks = lab.fit_points(*lab.read_points(points, measured.raster, picture.shape), model)
+        _print_points(marks)
+        registration = marks.registration
     else:
-        if points is not None:
-            fit = lab.fit_points(*lab.read_points(points, measured.raster, picture.shape), model)
-        else:
-            by_images = lab.fit_dots if method == "dots" else lab.fit_images
-            fit = by_images(lab.infrared_radiance(measured, frame), measured.raster, picture, model)
-        _print_fit(fit)
+        infrared_image = lab.infrared_radiance(measured, frame)
+        fit = lab.fit_dots(infrared_image, measured.raster, picture, model)
+        marks = fit.points
+        _print_points(marks)
+        _print_dots(fit)
         registration = fit.registration
     _print_registration(registration, measured)
     notes = registration.notes + measured.notes + pictures.notes.about(str(visible))
@@ -114,8 +118,7 @@ def register(
         aligned = [(pairs, partial(write_frame, clocks.to_frame()))]
     temperature = measured.radiance_temperature()[frame]
     shown = registration, temperature, measured.raster, picture, outline
-    marks = fit.points if isinstance(fit, lab.DotFit) else fit
-    marked = (marks.positions, marks.pixels) if isinstance(marks, lab.PointFit) else None
+    marked = None if marks is None else (marks.positions, marks.pixels)
     finish(
         notes,
         *aligned,
@@ -123,15 +126,6 @@ def register(
         (overlay, figure(draw_registration, *shown, marked)),
         (blink, lambda path: write_blink(blink_pictures(*shown), path)),
     )
-
-
-def _check_method(method: Method | None, points: Path | None, known: Path | None) -> None:
-    if known is not None and (points is not None or method is not None):
-        raise ValueError("--map cannot be combined with --points or --method")
-    if method == "points" and points is None:
-        raise ValueError("--method points requires --points")
-    if method not in (None, "points") and points is not None:
-        raise ValueError(f"--method {method} cannot be combined with --points")
 
 
 def _region(text: str) -> tuple[float, float, float, float]:
@@ -154,18 +148,8 @@ def _check_frame(option: str, number: int, count: int) -> None:
         raise ValueError(f"{option}: {number}, expected 0 to {count - 1}")
 
 
-def _print_fit(fit: "lab.PointFit | lab.DotFit | lab.ImageFit") -> None:
-    from chipglow.laboratory import registration as lab
-
+def _print_points(points: "lab.PointFit") -> None:
     screen = current()
-    if isinstance(fit, lab.ImageFit):
-        screen.say(
-            f"Score of the placement: {fit.placement:.3g}, of {fit.by_chance.size} unrelated "
-            f"images at most {fit.by_chance.max():.3g}.",
-            {"placement_score": fit.placement},
-        )
-        return
-    points = fit.points if isinstance(fit, lab.DotFit) else fit
     columns = ["point", "x_um", "y_um", "visible_column", "visible_row", "residual"]
     screen.table("points", points.to_frame(), columns)
     freedom = points.registration.degrees_of_freedom
@@ -174,14 +158,16 @@ def _print_fit(fit: "lab.PointFit | lab.DotFit | lab.ImageFit") -> None:
         f"{freedom:.0f} degrees of freedom.",
         {"scatter_pixel": points.scatter, "degrees_of_freedom": freedom},
     )
-    if isinstance(fit, lab.DotFit):
-        match = len(points.pixels)
-        for name, dots in (("Infrared", fit.infrared), ("Visible", fit.visible)):
-            screen.say(
-                f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots with a "
-                f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match.",
-                {f"{name.lower()}_dots": len(dots.pixels), "matching_dots": match},
-            )
+
+
+def _print_dots(fit: "lab.DotFit") -> None:
+    match = len(fit.points.pixels)
+    for name, dots in (("Infrared", fit.infrared), ("Visible", fit.visible)):
+        current().say(
+            f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots with a "
+            f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match.",
+            {f"{name.lower()}_dots": len(dots.pixels), "matching_dots": match},
+        )
 
 
 def _print_registration(registration: "lab.Registration", measured: "Measurement") -> None:

@@ -2,8 +2,7 @@
 
 import json
 import platform
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -19,7 +18,7 @@ from chipglow.io import atomic_folder
 from chipglow.quantities import changed
 from chipglow.report import result_rows, write_report
 from chipglow.report.paper import CITATION, SOFTWARE
-from chipglow.study import Progress, Study, run, study_text
+from chipglow.study import Study, run, study_text
 from chipglow.text import Notes
 
 
@@ -30,19 +29,14 @@ def write_results(
     resume: bool = False,
     agreed: bool = False,
     remarks: Sequence[str] = (),
-    steady_tool: bool = False,
     compute: Callable[..., Analysis] = run,
 ) -> None:
     """Analyse a study, write its report and print its results."""
-    steady_study = study.with_steady_tool() if steady_tool else None
     with atomic_folder(folder, force) as temporary:
-        for each in (study, steady_study):
-            if each is not None and each.scene is None:
-                confirm_cost(each, resume, agreed)
+        if study.scene is None:
+            confirm_cost(study, resume, agreed)
         with progress_bars() as progress:
             analysis = compute(study, progress, resume)
-            steady, failed = _steady(steady_study, progress, resume)
-            analysis = replace(analysis, failed={**analysis.failed, **failed})
             progress("report", 0.0)
             titled = _titled(study)
             report = write_report(
@@ -53,7 +47,6 @@ def write_results(
                 _provenance(study),
                 [*remarks, *(f"Assumed: {one}" for one in analysis.assumed), *analysis.warnings],
                 study,
-                steady,
             )
             progress("report", 1.0)
     screen = current()
@@ -71,21 +64,6 @@ def write_results(
     screen.file(folder / report.relative_to(temporary), "Report")
     method = f" {CITATION}" if study.is_papers else ""
     screen.say(f"Cite as: {SOFTWARE}{method}")
-
-
-def _steady(
-    study: Study | None, progress: Progress, resume: bool
-) -> tuple[Analysis | None, Mapping[str, str]]:
-    """Return the analysis with a steady tool, or why it failed; each step is named so."""
-    if study is None:
-        return None, {}
-    try:
-        analysis = run(study, lambda step, done: progress(f"{step}, steady tool", done), resume)
-    except ValueError as error:
-        return None, {"steady tool": str(error)}
-    if analysis.cut is None:
-        return None, {"steady tool": " ".join(analysis.missing)}
-    return analysis, {}
 
 
 def _titled(study: Study) -> Study:

@@ -31,8 +31,7 @@ def reproduce(
     steady_tool: Annotated[
         bool,
         opt.flag(
-            "--steady-tool",
-            "Also run the study with a steady-state tool temperature; doubles the run time.",
+            "--steady-tool", "Start the cut with a tool at steady-state temperature; takes longer."
         ),
     ] = False,
     out: ResultFolder = PAPER_FOLDER,
@@ -46,7 +45,9 @@ def reproduce(
     from chipglow.study import Study
 
     study, remarks = (Study.quick(), [QUICK]) if quick else (Study(), [])
-    write_results(study, out, force, resume, yes, remarks, steady_tool)
+    if steady_tool:
+        study = study.with_steady_tool()
+    write_results(study, out, force, resume, yes, remarks)
 
 
 def run(

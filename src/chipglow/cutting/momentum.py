@@ -64,19 +64,17 @@ class Step(NamedTuple):
     """Constants of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume without stress at room temperature
-    (m²), time step (s), fraction of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli
-    at room temperature (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point
-    touches (m), area of a point (m²/m), friction; boundary: nodes under `floor`, and those left of
-    `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature
-    over `friction_melting` (K): see `friction_coefficient`. `viscosity` (Pa s) is that of
-    `NonlocalViscosity`.
+    (m²), time step (s), moduli at room temperature (Pa); contact: stiffness (Pa), damping (N s/m²),
+    distance at which a point touches (m), area of a point (m²/m), friction; boundary: nodes under
+    `floor`, and those left of `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction
+    falls with the temperature over `friction_melting` (K): see `friction_coefficient`. `viscosity`
+    (Pa s) is that of `NonlocalViscosity`.
     """
 
     mass: float
     heat_mass: float
     volume: float
     time_step: float
-    kept: float
     shear_modulus: float
     bulk_modulus: float
     stiffness: float
@@ -127,8 +125,9 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     )
     scale = 4.0 * inverse
     p.vx, p.vy = vx, vy
-    p.own_vx = vx + step.kept * (p.own_vx + dx - vx)
-    p.own_vy = vy + step.kept * (p.own_vy + dy - vy)
+    # In this order of the sums cuts stay the same to the last bit from version to version.
+    p.own_vx = vx + (p.own_vx + dx - vx)
+    p.own_vy = vy + (p.own_vy + dy - vy)
     p.cxx, p.cxy, p.cyx, p.cyy = scale * cxx, scale * cxy, scale * cyx, scale * cyy
     p.x += step.time_step * vx
     p.y += step.time_step * vy

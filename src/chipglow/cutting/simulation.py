@@ -90,7 +90,6 @@ _GAP: Final = 5.0
 """Spacings of points without a point that part the chip from other material."""
 _CONTACT_STIFFNESS: Final = 50e9
 _CONTACT_DAMPING: Final = 0.2
-_KEPT: Final = 1.0
 _LARGEST_DRIFT: Final = 0.1
 _FASTEST_DRIFT: Final = 0.4
 _HEAT_STABILITY: Final = 0.15
@@ -359,7 +358,6 @@ class _State:
             heat_mass=heat_mass,
             volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
             time_step=0.0,
-            kept=_KEPT,
             shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
             bulk_modulus=float(material.bulk_modulus_at(ROOM_TEMPERATURE)),
             stiffness=_CONTACT_STIFFNESS,

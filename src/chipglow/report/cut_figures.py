@@ -4,7 +4,6 @@ from typing import Any, Final
 
 import matplotlib
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -13,7 +12,6 @@ from chipglow.analysis import Analysis, HeatedObject
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
-from chipglow.report import paper
 from chipglow.report.facts import Facts
 from chipglow.scene import Frame, Material, Raster
 from chipglow.surface import Emissivity, Texture
@@ -159,47 +157,6 @@ def chip(facts: Facts) -> Figure | None:
     """Draw the whole chip at the end of the cut, with the view of the scene."""
     overview, tool = facts.cut.overview, facts.analysis.tool
     return None if overview is None else drawing.draw_chip(overview, facts.analysis.raster, tool)
-
-
-def bands(facts: Facts) -> Figure | None:
-    """Draw the readings of straight bands over width and rise, with ours and the paper's."""
-    if not facts.is_compared or not facts.bands:
-        return None
-    found = facts.papers_band
-    figure = drawing.new_figure(3.7)
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    for letter, axes, (moved, chart) in zip("ab", panels, facts.band_charts, strict=True):
-        _draw_chart(axes, chart)
-        axes.set_title(f"{letter}) bands moving {1e6 * moved:.0f} µm in an exposure")
-        axes.set_xlabel("width of the temperature profile / µm")
-    ours = np.array([(1e6 * band.width, band.rise) for band in facts.bands])
-    panels[0].plot(*ours.T, "o", color="black", label="segments of this study")
-    panels[1].plot(1e6 * found.width, found.rise, "D", color="black", label="the paper's numbers")
-    panels[0].set_ylabel("rise over the sides / K")
-    drawing.legend(figure, 3)
-    return figure
-
-
-def _draw_chart(axes: Axes, chart: xr.Dataset) -> None:
-    """Draw lines of equal error at the centre, and those of the paper's numbers."""
-    width, rise = 1e6 * chart.width.values, chart.rise.values
-    levels = np.arange(-200.0, 0.0, 20.0)
-    thin: Any = {"colors": GREY, "linewidths": 0.6, "linestyles": "solid"}
-    lines = axes.contour(width, rise, chart.band.T, levels=levels, **thin)
-    axes.clabel(lines, fontsize=7, fmt=lambda level: f"−{-level:.0f} K")
-    scales_of = {"band": 1.0, "band_worst": 1.0, "band_psf_fraction": 0.01}
-    titles = ("centre", "beside", "PSF fraction")
-    for (name, scale), key, title, colour in zip(
-        scales_of.items(), paper.BAND_KEYS, titles, (BLUE, VERMILLION, GREEN), strict=True
-    ):
-        value = paper.PAPER[key].value
-        thick: Any = {"colors": colour, "linewidths": 1.8, "linestyles": "solid"}
-        axes.contour(width, rise, chart[name].T, levels=[scale * value], **thick)
-        unit = "%" if scale < 1 else "K"
-        axes.plot([], [], color=colour, label=f"paper: {title} {value:g} {unit}".replace("-", "−"))
-    axes.set_xscale("log")
-    axes.set_xticks([5, 10, 20, 40, 80], ["5", "10", "20", "40", "80"])
-    axes.minorticks_off()
 
 
 def forces(facts: Facts) -> Figure | None:

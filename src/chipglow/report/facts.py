@@ -1,34 +1,26 @@
 """The values of an analysis that texts and figures of its report read."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from math import nan
 from typing import Any, Final
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import (
     Analysis,
     Cut,
     Headline,
-    StraightBand,
-    band_chart,
-    band_with,
     headlines,
-    read_straight_band,
     sensitivity_error,
     sensitivity_psf_fraction,
 )
 from chipglow.camera import FlatFieldCalibration
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
-from chipglow.report import paper
 from chipglow.report.page import template, texts
 from chipglow.report.quoted import Quoted
-from chipglow.scene import sample
 
 Array = NDArray[np.float64]
 
@@ -61,7 +53,6 @@ class Facts:
             "cut": cut,
             "data": data,
             "exposure": time_text(camera.integration_time),
-            "facts": self,
             "forces": cut.forces if cut else None,
             "is_compared": self.is_compared,
             "largest_cause": self.largest_cause,
@@ -92,47 +83,6 @@ class Facts:
         """The cut, for what is shown of a cut only."""
         assert self.analysis.cut is not None
         return self.analysis.cut
-
-    @cached_property
-    def bands(self) -> tuple[StraightBand, ...]:
-        """Straight bands closest to those of the segments; no unknown ones."""
-        known = [segment for segment in self.cut.segments if np.isfinite(segment.sweep)]
-        return tuple(StraightBand.of(segment, self.analysis.raster) for segment in known)
-
-    @cached_property
-    def band_emissivity(self) -> float:
-        """Mean emissivity along the middle half of the shown shear band."""
-        band, surface = self.cut.band, self.data.attrs["band_surface"]
-        points = band.ridge.points[band.middle_half]
-        image = self.data.emissivity.sel(surface=surface).values
-        return float(np.nanmean(sample(image, self.analysis.raster, points)))
-
-    @cached_property
-    def papers_band(self) -> StraightBand:
-        """The straight band with the paper's three numbers, beside as warm as ours."""
-        numbers = [paper.PAPER[key].value for key in paper.BAND_KEYS]
-        numbers[-1] /= 100.0
-        beside = float(np.mean([band.beside for band in self.bands]))
-        return band_with(self.analysis.camera, self.band_emissivity, beside, numbers)
-
-    @cached_property
-    def band_charts(self) -> tuple[tuple[float, xr.Dataset], ...]:
-        """Travel in m and chart of straight bands that move as ours do, and as the paper's."""
-        found, camera = self.papers_band, self.analysis.camera
-        widths, rises = np.geomspace(4e-6, 90e-6, 12), np.linspace(50.0, 500.0, 10)
-        ours = float(np.mean([band.sweep for band in self.bands]))
-        bands = [replace(found, sweep=sweep) for sweep in (ours, found.sweep)]
-        emissivity = self.band_emissivity
-        return tuple(
-            (band.sweep, band_chart(camera, emissivity, band, widths, rises)) for band in bands
-        )
-
-    @cached_property
-    def straight_readings(self) -> Array:
-        """Mean readings of straight bands like ours."""
-        camera, emissivity = self.analysis.camera, self.band_emissivity
-        read = [read_straight_band(camera, emissivity, band) for band in self.bands]
-        return np.asarray(np.mean(read, axis=0))
 
     @cached_property
     def headlines(self) -> Mapping[str, Headline]:

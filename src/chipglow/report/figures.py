@@ -19,7 +19,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
-from chipglow.analysis.figure import draw_error, error_limit
+from chipglow.analysis.figure import draw_error, draw_marks, error_limit
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
@@ -122,6 +122,32 @@ def measurement(facts: Facts) -> Figure:
         for one in axes:
             one.label_outer()
         drawing.colour_bar(figure, picture, list(axes), "radiance temperature / °C")
+    return figure
+
+
+def exposure(facts: Facts) -> Figure:
+    """Draw reference, measurement and error of the shown exposure, and where errors are read."""
+    analysis, names = facts.analysis, facts.read_surfaces
+    shown = facts.data.isel(instant=facts.data.attrs["shown_instant"]).sel(surface=names)
+    reference = shown.reference_temperature - KELVIN
+    measured = shown.radiance_temperature - KELVIN
+    error = measured - reference
+    heat = facts.heat_limits(reference.values)
+    largest = scales.round_limit(error.values, 99.0, 10.0)
+    figure = drawing.image_figure(analysis.raster, 2.2, rows=len(names))
+    rows = figure.subplots(len(names), 3, sharex=True, sharey=True, squeeze=False)
+    for row, name in zip(rows, names, strict=True):
+        panels = (
+            ("reference", reference, "temperature / °C", heat, scales.HEAT),
+            ("measured", measured, "temperature / °C", heat, scales.HEAT),
+            ("error", error, "error / K", (-largest, largest), scales.SIGNED),
+        )
+        for axes, (title, images, label, limits, colours) in zip(row, panels, strict=True):
+            image = images.sel(surface=name).values.astype(np.float64)
+            panel = ImagePanel(of_surface(facts, title, name), label, image, limits, colours)
+            panel.draw(figure, axes, analysis.measurements[name].raster, analysis.tool, "bottom")
+            draw_marks(axes, analysis)
+            axes.label_outer()
     return figure
 
 

@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 _TEXTS: Final = texts("paper")
 SOFTWARE: Final[str] = template(_TEXTS["software"]).render(version=__version__)
 CITATION: Final[str] = _TEXTS["citation"]
-BAND_KEYS: Final = ("band_error_degC", "band_worst_error_degC", "band_psf_fraction_percent")
-"""Rows of the three numbers on the shear band."""
 
 QUICK: Final[str] = _TEXTS["quick"]
 """Remark on the quick study."""
@@ -45,9 +43,6 @@ PAPER: Final[Mapping[str, PaperValue]] = {
     key: PaperValue(**value) for key, value in _TEXTS["values"].items()
 }
 """The values of Heigel and Whitenton (2010) that a study is compared with, by the report's rows."""
-
-RAKE_MISSING: Final = PaperValue(**_TEXTS["rake_missing"])
-"""Difference of the paper's measured and simulated profile at the rake face, in K."""
 
 FIGURES: Final[Mapping[str, tuple[str, str]]] = _TEXTS["figures"]
 """The figures of the paper by the report's figures, and what is the same and different."""

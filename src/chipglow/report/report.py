@@ -17,9 +17,7 @@ from chipglow.report import attribution, cut_figures, figures, paper
 from chipglow.report.answer import answer, changes
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts
-from chipglow.report.player import exposure_player
 from chipglow.report.rows import all_rows
-from chipglow.report.steady_tool import tool_rows
 from chipglow.report.summary import Summary, summary
 from chipglow.report.tables import tables
 from chipglow.text import json_schema
@@ -45,6 +43,7 @@ class Failure(NamedTuple):
 
 
 _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
+    "exposure": figures.exposure,
     "psf": figures.point_spread,
     "heated-chips": cut_figures.heated_chips,
     "heated-tool": cut_figures.heated_tool,
@@ -60,11 +59,10 @@ _FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
     "attribution-lines": attribution.profiles,
     "over-time": figures.over_time,
     "psf-sensitivity": figures.psf_sensitivity,
-    "bands": cut_figures.bands,
     "forces": cut_figures.forces,
     "chip-thickness": cut_figures.chip_thickness,
 }
-"""All figures in the order of the paper, then further ones."""
+"""The figure of the answer, all figures in the order of the paper, then further ones."""
 
 
 def write_report(
@@ -75,7 +73,6 @@ def write_report(
     provenance: Mapping[str, str],
     remarks: Sequence[str] = (),
     study: Any = None,
-    steady: Analysis | None = None,
 ) -> Path:
     """Write the results of an analysis into a folder.
 
@@ -98,8 +95,6 @@ def write_report(
         Assumptions and warnings to consider before quoting a number, one sentence each.
     study : chipglow.study.Study, optional
         The study; the paper's values are shown if it is the paper's.
-    steady : Analysis, optional
-        Analysis of the same study with a steady tool, for comparison.
 
     Returns
     -------
@@ -114,11 +109,10 @@ def write_report(
     """
     facts = Facts(analysis, study)
     rows = all_rows(facts)
-    tool = tool_rows(analysis, steady) if steady else []
     (folder / "study.yaml").write_text(study_text, encoding="utf-8")
     _write_arrays(analysis.data, provenance, folder / "results.nc")
     attributed = attribution.contributions(facts)
-    _write_numbers(summary(rows, tool, analysis, provenance, attributed), folder)
+    _write_numbers(summary(rows, analysis, provenance, attributed), folder)
     (folder / "figures").mkdir()
     values = {
         "title": title,
@@ -129,14 +123,11 @@ def write_report(
         "attribution": list(attribution.sentences(facts)),
         "note": facts.text(texts()["note"]),
         "camera_settings": facts.settings,
-        "player": _attempt("Images of the exposures", lambda: exposure_player(facts)),
         "figures": dict(_figures(facts, folder / "figures")),
-        **tables(facts, rows, tool),
+        **tables(facts, rows),
         "scene": study.scene if study else None,
-        "is_quick": facts.is_compared and study == type(study).quick(),
         "software": paper.SOFTWARE,
         "citation": paper.CITATION,
-        "rake_missing": paper.RAKE_MISSING,
         "version": __version__,
     }
     path = folder / "report.html"

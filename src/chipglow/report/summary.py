@@ -7,7 +7,6 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from chipglow.analysis import Analysis, Distribution
 from chipglow.report.rows import Row, known, slug
-from chipglow.report.steady_tool import ToolRow
 
 _Known = FiniteFloat | None
 _Numbers = dict[str, _Known]
@@ -70,19 +69,6 @@ class Mean(_Numbered):
     standard_deviation: _Known
 
 
-class BothTools(_Numbered):
-    """A number of the study and of the same one with a steady tool."""
-
-    own: _Known
-    own_standard_deviation: _Known
-    steady: _Known
-    steady_standard_deviation: _Known
-    difference: _Known
-    """Steady minus own."""
-    difference_standard_deviation: _Known
-    """Deviation of the difference of two single values."""
-
-
 class Summary(_Numbered):
     """summary.json: numbers by names that end in their unit; unknown ones are null."""
 
@@ -118,8 +104,6 @@ class Summary(_Numbered):
     """Whether the published value ± its rounding differs; null without an interval."""
     explanation: dict[str, str]
     """Cause or determination of each number."""
-    steady_tool: dict[str, BothTools] = {}
-    """Comparison with a steady tool, if requested."""
     missing: list[str] = []
     """Unavailable results with the reason."""
     failed: dict[str, str] = {}
@@ -128,7 +112,6 @@ class Summary(_Numbered):
 
 def summary(
     rows: Mapping[str, Sequence[Row]],
-    steady: Sequence[ToolRow],
     analysis: Analysis,
     provenance: Mapping[str, str],
     attributed: Mapping[str, Mapping[str, float]],
@@ -157,7 +140,6 @@ def summary(
         paper_rounding={key: one.rounding for key, one in published.items()},
         differs={row.key: row.differs for row in results if row.published is not None},
         explanation={row.key: row.explanation for row in (*results, *chip, *rows["camera"])},
-        steady_tool={row.key: _tools(row) for row in steady},
         provenance=dict(provenance),
         missing=list(analysis.missing),
         failed=dict(analysis.failed),
@@ -177,10 +159,3 @@ def _causes(draws: Distribution) -> dict[str, Cause]:
 
 def _mean(draws: Distribution) -> Mean:
     return Mean(mean=draws.mean, standard_deviation=known(draws.standard_deviation))
-
-
-def _tools(row: ToolRow) -> BothTools:
-    spreads = {"own": row.own, "steady": row.steady, "difference": row.difference}
-    values = {name: known(mean) for name, (mean, _) in spreads.items()}
-    values |= {f"{name}_standard_deviation": known(s) for name, (_, s) in spreads.items()}
-    return BothTools(**values)

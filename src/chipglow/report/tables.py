@@ -1,15 +1,14 @@
 """The tables of the report's page, and the words that explain their columns."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite, nan
+from math import nan
 from typing import Any, Final, NamedTuple
 
 from chipglow.analysis.distribution import FEWEST, TOGETHER
 from chipglow.report import paper
 from chipglow.report.facts import Facts
 from chipglow.report.page import texts
-from chipglow.report.rows import Row, slug, spread_text
-from chipglow.report.steady_tool import ToolRow
+from chipglow.report.rows import Row, spread_text
 from chipglow.surface import Emissivity
 
 _PARTS: Final = ("psf", "motion", "footprint", "rest")
@@ -46,19 +45,17 @@ class Line(NamedTuple):
 class Table(NamedTuple):
     """Rows and the columns that are shown; the first column holds no numbers."""
 
-    rows: Sequence[Row | ToolRow | Line]
+    rows: Sequence[Row | Line]
     columns: Sequence[Column]
 
 
-def tables(
-    facts: Facts, rows: Mapping[str, Sequence[Row]], tool: Sequence[ToolRow]
-) -> dict[str, Any]:
+def tables(facts: Facts, rows: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
     """Return the names by which the page uses the tables, and the report's words as `terms`."""
     terms = {
         key: Term(*(facts.text(text) for text in pair)) for key, pair in texts()["terms"].items()
     }
 
-    def table(rows: Sequence[Row | ToolRow | Line], *names: str) -> Table:
+    def table(rows: Sequence[Row | Line], *names: str) -> Table:
         return Table(rows, [_column(name, terms) for name in names])
 
     def numbers(rows: Sequence[Row]) -> Table:
@@ -70,16 +67,11 @@ def tables(
     published = [row for row in rows["cut"] if row.published]
     compared = ("paper",) if facts.is_compared else ()
     differs = ("differs",) if facts.is_compared else ()
-    peak = f"rake_peak_{slug(str(facts.data.attrs.get('rake_surface')))}_degC"
     return {
         "terms": terms,
         "rows": rows,
         "contributions": table(parted, "quantity", "reference", "error", *parts),
         "scatter": _scatter(rows["errors"]),
-        "tool": table(tool, "quantity", "own", "steady", "difference"),
-        "peak": next(
-            (row for row in tool if row.key == peak and isfinite(row.difference[0])), None
-        ),
         "comparison": table(
             [*rows["errors"], *published],
             *("quantity", *compared, "mean", "interval", "one-draw", *differs),
@@ -101,8 +93,7 @@ def _column(name: str, terms: Mapping[str, Term]) -> Column:
     term = "psf-contribution" if name == "psf" else name
     if term in terms:
         return Column(name, terms[term].name, term)
-    names = {"own": "Tool of this study", "steady": "Steady tool"}
-    return Column(name, names.get(name, name.capitalize()))
+    return Column(name, name.capitalize())
 
 
 def _scatter(errors: Sequence[Row]) -> Table:

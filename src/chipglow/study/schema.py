@@ -93,17 +93,22 @@ class Study(Part):
 
     def with_steady_tool(self) -> Self:
         """Return the same study with a tool at steady-state temperature."""
-        return changed(self, {"cutting.tool.temperature": STEADY})
+        title = f"{self.title}, with a tool at steady-state temperature"
+        return changed(self, {"title": title, "cutting.tool.temperature": STEADY})
 
     @property
     def is_papers(self) -> bool:
-        """Whether it cuts, measures and reads as the paper does, finely or coarsely."""
+        """Whether it cuts, measures and reads as the paper does, finely or coarsely.
+
+        The temperature of its tool does not count: it was not measured.
+        """
         paper = type(self)()
         names = ("numerics", "window", "field_of_view", "cutting_length")
         finely = {name: getattr(paper.cutting, name) for name in names}
+        tool = replace(self.cutting.tool, temperature=paper.cutting.tool.temperature)
         return (
             self.scene is None
-            and replace(self.cutting, **finely) == paper.cutting
+            and replace(self.cutting, tool=tool, **finely) == paper.cutting
             and self.surface == paper.surface
             and self.camera == paper.camera
             and self.analysis.reference == paper.analysis.reference

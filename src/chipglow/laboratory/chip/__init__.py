@@ -24,7 +24,6 @@ from chipglow.laboratory.chip.segment import (
     NoContactError as NoContactError,
     Segment as Segment,
     contact_length as contact_length,
-    contact_temperatures as contact_temperatures,
 )
 from chipglow.laboratory.chip.segmentation import (
     CutHistory as CutHistory,

@@ -16,9 +16,6 @@ from chipglow.scene.lines import nearest
 
 _LONGEST_GAP: Final = 12e-6
 
-BESIDE: Final = 15e-6
-"""Distance from the rake face in m within which `contact_temperatures` takes means."""
-
 
 class NoContactError(ValueError):
     """The chip does not touch the rake face."""
@@ -39,21 +36,6 @@ def contact_length(
         return 0.0
     gaps = np.diff(contacts) > _LONGEST_GAP
     return float(contacts[gaps.argmax() if gaps.any() else -1])
-
-
-def contact_temperatures(
-    frame: Frame, raster: Raster, tool: Tool, length: float
-) -> tuple[float, float]:
-    """Return the mean temperatures in K of chip and tool within `BESIDE` of the contact."""
-    x, y = np.meshgrid(raster.x, raster.y)
-    distance = tool.signed_distance(x, y)
-    along, _ = tool.face_coordinates(np.stack([x, y], axis=-1))
-    beside = (np.abs(distance) < BESIDE) & (along > 0) & (along < length)
-    chip, inside = (
-        frame.temperature[beside & where]
-        for where in (frame.material == Material.WORKPIECE, distance < 0)
-    )
-    return float(chip.mean()) if chip.size else nan, float(inside.mean()) if inside.size else nan
 
 
 @dataclass(frozen=True, repr=False)

@@ -12,10 +12,6 @@ from chipglow.laboratory.registration.files import (
     read_points as read_points,
     write_registration as write_registration,
 )
-from chipglow.laboratory.registration.mutual_information import (
-    ImageFit as ImageFit,
-    fit_images as fit_images,
-)
 from chipglow.laboratory.registration.registration import (
     PointFit as PointFit,
     Registration as Registration,

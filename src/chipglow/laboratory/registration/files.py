@@ -40,13 +40,13 @@ _HEAD: Final = """\
 
 
 class _Fields(TypedDict):
-    """Contents of the file; omitted degrees of freedom are infinite."""
+    """Contents of the file."""
 
     model: Model
     method: Method
     matrix: list[list[float]]
     covariance: list[list[float]]
-    degrees_of_freedom: NotRequired[float | None]
+    degrees_of_freedom: float
     assumed: NotRequired[list[str]]
     warnings: NotRequired[list[str]]
 
@@ -57,13 +57,12 @@ _FIELDS: Final = TypeAdapter(_Fields)
 
 def write_registration(registration: Registration, path: str | Path) -> None:
     """Write a registration to a YAML file."""
-    finite = np.isfinite(registration.degrees_of_freedom)
     data: _Fields = {
         "model": registration.model,
         "method": registration.method,
         "matrix": registration.matrix.tolist(),
         "covariance": registration.covariance.tolist(),
-        "degrees_of_freedom": registration.degrees_of_freedom if finite else None,
+        "degrees_of_freedom": registration.degrees_of_freedom,
         "assumed": registration.notes.assumed,
         "warnings": registration.notes.warnings,
     }
@@ -86,13 +85,12 @@ def load_registration(path: str | Path) -> Registration:
     given = read_yaml(path)
     try:
         data = _FIELDS.validate_python(given)
-        freedom = data.get("degrees_of_freedom")
         return Registration(
             np.array(data["matrix"], np.float64),
             np.array(data["covariance"], np.float64),
             data["model"],
             data["method"],
-            np.inf if freedom is None else freedom,
+            data["degrees_of_freedom"],
             Notes(data.get("assumed", []), data.get("warnings", [])),
         )
     except ValueError as error:

@@ -16,7 +16,7 @@ from chipglow.scene.lines import nearest
 from chipglow.text import Notes
 
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
-Method: TypeAlias = Literal["points", "dots", "mutual-information"]
+Method: TypeAlias = Literal["points", "dots"]
 
 _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
 _FLATTEST: Final = 0.01
@@ -43,8 +43,8 @@ class Registration:
     """Covariance of the elements of the matrix, row by row, shape (9, 9)."""
     model: Model
     method: Method
-    degrees_of_freedom: float = np.inf
-    """Degrees of freedom of the covariance, for Student's t; infinite for mutual information."""
+    degrees_of_freedom: float
+    """Degrees of freedom of the covariance, for Student's t."""
     notes: Notes = field(default_factory=Notes)
     """Assumptions, and reasons why it may be wrong."""
 
@@ -66,16 +66,16 @@ class Registration:
 
     def pixels(self, positions: ArrayLike) -> Array:
         """Return columns and rows in the visible picture of positions x, y in m, (..., 2)."""
-        return mapped_places(self.matrix, np.asarray(positions, np.float64))
+        return _mapped_places(self.matrix, np.asarray(positions, np.float64))
 
     def positions(self, pixels: ArrayLike) -> Array:
         """Return positions x, y in m of columns and rows of the visible picture, (..., 2)."""
         back = np.asarray(np.linalg.inv(self.matrix), np.float64)
-        return mapped_places(back, np.asarray(pixels, np.float64))
+        return _mapped_places(back, np.asarray(pixels, np.float64))
 
     def pixel_covariance(self, positions: ArrayLike) -> Array:
         """Return the covariance of `pixels` in pixels², shape (..., 2, 2)."""
-        slope = element_slopes(self.matrix, np.asarray(positions, np.float64))
+        slope = _element_slopes(self.matrix, np.asarray(positions, np.float64))
         return slope @ self.covariance @ np.swapaxes(slope, -1, -2)
 
     def position_covariance(self, positions: ArrayLike) -> Array:
@@ -169,7 +169,7 @@ def fit_points(
     (the externally studentised residual) is beyond 1 % over all points.
     """
     given, seen = _checked(positions, pixels, model)
-    frame = NormalisedFrame.around(given, seen)
+    frame = _NormalisedFrame.around(given, seen)
     found, target = frame.unit(given), frame.unit_pixels(seen)
     orientations = (False, True) if model == "similarity" else (False,)
     basis, residual, slope, matrix = min(
@@ -204,7 +204,7 @@ def fit_points(
 
 
 @dataclass(frozen=True)
-class NormalisedFrame:
+class _NormalisedFrame:
     """Coordinates in which the numbers of a registration are of the order of 1."""
 
     centre: Array
@@ -217,7 +217,7 @@ class NormalisedFrame:
     """Visible pixels that become 1."""
 
     @classmethod
-    def around(cls, positions: Array, pixels: Array) -> "NormalisedFrame":
+    def around(cls, positions: Array, pixels: Array) -> "_NormalisedFrame":
         """Return the middle of points, and their distance from it, in both images."""
         centre, pixel_centre = positions.mean(axis=0), pixels.mean(axis=0)
         scale = float(np.sqrt(((positions - centre) ** 2).sum(axis=1).mean()))
@@ -232,10 +232,6 @@ class NormalisedFrame:
         """Return columns and rows in these coordinates."""
         return (pixels - self.pixel_centre) / self.pixel_scale
 
-    def pixels(self, matrix: Array, unit: Array) -> Array:
-        """Return columns and rows of places that a matrix in these coordinates maps."""
-        return mapped_places(matrix, unit) * self.pixel_scale + self.pixel_centre
-
     def undone(self, matrix: Array, covariance: Array) -> tuple[Array, Array]:
         """Return a matrix in these coordinates, and its covariance, for m and pixels."""
         x, y = self.centre / self.scale
@@ -249,7 +245,7 @@ class NormalisedFrame:
         return full, slope @ covariance @ slope.T
 
 
-def parameter_basis(model: Model, mirrored: bool) -> Array:
+def _parameter_basis(model: Model, mirrored: bool) -> Array:
     """Return the elements of a matrix by a model's parameters, but for the last one's 1; (9, k)."""
     if model != "similarity":
         return np.eye(9)[:, : _PARAMETERS[model]]
@@ -265,16 +261,16 @@ def _least(
     found: Array, target: Array, model: Model, mirrored: bool
 ) -> tuple[Array, Array, Array, Array]:
     """Return basis, residuals, their slopes and the matrix of the least squares."""
-    basis, last = parameter_basis(model, mirrored), np.eye(3)[2]
+    basis, last = _parameter_basis(model, mirrored), np.eye(3)[2]
 
     def matrix_of(parameters: Array) -> Array:
         return (basis @ parameters).reshape(3, 3) + np.outer(last, last)
 
     def residual(parameters: Array) -> Array:
-        return (mapped_places(matrix_of(parameters), found) - target).ravel()
+        return (_mapped_places(matrix_of(parameters), found) - target).ravel()
 
     def slope(parameters: Array) -> Array:
-        return (element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, basis.shape[1])
+        return (_element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, basis.shape[1])
 
     begin = _direct(found, target, basis)
     fit = least_squares(residual, begin, slope, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
@@ -283,7 +279,7 @@ def _least(
 
 def _direct(found: Array, target: Array, basis: Array) -> Array:
     """Return the direct linear solution: X − column W = 0 and Y − row W = 0."""
-    slopes = element_slopes(np.eye(3), found)
+    slopes = _element_slopes(np.eye(3), found)
     slopes[..., 6:8] = -target[..., None] * found[:, None]
     return np.asarray(np.linalg.lstsq((slopes @ basis).reshape(target.size, -1), target.ravel())[0])
 
@@ -333,16 +329,16 @@ def _depth(matrix: Array, places: Array) -> Array:
     return np.asarray(places @ matrix[2, :2] + matrix[2, 2])
 
 
-def mapped_places(matrix: Array, places: Array) -> Array:
+def _mapped_places(matrix: Array, places: Array) -> Array:
     """Return places mapped by a matrix, shape (..., 2)."""
     return (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
 
 
-def element_slopes(matrix: Array, places: Array) -> Array:
+def _element_slopes(matrix: Array, places: Array) -> Array:
     """Return the derivative of mapped places by the matrix elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]
     slopes = np.zeros((*places.shape, 9))
     slopes[..., 0, 0:3] = slopes[..., 1, 3:6] = whole
-    slopes[..., 6:9] = -mapped_places(matrix, places)[..., None] * whole[..., None, :]
+    slopes[..., 6:9] = -_mapped_places(matrix, places)[..., None] * whole[..., None, :]
     return slopes

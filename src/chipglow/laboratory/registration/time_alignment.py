@@ -259,5 +259,5 @@ def align_recordings(
 
 
 def infrared_radiance(measurement: Measurement, frame: int) -> Array:
-    """Return the radiance of a frame for `fit_images` and `fit_dots`: NaN where a pixel is dead."""
+    """Return the radiance of a frame for `fit_dots`: NaN where a pixel is dead."""
     return np.where(measurement.flags[frame] & Flag.DEAD, np.nan, measurement.radiance[frame])
