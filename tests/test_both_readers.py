@@ -315,9 +315,9 @@ def test_a_unit_that_contradicts_the_file_wins_and_is_said(tmp_path):
     said = "temperature is in 'degC'; the given unit is used instead."
     recording = convert(path, unit="K")
     np.testing.assert_allclose(recording.signal, truth(), **CLOSE)
-    assert said in recording.notes.remarks
+    assert said in recording.notes.warnings
     source = GridSource(str(path), units=Units(temperature=parse_unit("K", "K", "temperature")))
-    assert said in prospect(Import(source)).notes.remarks
+    assert said in prospect(Import(source)).notes.warnings
     np.testing.assert_allclose(next(source.frames(prospect(Import(source)).raster))
                                .fields["temperature"], truth()[0], **CLOSE)  # fmt: skip
 
@@ -409,6 +409,117 @@ def test_times_that_only_count_are_not_times(tmp_path):
     notes = GridSource(str(path)).survey().notes
     assert "The files contain no times: frames are 1 s apart." in notes.assumed
     assert "time only counts along time: it is not used." in notes.remarks
+
+
+# Series of files, mesh grids and origins
+
+
+def series(data, folder, packing=None):
+    """One file for each frame of several datasets."""
+    for number, one in enumerate(data):
+        encoding = {"temperature": packing(number)} if packing else None
+        one.to_netcdf(folder / f"a_{number}.nc", engine="h5netcdf", encoding=encoding)
+    return folder / "a_*.nc"
+
+
+def own_scale(number):
+    return {"dtype": "i2", "scale_factor": 0.01 * (number + 1), "add_offset": 450.0,
+            "_FillValue": -32768}  # fmt: skip
+
+
+EACH = [a_dataset(reverse=("y",)).isel(time=[number]) for number in range(FRAMES)]
+SERIES = {
+    "coordinates in each file": ([one.isel(time=0, drop=True) for one in EACH], None),
+    "a frame and its time in each file": (EACH, None),
+    "packed by a scale of their own": (EACH, own_scale),
+    "several frames in each file": (
+        [a_dataset(), a_dataset().assign_coords(
+            time=("time", TIMES + TIMES[-1] + 1e-3, {"units": "s"})
+        )],
+        None,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("data", "packing"), SERIES.values(), ids=SERIES)
+def test_a_series_of_files_is_upright_and_in_time(tmp_path, data, packing):
+    path = series(data, tmp_path, packing)
+    stated = {} if "time" in data[0].coords else {"interval": 1e-3}
+    expected = np.concatenate([truth()] * 2) if len(data) == 2 else truth()
+    # Packed numbers are rounded to 0.03 K.
+    close = {"rtol": 0, "atol": 0.016} if packing else CLOSE
+    recording = convert(path, **stated)
+    np.testing.assert_allclose(recording.signal, expected, **close)
+    np.testing.assert_allclose(recording.times, 1e-3 * np.arange(len(expected)), atol=1e-12)
+    kelvins, raster = imported(path, **stated)
+    np.testing.assert_allclose(kelvins, expected, **close)
+    assert (raster.left, raster.top) == pytest.approx((0.0, 30e-6), abs=1e-12)
+
+
+def test_files_of_a_series_at_other_places_are_refused(tmp_path):
+    first, *others = EACH
+    path = series([first.isel(y=slice(None, None, -1)), *others], tmp_path)
+    for read in (convert, imported):
+        with pytest.raises(SourceError, match="y: differs between frames"):
+            read(path)
+
+
+def mesh_grid(data):
+    """Coordinates as matrices of all samples."""
+    x, y = np.meshgrid(data["x"].values, data["y"].values)
+    return xr.Dataset(
+        {"temperature": (("j", "i"), data["temperature"].values[0], {"units": "K"})},
+        {"x": (("j", "i"), x, {"units": "m"}), "y": (("j", "i"), y, {"units": "m"})},
+    )
+
+
+@pytest.mark.parametrize("reverse", REVERSED)
+def test_coordinates_of_a_mesh_grid(tmp_path, reverse):
+    path = netcdf4(mesh_grid(a_dataset(reverse=reverse)), tmp_path)
+    recording, (kelvins, raster) = convert(path), imported(path)
+    np.testing.assert_allclose(recording.signal, truth()[:1], **CLOSE)
+    np.testing.assert_allclose(kelvins, truth()[:1], **CLOSE)
+    assert recording.position == pytest.approx((raster.left, raster.top), abs=1e-12)
+
+
+def test_coordinates_of_a_curved_grid_are_not_used_and_said(tmp_path):
+    data = mesh_grid(a_dataset())
+    data["y"] = data["y"] + 0.1 * data["x"]
+    path = netcdf4(data, tmp_path)
+    said = "y does not vary along y alone: it is not used as a coordinate."
+    assert said in convert(path).notes.warnings
+    with pytest.raises(SourceError, match=r"has no coordinate 'y', expected grid\.spacing"):
+        imported(path)
+
+
+def test_an_axis_of_one_band_is_left_out(tmp_path):
+    path = netcdf4(a_dataset().expand_dims(band=1, axis=1), tmp_path)
+    check_both(path)
+
+
+ORIGINS = {"UL": (), "LL": ("y",), "UR": ("x",), "LR": ("y", "x")}
+
+
+@pytest.mark.parametrize("origin", ORIGINS)
+def test_the_origin_of_an_image_of_hdf5(tmp_path, origin):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["data"] = a_dataset(reverse=ORIGINS[origin])["temperature"].values[0] - 273.15
+        file["data"].attrs.update(DISPLAY_ORIGIN=np.bytes_(origin), Unit="degC")
+    recording = convert(tmp_path / "a.h5")
+    np.testing.assert_allclose(recording.signal, truth()[:1], **CLOSE)
+    assert sum("DISPLAY_ORIGIN" in text for text in recording.notes.remarks) == len(ORIGINS[origin])
+    kelvins, _ = imported(tmp_path / "a.h5", spacing=PITCH)
+    np.testing.assert_allclose(kelvins, truth()[:1], **CLOSE)
+
+
+@pytest.mark.parametrize("kind", ["IMAGE_INDEXED", "IMAGE_TRUECOLOR"])
+def test_colours_of_hdf5_are_refused_by_both(tmp_path, kind):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["data"] = truth()[0]
+        file["data"].attrs["IMAGE_SUBCLASS"] = np.bytes_(kind)
+    for read in (lambda path: convert(path, unit="K"), lambda path: imported(path, spacing=1e-5)):
+        with pytest.raises(SourceError, match=f"colours .{kind}"):
+            read(tmp_path / "a.h5")
 
 
 def test_bounds_and_flags_are_not_images(tmp_path):

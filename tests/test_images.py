@@ -188,6 +188,7 @@ def test_tiff_gives_the_numbers_that_were_written(tmp_path, written, expected, n
     expected = expected.reshape(-1, ROWS, COLUMNS)
     np.testing.assert_array_equal(recording.signal, expected)
     notes = [*recording.notes.assumed, *recording.notes.warnings, *recording.notes.remarks]
+    notes.remove("Row 0 is the upper edge.")
     assert [note in text for text in notes] == ([True] if note else [])
     check_import(path, expected)
 
@@ -374,6 +375,40 @@ def test_other_calibrations_of_imagej_are_refused(tmp_path, values, stated, reas
     assert reason in refusal(tiff(tmp_path / "a.tif", **imagej(values, axes="YX", **stated)))
 
 
+def test_a_structure_of_matlab_is_refused_by_name(tmp_path):
+    scipy.io.savemat(tmp_path / "a.mat", {"s": {"T": IMAGE}})
+    assert "has only s (struct), expected matrices" in refusal(tmp_path / "a.mat")
+
+
+def test_counts_of_a_calibrated_image_are_refused(tmp_path):
+    stated = {"cf": 0, "c0": -273.15, "c1": 0.01, "vunit": "degC"}
+    path = tiff(tmp_path / "a.tif", **imagej(IMAGE, axes="YX", **stated))
+    assert "the file states values in degC, which are not counts" in refusal(path)
+
+
+GDAL_ITEMS = {
+    "scale and offset": (
+        '<Item name="SCALE" sample="0" role="scale">0.01</Item>'
+        '<Item name="OFFSET" sample="0" role="offset">-273.15</Item>'
+        '<Item name="UNITTYPE" sample="0" role="unittype">degC</Item>',
+        0.01 * IMAGE, "remarks",
+    ),
+    "other items": ('<Item name="AREA">Point</Item>', IMAGE, None),
+    "damaged": ("<Item>", IMAGE, "warnings"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("items", "kelvins", "said"), GDAL_ITEMS.values(), ids=GDAL_ITEMS)
+def test_scale_and_offset_of_gdal_are_applied(tmp_path, items, kelvins, said):
+    text = f"<GDALMetadata>{items}</GDALMetadata>"
+    path = tiff(tmp_path / "a.tif", IMAGE, extratags=[(42112, "s", 0, text, True)])
+    recording = read(path, unit=None if said == "remarks" else "counts")
+    np.testing.assert_allclose(recording.signal[0], kelvins, rtol=1e-6)
+    notes = {kind: any("GDAL" in text for text in found)
+             for kind, found in vars(recording.notes).items()}  # fmt: skip
+    assert notes == {kind: kind == said for kind in notes}
+
+
 def test_imagejs_calibration_none_changes_nothing(tmp_path):
     path = tiff(tmp_path / "a.tif", **imagej(cf=20, c0=1.0, c1=2.0, vunit="Gray Value"))
     np.testing.assert_array_equal(read(path).signal, STACK)
@@ -455,6 +490,7 @@ def test_png_gives_the_numbers_that_were_written(tmp_path, written, options, exp
     recording = read(tmp_path / "a_*.png")
     np.testing.assert_array_equal(recording.signal, [expected] * 3)
     notes = [*recording.notes.assumed, *recording.notes.warnings, *recording.notes.remarks]
+    notes.remove("Row 0 is the upper edge.")
     assert [note in text for text in notes] == ([True] if note else [])
     check_import(tmp_path / "a_*.png", np.stack([expected] * 3))
 
@@ -578,7 +614,7 @@ MATLAB_REFUSED = {
     "3 axes": ({"T": STACK.transpose(1, 2, 0)}, {"interval": 1.0}, AXES),
     "3 axes of Python": ({"T": STACK}, {"interval": 1.0}, AXES),
     "a square stack": ({"T": np.zeros((12, 12, 12))}, {"interval": 1.0}, AXES),
-    "4 axes": ({"T": np.zeros((2, 3, 4, 5))}, {"interval": 1.0}, "give the dataset"),
+    "4 axes": ({"T": np.zeros((2, 3, 4, 5))}, {"interval": 1.0}, "no array has 2 or 3 axes"),
     "frames without times": (numbered(3), {}, "give the interval between frames"),
     "dates of some": (numbered(3, clock(0, 1)), {}, "give the interval between frames"),
     "dates that stand still": (numbered(3, clock(0, 1, 1)), {}, "does not ascend"),

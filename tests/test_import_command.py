@@ -202,6 +202,19 @@ def test_samples_filled_in_a_middle_frame_are_warned_about(tmp_path):
     assert f"In 1 of 4 frames up to {100 * filled[2]:.2g} % of the samples with material" in said
 
 
+def test_missing_samples_in_a_middle_frame_are_said(tmp_path):
+    image = 300.0 + np.arange(48.0).reshape(6, 8) ** 1.5
+    for number in range(3):
+        cells = [[f"{kelvin:.2f}" for kelvin in row] for row in image]
+        if number == 1:
+            cells[2][3] = "---"
+        (tmp_path / f"t_{number}.csv").write_text("\n".join(map(";".join, cells)))
+    settings = ["grid.spacing=5 um", "interval=1 us"]
+    out = tmp_path / "scene.nc"
+    said = run("import", tmp_path / "t_*.csv", "--out", out, *settings_of(settings))
+    assert "In 1 of 3 frames up to 2.1 % of the samples have no temperature" in said
+
+
 def test_the_description_that_init_writes_says_every_field_and_is_read_back(arrays, tmp_path):
     path = tmp_path / "import.yaml"
     run("init", path, "--import")

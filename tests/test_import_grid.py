@@ -264,7 +264,7 @@ def test_units_from_the_file_are_honoured_and_said(tmp_path):
     (other, *_) = given.frames(INNER)
     moved = other.fields["temperature"] - frame.fields["temperature"]
     np.testing.assert_allclose(moved, 100.0 - 273.15, atol=3e-4)
-    assert "temp is in 'degC'; the given unit is used instead." in given.survey().notes.remarks
+    assert "temp is in 'degC'; the given unit is used instead." in given.survey().notes.warnings
 
 
 def test_units_given_where_the_file_says_none(tmp_path):

@@ -36,6 +36,11 @@ def matrix_of(path, text, encoding="utf-8"):
     return read_matrix(path)
 
 
+def points_of(header=""):
+    lines = [f"{x};{y};{value:.2f}\n" for y, row in enumerate(ROWS) for x, value in enumerate(row)]
+    return header + "".join(lines).replace(".", ",")
+
+
 NAMED = "Y/X;0;1;2;3\n" + "".join(
     f"{number};{line}\n" for number, line in enumerate(text_of().splitlines())
 )
@@ -100,6 +105,11 @@ def test_a_cell_without_a_number_is_missing(tmp_path, cell, row, column):
 def test_encodings_and_ends_of_lines(tmp_path, encoding, end):
     text = ("Temperature;20,0 °C\n" + text_of()).replace("\n", end)
     np.testing.assert_array_equal(matrix_of(tmp_path / "t.csv", text, encoding).values[0], ROWS)
+
+
+def test_a_corner_without_a_number_is_no_missing_value(tmp_path):
+    notes = matrix_of(tmp_path / "t.csv", NAMED.replace("Y/X", "")).notes
+    assert not any("without a number" in text for text in notes.remarks)
 
 
 @pytest.mark.parametrize("between", ["\n", "Frame 2\n", "\nFrame 2;0,02 s\n\n"])
@@ -174,6 +184,9 @@ def test_three_decimals_everywhere_are_noted(tmp_path):
         ("950,1.383\n961,1.086\n", "'.' may be the decimal mark"),
         ("20\0,21\n", "is not text"),
         ("1e999,2,3\n3,4,5\n", "a number is too large"),
+        (points_of("x;y;T\n"), "line 2: each line is a point with its coordinates in columns 1"),
+        (points_of(), "line 1: each line is a point"),
+        (text_of().replace(";", " °C;"), "line 1, column 1: '20,25 °C' is not a number"),
     ],
 )  # fmt: skip
 def test_a_table_that_can_be_misread_is_refused(tmp_path, text, said):

@@ -175,7 +175,8 @@ def import_source(
     from chipglow.io.importing import kept_import
     from chipglow.text import Notes
 
-    wanted = load_import(source, settings or ()).build()
+    described = load_import(source, settings or ())
+    wanted = described.build()
     looked = prospect(wanted)
     _say(looked)
     if out is None:
@@ -191,8 +192,14 @@ def import_source(
             resume=kept if resume else None,
         )
     scene = open_scene(out)
-    filled = scene.filled()
+    filled, empty = scene.filled(), scene.void()
     scene.data.close()
+    if described.kind_of_source() == "grid" and (largest := empty.max()) > 0:
+        remark = (
+            f"In {np.count_nonzero(empty)} of {empty.size} frames up to {100 * largest:.2g} % of "
+            "the samples have no temperature or no material and are void."
+        )
+        current().remarks(Notes(remarks=[remark]))
     if (largest := filled.max()) > 0:
         warning = (
             f"In {np.count_nonzero(filled)} of {filled.size} frames up to {100 * largest:.2g} % of "

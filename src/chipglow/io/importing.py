@@ -262,7 +262,10 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
 def _remedy(wanted: Import) -> str:
     """Return what to do about temperatures beyond those of a scene."""
     unit = wanted.description.get("units", {}).get("temperature") or "K, or as the file states"
-    return f"units.temperature is {unit}: state another unit, such as degC, degF or cK"
+    return (
+        f"units.temperature is {unit}: state another unit, such as degC, degF or cK; for a grid "
+        "also scale and offset, or as void_value the number without a meaning"
+    )
 
 
 def _check_temperatures(wanted: Import, survey: Survey, raster: Raster) -> None:

@@ -207,6 +207,11 @@ class Scene:
         """The grid of the samples."""
         return raster_of(self.data)
 
+    def void(self) -> NDArray[np.float64]:
+        """Return the fraction of each frame's samples without material, shape (time,)."""
+        void = [self.field("material", index) == Material.VOID for index in range(len(self))]
+        return np.array([one.mean() for one in void])
+
     def filled(self) -> NDArray[np.float64]:
         """Return the fraction of each frame's material whose values are filled, shape (time,)."""
         if QUALITY not in self.data:

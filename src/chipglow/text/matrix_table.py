@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Final, Literal
 
@@ -34,6 +34,12 @@ _FEWEST_COUNTED: Final = 3
 
 _FEWEST_EVEN: Final = 5
 """Pixels of a row of which all steps are equal by chance are fewer."""
+
+_COLUMNS_OF_POINTS: Final = range(3, 9)
+"""Number of columns of x, y, maybe z, and fields."""
+
+_FEWEST_POINTS: Final = 9
+"""Points of a grid; fewer rows of an image may look like one by chance."""
 
 _MOST_DIGITS: Final = 3
 """Digits of a group of thousands; more decimals are rarely written."""
@@ -130,8 +136,11 @@ def read_matrix(path: Path) -> Matrix:
     table = _Cells(path, survey, form, blocks)
     table.drop_empty_columns(notes)
     _check_split_numbers(path, survey.separator, table)
-    values = table.values(notes)
-    values = _without_indices(path, values, table, headers, notes)
+    values = table.values()
+    rows, columns = _indices_of_all(path, values, table, headers, notes)
+    table.note_missing(values, rows, columns, notes)
+    values = values[:, rows:, columns:]
+    _check_list_of_points(path, blocks[0][0], values)
     if len(values) > 1:
         notes.remarks.append(f"{len(values)} frames are separated by lines without numbers.")
     return Matrix(values, notes)
@@ -168,7 +177,9 @@ def _refuse_text(path: Path, surveys: Sequence[_Survey]) -> None:
                if survey.lines}  # fmt: skip
     if not longest or all(line.cells == 0 for line in longest.values()):
         raise TableError(f"{path}: there is no number in it")
-    survey, line = max(longest.items(), key=lambda item: item[1].cells)
+    # The first separator that divides most lines; others may be decimal marks.
+    survey = max(longest, key=lambda one: sum(line.cells > 1 for line in one.lines))
+    line = longest[survey]
     cell, column = _first_text(survey, line)
     raise TableError(
         f"{path}, line {line.number}, column {column}: {cell[:40]!r} is not a number; expected a "
@@ -254,7 +265,7 @@ def _refuse_row(path: Path, survey: _Survey, line: _Line, widths: set[int]) -> N
         cell, column = _first_text(survey, line)
         raise TableError(
             f"{path}, line {line.number}, column {column}: {cell[:40]!r} is not a number; if the "
-            "line is not a row of the matrix, delete it"
+            "line is not a row of the matrix, delete it, else the cell"
         )
 
 
@@ -406,29 +417,37 @@ class _Cells:
             if empty:
                 notes.remarks.append(f"All rows {place} with a separator, which is left out.")
 
-    def values(self, notes: Notes) -> Array:
-        """Return all numbers, shape (frames, rows, columns), and note missing ones."""
+    def values(self) -> Array:
+        """Return all numbers, shape (frames, rows, columns)."""
         columns = self._last - self._first
         values = np.empty((len(self._blocks) * len(self._blocks[0]), columns))
-        missing: list[str] = []
         for row, (line, cells) in enumerate(self.rows()):
             try:
                 values[row] = [self._form.number(cell) for cell in cells]
             except ValueError:
                 values[row] = [number_or_nan(cell, self._form) for cell in cells]
-                missing += [
-                    f"{cell!r} in line {line.number}, column {column}"
-                    for column, cell in enumerate(cells, self._first + 1)
-                    if is_missing(cell) and cell.lower() != "nan"
-                ]
             if np.isinf(values[row]).any():
                 raise TableError(f"{self._path}, line {line.number}: a number is too large")
-        if missing:
-            notes.remarks.append(
-                f"{len(missing)} cell{'s' * (len(missing) > 1)} without a number are missing "
-                f"values, the first is {missing[0]}."
-            )
         return values.reshape(len(self._blocks), -1, columns)
+
+    def note_missing(self, values: Array, first_row: int, first_column: int, notes: Notes) -> None:
+        """Note cells without a number in the image, besides the text nan."""
+        begin = self._first + first_column
+        missing = [
+            f"{cell!r} in line {line.number}, column {column}"
+            for block, frame in zip(self._blocks, values, strict=True)
+            for line, numbers in zip(block[first_row:], frame[first_row:], strict=True)
+            if np.isnan(numbers).any()
+            for column, cell in enumerate(self._survey.cells(line)[begin : self._last], begin + 1)
+            if is_missing(cell) and cell.lower() != "nan"
+        ]
+        if missing:
+            one = len(missing) == 1
+            notes.remarks.append(
+                f"{len(missing)} {'cell' if one else 'cells'} without a number "
+                f"{'is a missing value' if one else 'are missing values'}, the first is "
+                f"{missing[0]}."
+            )
 
     def edges(self) -> Iterator[_Edges]:
         """Yield first row and column of each frame."""
@@ -453,12 +472,12 @@ def _is_even(values: Array) -> bool:
     return bool(np.abs(steps / steps[0] - 1).max() < _ROUNDING)
 
 
-def _without_indices(
+def _indices_of_all(
     path: Path, values: Array, cells: _Cells, headers: Sequence[_Line], notes: Notes
-) -> Array:
-    """Leave out a first row and column of indices; refuse what may be either index or pixel."""
+) -> tuple[bool, bool]:
+    """Return and note whether first row and column are indices; refuse what may be a pixel."""
     if min(values.shape[1:]) < 2:
-        return values
+        return False, False
     named, corner = bool(headers), any(line.numbers for line in headers)
     frames = zip(values, cells.edges(), strict=True)
     found = {_indices(path, frame, edges, named, corner) for frame, edges in frames}
@@ -468,7 +487,24 @@ def _without_indices(
     for axis, name in ((row, "row"), (column, "column")):
         if axis:
             notes.remarks.append(f"The first {name} counts the pixels and is left out.")
-    return values[:, int(row) :, int(column) :]
+    return row, column
+
+
+def _check_list_of_points(path: Path, first: _Line, values: Array) -> None:
+    """Refuse lines of a point each, of which two columns are the coordinates of a grid."""
+    frame = values[0]
+    rows, columns = frame.shape
+    if columns not in _COLUMNS_OF_POINTS or rows < _FEWEST_POINTS:
+        return
+    for one, other in combinations(range(columns), 2):
+        sides = [np.unique(frame[:, column]).size for column in (one, other)]
+        pairs = np.unique(frame[:, [one, other]], axis=0)
+        if min(sides) > 1 and sides[0] * sides[1] == rows == len(pairs):
+            raise TableError(
+                f"{path}, line {first.number}: each line is a point with its coordinates in "
+                f"columns {one + 1} and {other + 1}, expected a matrix; chipglow import reads "
+                "points (--set kind=points)"
+            )
 
 
 def _indices(

@@ -24,11 +24,13 @@ from chipglow.io.sources.layout import (
     coordinate,
     even_positions,
     find_fields,
+    is_reversed,
     may_be_field,
     note_other_unit,
     read_frames,
     read_list,
     scaled,
+    with_lists,
     without,
 )
 from chipglow.io.sources.plausible import check_sides, check_temperatures, check_tenths
@@ -96,7 +98,8 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
     """
     with ExitStack() as stack:
         notes = Notes()
-        image = _Image(open_arrays(str(path), stack, ARRAY_READERS[kind]), path, stated, notes)
+        arrays = with_lists(open_arrays(str(path), stack, ARRAY_READERS[kind]))
+        image = _Image(arrays, path, stated, notes)
         one, (rows, columns) = image.array, image.sides
         check_sides(one, rows, columns)
         chosen = chosen_frames(path, frames, image.count, rows * columns)
@@ -141,10 +144,12 @@ class _Image:
         self.sides = self._lengths["y"], self._lengths["x"]
         self.count = self._lengths.get("time", 1)
         self._y, self._x = self._coordinate("y"), self._coordinate("x")
-        if self._y is None:
+        self._is_upward, self._is_leftward = (
+            is_reversed(axis, one, notes) if found is None else ascends(found) == (axis == "y")
+            for axis, found in (("y", self._y), ("x", self._x))
+        )
+        if self._y is None and not self._is_upward:
             notes.assumed.append(ROW_0.format("upper"))
-        self._is_upward = self._y is not None and ascends(self._y)
-        self._is_leftward = self._x is not None and not ascends(self._x)
 
     @property
     def stored(self) -> str:
@@ -216,7 +221,7 @@ def _dataset(
             with suppress(SourceError):
                 labels = [find_fields(images, {}, ("temperature",), notes)["temperature"].name]
                 notes.assumed.append(f"The temperature is {labels[0]} among {', '.join(images)}.")
-        wrong = "give the dataset with the frames"
+        wrong = "give the dataset with the frames" if images else "no array has 2 or 3 axes"
     else:
         labels = [label for label in arrays if name in (label, label.rsplit("/", 1)[-1])]
         labels = [name] if name in arrays else labels
@@ -238,15 +243,19 @@ def _unit(one: FileArray, stated: Stated, notes: Notes) -> tuple[Quantity, Unit]
     if stated.unit is not None:
         found = recording_unit(stated.unit)
         assert found is not None  # Stated refuses others
-        quantity, unit = found
+        quantity, _ = found
         own = recording_unit(one.unit or "")
-        if own is None or own[0] != quantity or own[1] != unit:
-            note_other_unit(one.short, one.unit, notes)
+        if own is not None and quantity == "counts" != own[0]:
+            raise SourceError(
+                f"{one}: the file states values in {one.unit}, which are not counts; leave out unit"
+            )
+        if own != found:
+            note_other_unit(one.short, one.unit, notes, own is not None)
         return found
     found = recording_unit(one.unit or "")
     if found is None and stated.quantity in ("counts", "radiance"):
         found = recording_unit("counts" if stated.quantity == "counts" else "W/m2/sr")
-        note_other_unit(one.short, one.unit, notes)
+        note_other_unit(one.short, one.unit, notes, contradicts=False)
     if found is not None and stated.quantity not in (None, found[0]):
         raise SourceError(f"{one}: is in {one.unit}, which is not a unit of {stated.quantity}")
     return found

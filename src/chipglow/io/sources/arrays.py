@@ -15,6 +15,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources.conventions import FRAME_NAMES, OTHER_NAMES, simple
 from chipglow.io.sources.file_names import files_of, missing_number
 from chipglow.io.sources.source import (
     SourceError,
@@ -24,6 +25,7 @@ from chipglow.io.sources.source import (
     required,
     table_errors,
 )
+from chipglow.io.sources.unpacking import PACKING, unpack
 from chipglow.text import Notes, read_matrix
 
 MOST_SAMPLES: Final = 100_000_000
@@ -32,16 +34,11 @@ MOST_SAMPLES: Final = 100_000_000
 _MOST_NOTES: Final = 10
 _MORE_NOTES: Final = "There are more notes on further files."
 _KINDS: Final = "fiub"
-_MEANING: Final = (
-    "units", "scale_factor", "add_offset", "_Unsigned", "_FillValue", "missing_value", "valid_min",
-    "valid_max", "valid_range",
-)  # fmt: skip
-"""Attributes on which the meaning of numbers depends: those of a series are of its first file."""
-
 _ATTRIBUTES: Final = (
-    "standard_name", "axis", "bounds", "flag_values", "flag_masks", "flag_meanings", *_MEANING
+    "units", "standard_name", "axis", "bounds", "flag_values", "flag_masks", "flag_meanings",
+    "DISPLAY_ORIGIN", "IMAGE_SUBCLASS", "IMAGE_WHITE_IS_ZERO", *PACKING,
 )  # fmt: skip
-"""Attributes of the NetCDF and CF conventions that readers use."""
+"""Attributes of HDF5's images and of the NetCDF and CF conventions that readers use."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
     "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
@@ -119,8 +116,8 @@ def open_arrays(
 ) -> dict[str, FileArray]:
     """Return the arrays of a file by their names; the stack closes the file.
 
-    By a pattern with ``*`` each file is a frame, and the arrays get a first axis ``time``. The
-    reader depends on the ending of the name by default.
+    By a pattern with ``*`` each file is a frame, or several along its own first axis; the arrays
+    get a first axis ``time``. The reader depends on the ending of the name by default.
     """
     paths = files_of(pattern)
     first = _open_file(paths[0], stack, reader)
@@ -132,6 +129,7 @@ def open_arrays(
         if gap:
             notes.warnings.append(f"{pattern}: {gap}; the frames are taken as evenly spaced.")
         arrays = [_series(paths, array, reader, notes) for array in arrays]
+    arrays = [_squeezed(array) for array in arrays]
     only = re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
     arrays = [replace(array, name=array.name or only, path=pattern) for array in arrays]
     return {array.name: array for array in arrays}
@@ -155,21 +153,69 @@ def _open_file(
 def _series(
     paths: Sequence[Path], first: FileArray, reader: ArrayReader | None, notes: Notes
 ) -> FileArray:
+    """Return the unpacked arrays of one name in all files, one after the other along time."""
     said = first.notes + notes
+    together = _frames_per_file(first)
+    per_file = together or 1
+
+    def load(path: Path) -> NDArray[Any]:
+        values, found = _read_whole(path, first, reader)
+        _add_notes(said, found, path.name)
+        return values if together else values[None]
 
     def read(key: Key) -> NDArray[Any]:
-        chosen = paths[key[0]]
-        check_samples(str(chosen[0]), len(chosen) * first.size)
-        parts = []
-        for path in chosen:
-            values, found = _read_whole(path, first, reader)
-            parts.append(values[key[1:]])
-            _add_notes(said, found, path.name)
+        chosen = range(len(paths) * per_file)[key[0]]
+        check_samples(str(paths[0]), len(chosen) * first.size // per_file)
+        parts: list[NDArray[Any]] = []
+        opened, frames = -1, np.empty(0)
+        for index in chosen:
+            number, frame = divmod(index, per_file)
+            if number != opened:
+                opened, frames = number, load(paths[number])
+            parts.append(frames[frame][key[1:]])
         return np.stack(parts)
 
-    dims = ("time", *first.dims) if first.dims else ()
-    shape, chunks = (len(paths), *first.shape), (1, *first.shape)
-    return replace(first, shape=shape, read=read, dims=dims, chunks=chunks, notes=said)
+    sides = first.shape[1:] if together else first.shape
+    dims = (first.dims[1:] if together else first.dims) or ("",) * len(sides)
+    stated = {name: value for name, value in first.attributes.items() if name not in PACKING}
+    return replace(
+        first, shape=(len(paths) * per_file, *sides), read=read, dims=("time", *dims),
+        attributes=stated, chunks=(per_file, *sides), notes=said,
+    )  # fmt: skip
+
+
+def _frames_per_file(array: FileArray) -> int:
+    """Return the number of frames in each file of a series; 0 if a file is a frame."""
+    number, names = len(array.shape), (*OTHER_NAMES["time"], *FRAME_NAMES)
+    if array.dims:
+        several = simple(array.dims[0]) in names
+    elif number == 1:
+        several = simple(array.short) in names
+    else:
+        # MATLAB's images are ordered y, x, time.
+        several = number == 3 and not array.path.lower().endswith(".mat")
+    return array.shape[0] if several else 0
+
+
+def _squeezed(array: FileArray) -> FileArray:
+    """Return an array of more than three axes without those of length 1, as of a single band."""
+    if len(array.shape) <= 3:
+        return array
+    kept = [number for number, length in enumerate(array.shape) if length > 1]
+    if len(kept) not in (2, 3):
+        return array
+
+    def read(key: Key) -> NDArray[Any]:
+        parts = dict(zip(kept, key, strict=True))
+        whole = tuple(parts.get(number, slice(None)) for number in range(len(array.shape)))
+        values = array.read(whole)
+        return values.reshape([values.shape[number] for number in kept])
+
+    def chosen(values: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(values[number] for number in kept) if values else ()
+
+    return replace(array, shape=chosen(array.shape), read=read, dims=chosen(array.dims),
+                   chunks=chosen(array.chunks or ()) or None)  # fmt: skip
 
 
 def _add_notes(notes: Notes, added: Notes, name: str) -> None:
@@ -192,14 +238,12 @@ def _read_whole(
             raise SourceError(
                 f"{path}: expected an array {first.name!r} of shape {first.shape}, it has {found}"
             )
-        for name in _MEANING:
-            ours, stated = array.attributes.get(name), first.attributes.get(name)
-            if str(ours) != str(stated):
-                raise SourceError(
-                    f"{path}: {name} of {first.name!r} is {ours}, expected {stated} as in the "
-                    "first file of the series"
-                )
-        return array.part(), array.notes
+        if array.unit != first.unit:
+            raise SourceError(
+                f"{path}: units of {first.name!r} is {array.unit}, expected {first.unit} as in the "
+                "first file of the series"
+            )
+        return unpack(array.part(), array.attributes), array.notes
 
 
 # NumPy
@@ -297,6 +341,9 @@ def _hdf5_arrays(name: str, item: Any) -> Iterator[FileArray]:
     if item.dtype.kind not in _KINDS or item.shape is None or "#" in name:
         return
     attributes = {key: _plain(item.attrs[key]) for key in _ATTRIBUTES if key in item.attrs}
+    for key in item.attrs:
+        if key.lower() in ("unit", "units"):
+            attributes.setdefault("units", _plain(item.attrs[key]))
     dims = tuple(_dimension(dimension) for dimension in item.dims)
     dims = dims if all(dims) else ()
     kind = item.attrs.get("MATLAB_class")
@@ -407,7 +454,14 @@ def _moment(path: Path, array: FileArray) -> datetime:
 def _matlab_5(path: Path, stack: ExitStack) -> Iterator[FileArray]:
     from scipy.io import whosmat
 
-    for name, shape, kind in whosmat(path):
+    members = whosmat(path)
+    kinds = {kind for _, _, kind in members}
+    if kinds and kinds <= {"struct", "cell", "object"}:
+        raise SourceError(
+            f"{path}: has only {', '.join(f'{name} ({kind})' for name, _, kind in members[:5])}, "
+            "expected matrices; save the matrix itself, as in T = s.T; save('file.mat', 'T')"
+        )
+    for name, shape, kind in members:
         numeric = kind.startswith(("double", "single", "int", "uint", "logical"))
         if numeric and not name.startswith("__"):
             sides = tuple(int(length) for length in shape)

@@ -47,6 +47,9 @@ COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
 }  # fmt: skip
 """Names that the major codes give to fields, simplified by `simple`, the surest first."""
 
+FRAME_NAMES: Final = ("frame", "frames", "image", "images")
+"""Further names of the axis along time."""
+
 OTHER_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "time": ("time", "times", "t_s", "t"),
     **{

@@ -21,11 +21,13 @@ from chipglow.io.sources.layout import (
     coordinate,
     even_positions,
     find_fields,
+    is_reversed,
     may_be_field,
     read_frames,
     read_list,
     scaled,
     unit_of,
+    with_lists,
     without,
 )
 from chipglow.io.sources.plausible import check_sides, check_tenths
@@ -175,7 +177,7 @@ class _Grid:
         self._source, self.notes = source, Notes()
         files = source.files
         paths = tuple(files.values()) if isinstance(files, dict) else (str(files),)
-        self._files = {path: list(open_arrays(path, stack).values()) for path in paths}
+        self._files = {path: list(with_lists(open_arrays(path, stack)).values()) for path in paths}
         self._arrays = [array for arrays in self._files.values() for array in arrays]
         layers = {name: self._layer(name, array) for name, array in self._choose().items()}
         used = {layer.array.name for layer in layers.values()} | set(source.names.values())
@@ -265,6 +267,8 @@ class _Grid:
             self.notes.remarks.append(
                 f"The spacing is given; the coordinate {axis} determines only the direction."
             )
+        elif is_reversed(axis, self._first.array, self.notes):
+            is_ascending = axis == "y"
         elif axis == "y":
             self.notes.assumed.append(ROW_0.format("upper" if source.top_first else "lower"))
         number = np.arange(self._first.shape[AXES.index(axis)], dtype=np.float64) + 0.5

@@ -57,7 +57,10 @@ def _turn(orientation: object, notes: Notes) -> int:
 _BLACK_IS_ZERO: Final = ("MINISBLACK", "LINEAR_RAW")
 _MOST_BITS_OF_COLOURS: Final = 8
 """Planes of more bits are usually a stack of frames, which tifffile writes so by default."""
+_GDAL: Final = 42112
 _NO_DATA: Final = 42113
+_GDAL_ROLES: Final = {"scale": "scale_factor", "offset": "add_offset", "unittype": "units"}
+"""Attributes of NetCDF by the roles of items of GDAL's metadata."""
 _X_RESOLUTION: Final = 282
 _PHOTOMETRIC: Final = 262
 _INCH_AND_CENTIMETRE: Final = {2: 0.0254, 3: 0.01}
@@ -144,6 +147,8 @@ def _series_arrays(
     convert, attributes = _imagej_calibration(path, file, page, notes)
     if _NO_DATA in page.tags:
         attributes |= _no_data(page)
+    if _GDAL in page.tags:
+        attributes |= _gdal_packing(page, notes)
     shape, read = tuple(series.shape), _tiff_reader(path, series)
     if orientation in _TRANSPOSED:
         shape = (*shape[:-2], shape[-1], shape[-2])
@@ -283,6 +288,22 @@ def _note_pitch(file: Any, page: Any, notes: Notes) -> None:
             text = f"{1e6 * metres:.6g} µm"
     if text:
         notes.remarks.append(f"The file states a pixel pitch of {text}, which is not used.")
+
+
+def _gdal_packing(page: Any, notes: Notes) -> dict[str, Any]:
+    """Return scale, offset and unit that GDAL's metadata state for the stored numbers."""
+    try:
+        items = ElementTree.fromstring(str(page.tags[_GDAL].value).strip("\0 ")).iter("Item")
+        stated = {_GDAL_ROLES[role]: str(one.text).strip() for one in items
+                  if (role := one.get("role", "")) in _GDAL_ROLES}  # fmt: skip
+        result = {name: text if name == "units" else float(text) for name, text in stated.items()}
+    except (ElementTree.ParseError, ValueError):
+        notes.warnings.append("The metadata of GDAL in the file are damaged and not used.")
+        return {}
+    if result:
+        listed = ", ".join(f"{name} {value}" for name, value in result.items())
+        notes.remarks.append(f"The metadata of GDAL in the file are applied: {listed}.")
+    return result
 
 
 def _no_data(page: Any) -> dict[str, float]:

@@ -1,16 +1,24 @@
 """Which array of a file is which field or coordinate, along which axes and in which unit."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import FileArray
-from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, SI_UNITS, match_names, simple
+from chipglow.io.sources.conventions import (
+    COMMON_NAMES,
+    FRAME_NAMES,
+    OTHER_NAMES,
+    SI_UNITS,
+    match_names,
+    simple,
+)
 from chipglow.io.sources.plausible import LARGEST_WITHOUT_UNIT
 from chipglow.io.sources.source import SourceError, naming
-from chipglow.io.sources.unpacking import unpack
+from chipglow.io.sources.unpacking import PACKING, unpack
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.text import Notes
 
@@ -22,7 +30,7 @@ ROW_0: Final = "Row 0 is the {} edge."
 
 _GRID_NAMES: Final = {**COMMON_NAMES, "material": ("material",)}
 _DIMENSIONS: Final[Mapping[str, tuple[str, ...]]] = {
-    "time": ("frame", "frames", "image", "images"),
+    "time": FRAME_NAMES,
     "y": ("row", "rows", "line", "lines", "height", "lat", "latitude", "ny"),
     "x": ("column", "columns", "col", "cols", "width", "lon", "longitude", "nx"),
 }
@@ -33,6 +41,9 @@ _CF_AXES: Final = {
     "x": "x", "projection_x_coordinate": "x", "longitude": "x", "grid_longitude": "x",
 }  # fmt: skip
 """Axes by the attributes ``axis`` and ``standard_name`` of their coordinates."""
+_BOTTOM_OR_RIGHT: Final = {"y": ("LL", "LR"), "x": ("UR", "LR")}
+"""HDF5's origins of images whose first sample along an axis is the lowest or the rightmost."""
+_COLOURS: Final = ("IMAGE_INDEXED", "IMAGE_TRUECOLOR")
 _LARGEST_UNEVENNESS: Final = 0.05
 """Maximum distance of a coordinate from its even place, in steps."""
 
@@ -67,6 +78,37 @@ def find_fields(
     return {name: arrays[found[name]] for name in dict.fromkeys((*known, *found)) if name in found}
 
 
+def with_lists(arrays: Mapping[str, FileArray]) -> dict[str, FileArray]:
+    """Return arrays, with coordinates that are repeated along other axes as lists.
+
+    Coordinates are repeated in a mesh grid, and in each file of a series.
+    """
+    return {name: _as_list(array) for name, array in arrays.items()}
+
+
+def _as_list(array: FileArray) -> FileArray:
+    number = len(array.shape)
+    axis = next((axis for axis in ("y", "x") if _is_coordinate(array, axis, axis)), None)
+    if axis is None or number not in (2, 3) or max(array.shape) == array.size:
+        return array
+    rest = (slice(None),) * (number - 1)
+    values = array.part((slice(1 if number == 3 else None), *rest))
+    for index in range(1, array.shape[0] if number == 3 else 0):
+        if not np.array_equal(array.part((slice(index, index + 1), *rest)), values):
+            return array
+    mesh = unpack(values, array.attributes).reshape(array.shape[-2:])
+    is_in_each_frame = number == 2 and array.dims[:1] == ("time",)
+    mesh = mesh.T if axis == "y" and not is_in_each_frame else mesh
+    line = mesh[0]
+    if not (mesh == line).all():
+        if is_in_each_frame:
+            raise SourceError(f"{array}: differs between frames, expected the same {axis} in all")
+        return array
+    stated = {name: value for name, value in array.attributes.items() if name not in PACKING}
+    return replace(array, shape=line.shape, read=lambda key: line[key], dims=(), chunks=None,
+                   attributes=stated)  # fmt: skip
+
+
 def may_be_field(array: FileArray, arrays: Iterable[FileArray]) -> bool:
     """Return whether an array may hold samples: neither bounds of a coordinate nor flags."""
     bounds = {str(one.attributes.get("bounds")) for one in arrays}
@@ -87,6 +129,13 @@ def axes_of(
         raise SourceError(
             f"{array}: has shape {shape}, expected the axes {', '.join(given or AXES)}"
         )
+    if (kind := array.attributes.get("IMAGE_SUBCLASS")) in _COLOURS:
+        raise SourceError(f"{array}: its numbers are colours ({kind}), not measured values")
+    if array.attributes.get("IMAGE_WHITE_IS_ZERO"):
+        notes.warnings.append(
+            f"{array.short}: the file states that large numbers are dark (IMAGE_WHITE_IS_ZERO); "
+            "the numbers are used as stored."
+        )
     if given is not None:
         return tuple(given)
     named = tuple(_axis_of(dim, arrays) for dim in array.dims) or ("",) * len(shape)
@@ -103,6 +152,21 @@ def axes_of(
     if names != named:
         notes.assumed.append(f"The axes of {array.name} are {', '.join(names)}.")
     return names
+
+
+def is_reversed(axis: str, array: FileArray, notes: Notes) -> bool:
+    """Return and note whether an image's first row is its lowest, or first column the rightmost.
+
+    HDF5's attribute DISPLAY_ORIGIN states it for images without coordinates.
+    """
+    origin = array.attributes.get("DISPLAY_ORIGIN")
+    if origin not in _BOTTOM_OR_RIGHT[axis]:
+        return False
+    side = "lower edge is row 0" if axis == "y" else "right edge is column 0"
+    notes.remarks.append(
+        f"{array.short}: its {side}, as the file states (DISPLAY_ORIGIN {origin})."
+    )
+    return True
 
 
 def _axis_of(dim: str, arrays: Iterable[FileArray]) -> str:
@@ -138,8 +202,8 @@ def unit_of(name: str, label: str, text: str | None, given: Unit | None, notes: 
     """
     short = label.rsplit(": ", 1)[-1]
     if given is not None and (given != SI or name == "temperature"):
-        if text is not None and _known_unit(text, name) != given:
-            note_other_unit(short, text, notes)
+        if text is not None and (own := _known_unit(text, name)) != given:
+            note_other_unit(short, text, notes, own is not None)
         return given
     if text is None:
         if SI_UNITS[name] != "1":
@@ -159,10 +223,14 @@ def _known_unit(text: str, name: str) -> Unit | None:
         return None
 
 
-def note_other_unit(short: str, text: str | None, notes: Notes) -> None:
-    """Note that a file states another unit than the one that is given and used."""
+def note_other_unit(short: str, text: str | None, notes: Notes, contradicts: bool) -> None:
+    """Note that a file states another unit than the one that is given and used.
+
+    It is a warning if the file's text is a unit, which contradicts the given one.
+    """
     if text is not None:
-        notes.remarks.append(f"{short} is in {text!r}; the given unit is used instead.")
+        place = notes.warnings if contradicts else notes.remarks
+        place.append(f"{short} is in {text!r}; the given unit is used instead.")
 
 
 def scaled(unit: Unit, scale: float | None, offset: float | None) -> Unit:
@@ -205,6 +273,11 @@ def coordinate(
         # The most specific of several names: t may be another number.
         match.sort(key=lambda one: (one.short != dim, simple(one.short) == "t"))
     if not match:
+        for one in every:
+            if axis != "time" and 1 < len(one.shape) < 4 and _is_coordinate(one, axis, dim):
+                notes.warnings.append(
+                    f"{one.short} does not vary along {axis} alone: it is not used as a coordinate."
+                )
         return None
     found = match[0]
     if found.size != length:

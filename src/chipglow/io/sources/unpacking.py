@@ -6,6 +6,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+PACKING: Final = (
+    "scale_factor", "add_offset", "_Unsigned", "_FillValue", "missing_value", "valid_min",
+    "valid_max", "valid_range", "prefilled",
+)  # fmt: skip
+"""Attributes that `unpack` applies."""
+
 _PREFILLED: Final[Mapping[str, float]] = {"i2": -32767, "i4": -2147483647, "i8": -(2**63) + 2}
 """What the NetCDF library writes before a number is written, by type.
 
