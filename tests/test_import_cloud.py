@@ -274,6 +274,14 @@ def test_units_in_the_names_of_columns_and_given(tmp_path):
     assert np.nanmax(one.fields["plastic_strain"]) < 0.7
 
 
+@pytest.mark.parametrize(("label", "zero"), [("T_C", 273.15), ("T_K", 0.0), ("T_c", 0.0)])
+def test_a_unit_behind_an_underscore(tmp_path, label, zero):
+    table = columns_at(0.0)
+    write_csv(tmp_path / "a.csv", {"x": table["x"], "y": table["y"], label: np.full(600, 400.0)})
+    source = CloudSource(str(tmp_path / "a.csv"), names={"temperature": label})
+    assert source.survey().temperatures == pytest.approx((400.0 + zero, 400.0 + zero))
+
+
 def test_placement_turns_places_and_vectors(tmp_path):
     table = columns_at(0.0)
     zero = np.zeros_like(table["x"])

@@ -13,7 +13,7 @@ from chipglow.io.importing import Import, prospect
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.quantities.units import CELSIUS, Unit
+from chipglow.quantities.units import CELSIUS, Unit, parse_unit
 from chipglow.scene import Material, Raster
 
 pv = pytest.importorskip("pyvista")
@@ -157,6 +157,70 @@ def test_units_and_placement(tmp_path):
     np.testing.assert_allclose(found, temperature(X, Y), atol=3e-4)
     np.testing.assert_allclose(frame.fields["velocity_x"], -3.0, rtol=1e-6)
     np.testing.assert_allclose(frame.fields["velocity_y"], 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("label", "given", "kelvins", "said"),
+    [
+        ("Temperature [C]", None, 400.0 + 273.15, "is in 'C'."),
+        ("NT11 (degC)", None, 400.0 + 273.15, "is in 'degC'."),
+        ("T (K)", None, 400.0, ""),
+        ("Temperature [degF]", None, (400.0 + 459.67) / 1.8, "is in 'degF'."),
+        ("temp (1)", None, 400.0, "temp (1) is in K: the file states no unit."),
+        ("NT11", None, 400.0, "NT11 is in K: the file states no unit."),
+        ("NT11", "degC", 400.0 + 273.15, ""),
+        ("T (K)", "degC", 400.0 + 273.15, "T (K) is in 'K'; the given unit is used instead."),
+        ("T_C", None, 400.0 + 273.15, "is in 'C'."),
+        ("T_K", None, 400.0, ""),
+        ("T_K", "degC", 400.0 + 273.15, "the given unit is used instead."),
+        ("T_chip", None, 400.0, "T_chip is in K: the file states no unit."),
+        ("Temperature (avg)", None, "unknown unit 'avg' of temperature", ""),
+        ("Temperature (avg)", "K", 400.0, "the given unit is used instead."),
+    ],
+)
+def test_a_unit_in_the_name_of_a_field(tmp_path, label, given, kelvins, said):
+    grid = grid_of()
+    del grid.point_data["NT11"]
+    grid.point_data[label] = np.full(grid.n_points, 400.0)
+    grid.save(tmp_path / "chip.vtu")
+    units = Units(temperature=parse_unit(given, "K", "temperature") if given else None)
+    source = MeshSource(tmp_path / "chip.vtu", units=units, names={"temperature": label})
+    if isinstance(kelvins, str):
+        with pytest.raises(SourceError, match=kelvins):
+            source.survey()
+        return
+    assert only_frame(source).fields["temperature"][30, 40] == pytest.approx(kelvins, abs=1e-3)
+    notes = source.survey().notes
+    about = [text for text in (*notes.assumed, *notes.remarks) if text.startswith(label)]
+    assert [said in text for text in about] == ([True] if said else [])
+
+
+@pytest.mark.parametrize(
+    ("label", "ours", "factor"),
+    [
+        ("PEEQ (Avg: 75%)", "plastic_strain", 1.0),
+        ("PEEQ [%]", "plastic_strain", 0.01),
+        ("ERPEQ [1/ms]", "plastic_strain_rate", 1000.0),
+        ("V1 (mm/s)", "velocity_x", 1e-3),
+    ],
+)
+def test_units_in_names_of_other_fields(tmp_path, label, ours, factor):
+    grid = grid_of()
+    del grid.point_data["V"], grid.cell_data["PEEQ"]
+    grid.point_data[label] = np.full(grid.n_points, 40.0)
+    grid.point_data["V2"] = np.zeros(grid.n_points)
+    grid.save(tmp_path / "chip.vtu")
+    frame = only_frame(MeshSource(tmp_path / "chip.vtu"))
+    assert frame.fields[ours][30, 40] == pytest.approx(40.0 * factor)
+
+
+def test_the_surface_of_a_solid_is_not_taken_for_a_flat_mesh(tmp_path):
+    surface = grid_of(depth=3e-4).extract_surface(algorithm=None)
+    surface.save(tmp_path / "chip.vtp")
+    with pytest.raises(SourceError, match=r"flat elements that extend over 0\.0003 m along z, exp"):
+        MeshSource(tmp_path / "chip.vtp").survey()
+    frame = only_frame(MeshSource(tmp_path / "chip.vtp", section="facing"))
+    check_linear(frame, offset=30.0)
 
 
 def test_components_of_velocity_are_taken_along_their_axes_only(tmp_path):
@@ -621,7 +685,7 @@ def test_all_times_of_one_file_are_read(tmp_path, write):
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        (("temp",), "temperature: 0 in temp, expected kelvin"),
+        (("temp",), "temp: temperature 0 K, expected 200 to 6000 K; units.temperature is K"),
         (("temperature_graphite", "temperature_steel"), "no field is known as temperature"),
     ],
 )

@@ -540,24 +540,24 @@ COLOURS_OF_CAMERAS = LinearSegmentedColormap.from_list(
 )
 
 
-def page_of(colours, page, outline):
+def page_of(colours, page, outline, bands=256):
     """A field that rises from the left to the right, and its legend: (y, x, 3) and K."""
-    table = colours(np.arange(256), bytes=True)[:, :3]
+    table = colours(np.linspace(0, 1, bands), bytes=True)[:, :3]
     page = table[page] if isinstance(page, int) else page
     rising = np.broadcast_to((np.arange(240) + 0.5) / 240, (200, 240))
     picture = np.full((240, 320, 3), page, np.uint8)
-    picture[20:220, 10:250] = table[(256 * rising).astype(int)]
+    picture[20:220, 10:250] = table[(bands * rising).astype(int)]
     left, top, right, bottom = BAR
     if outline:
         picture[top - 1 : bottom + 1, left - 1 : right + 1] = 0
     along = (np.arange(bottom - top)[::-1] + 0.5) / (bottom - top)
-    picture[top:bottom, left:right] = table[(256 * along).astype(int)][:, None]
+    picture[top:bottom, left:right] = table[(bands * along).astype(int)][:, None]
     return picture, ENDS[0] + (ENDS[1] - ENDS[0]) * rising
 
 
-def read_with_box(path, picture, box):
-    encode(path, iter([picture]), CODECS[1])
-    movie = FieldMovie(str(path), *ENDS, legend=box)
+def read_with_box(path, picture, box, codec=CODECS[1], bands=0):
+    encode(path, iter([picture]), codec)
+    movie = FieldMovie(str(path), *ENDS, legend=box, bands=bands)
     crop = (10, 20, 250, 220)
     source = MovieSource(
         movie, pixel=PIXEL, origin=(10.0, 220.0), crop=crop, interval=1e-6, background=()
@@ -585,6 +585,47 @@ def test_a_box_that_is_off_is_refused_or_in_the_uncertainty(tmp_path, name, page
         rms = float(np.sqrt(((found - truth) ** 2).mean()))
         # One pixel of the legend is 5.5 K; the offset is known to about one.
         assert rms < 1.5 * source.uncertainty()["temperature"].total, (up, down)
+
+
+MJPEG_420, H264_444, H264_420 = CODECS[5], CODECS[7], CODECS[9]
+LOSSY = [
+    # Few bands, whose edges are elsewhere in a box that is off.
+    ("viridis", 5, H264_444, "black", (1, 1)),
+    ("jet", 4, H264_444, "slate", (2, -1)),
+    ("gray", 3, H264_444, "white", (0, -2)),
+    ("jet", 6, H264_444, "black", (0, -2)),
+    ("jet", 2, MJPEG_420, "slate", (1, 0)),
+    # Bands that noise hides.
+    ("viridis", 16, MJPEG_420, "white", (0, 0)),
+    ("viridis", 12, H264_420, "white", (1, 0)),
+    ("plasma", 9, H264_420, "slate", (-1, 2)),
+    ("viridis", 24, H264_420, "slate", (2, -1)),
+    # No bands.
+    ("viridis", 256, H264_420, "white", (0, 0)),
+    ("plasma", 256, MJPEG_420, "slate", (-1, 1)),
+    ("gray", 256, H264_444, "slate", (0, 0)),
+]
+
+
+@pytest.mark.parametrize(("name", "bands", "codec", "page", "off"), LOSSY)
+def test_the_uncertainty_of_compressed_bands_holds(tmp_path, name, bands, codec, page, off):
+    picture, truth = page_of(colormaps[name], PAGES[page], True, bands)
+    left, top, right, bottom = BAR
+    box = (left, top - off[0], right, bottom + off[1])
+    source, found = read_with_box(tmp_path / f"a{codec.suffix}", picture, box, codec)
+    stated = source.uncertainty()["temperature"].total
+    within = (np.abs(found - truth) <= 2 * stated).mean()
+    assert within >= 0.9
+    # It says something still: three bands of 8, or pixels of a legend without bands.
+    assert stated < 0.3 * (ENDS[1] - ENDS[0]) / min(bands, 8) + 20
+
+
+def test_bands_that_are_stated_are_not_counted(tmp_path):
+    picture, _ = page_of(colormaps["viridis"], PAGES["white"], True, 24)
+    source, found = read_with_box(tmp_path / "a.mp4", picture, BAR, H264_420, bands=24)
+    assert "Legend of 24 bands" in " ".join(source.survey().notes.assumed)
+    middles = ENDS[0] + (ENDS[1] - ENDS[0]) * (np.arange(24) + 0.5) / 24
+    assert np.abs(np.unique(found)[:, None] - middles).min(axis=1).max() < 0.01
 
 
 def test_a_lying_legend_is_read_from_its_left_end(tmp_path):

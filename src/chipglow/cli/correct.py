@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
-from chipglow.quantities import ZERO_CELSIUS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -171,6 +170,8 @@ def _corrected(
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:
+    from chipglow.quantities import ZERO_CELSIUS
+
     screen = current()
     columns = {
         "place": "place",

@@ -16,6 +16,7 @@ from chipglow.io.sources.conventions import (
     Units,
     match_names,
     simple,
+    unit_in_name,
 )
 from chipglow.io.sources.layout import check_times, unit_of
 from chipglow.io.sources.point_files import PointTable, open_points
@@ -177,7 +178,13 @@ class _Points:
     def _unit(self, name: str, label: str, table: PointTable) -> Unit:
         units = self._source.units
         own = units.length if name in _AXES else units.unit_given(name)
-        return unit_of(name, f"{table.path}: {label}", table.units.get(label), own, self.notes)
+        return unit_of(
+            name,
+            f"{table.path}: {label}",
+            table.units.get(label) or unit_in_name(label, name),
+            own,
+            self.notes,
+        )
 
     def _places(self, table: PointTable) -> NDArray[np.float64]:
         """Return places in m in the file's axes, shape (points, 3)."""

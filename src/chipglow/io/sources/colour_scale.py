@@ -23,10 +23,18 @@ _LEVELS: Final = 256
 _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
 _APART: Final = 15.0
 _CHORD: Final = 0.01  # half of the fraction of the scale over which its slope is taken
-_FEWEST_BANDS, _MOST_BANDS = 4, 40
+_FEWEST_BANDS, _MOST_BANDS = 2, 40
 _NARROWEST_BAND: Final = 6
 _BLURRED: Final = 2.0
 _BANDED: Final = 0.5
+_AS_WELL, _AS_WELL_LAB = 2.0, 0.5
+"""Of the numbers of bands, the smallest is taken that fits up to this much worse than the best one.
+
+A box that is off by 2 pixels shifts the edges of the bands, to which multiples of their number fit
+slightly better.
+"""
+_CLEARLY: Final = 0.1  # misfit of bands, by that of lines between them, that leaves no doubt
+_COVERAGE: Final = 2.5  # colours of one value differ by up to this multiple of their noise
 # D65, IEC 61966-2-1
 _WHITE: Final = np.array([[0.95047], [1.0], [1.08883]])
 _TO_XYZ: Final = (
@@ -62,6 +70,8 @@ class ColourScale:
     """sRGB of 0 to 1, shape (n, 3)."""
     banded: bool = False
     """Whether each colour stands for a band of values; otherwise values are interpolated."""
+    noise: float = 0.0
+    """Standard deviation of the colours in CIE L*a*b*, if they were taken from a picture."""
 
     def __post_init__(self) -> None:
         """Refuse a scale that returns to a colour that it left."""
@@ -90,23 +100,37 @@ class ColourScale:
             return cls._linear(_map_colours(name, count), values, banded=bands > 0)
 
     @classmethod
-    def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":
-        """Return the scale of a legend's colours, shape (n, 3), by the values at its two edges."""
+    def from_legend(
+        cls,
+        pixels: NDArray[np.uint8],
+        values: tuple[float, float],
+        bands: int = 0,
+        noise: float = 0.0,
+    ) -> "ColourScale":
+        """Return the scale of a legend's colours, shape (n, 3), by the values at its two edges.
+
+        Bands are counted if their number is 0; the noise is the standard deviation in L*a*b*.
+        """
         colours = pixels / 255.0
-        count = _equal_bands(colours)
+        count = bands or _equal_bands(colours)
         if count:
             ends = pairwise(np.linspace(0, len(pixels), count + 1))
             colours = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
-        return cls._linear(colours, values, banded=count > 0)
+        return cls._linear(colours, values, banded=count > 0, noise=noise)
 
     @classmethod
     def _linear(
-        cls, colours: NDArray[np.float64], values: tuple[float, float], *, banded: bool
+        cls,
+        colours: NDArray[np.float64],
+        values: tuple[float, float],
+        *,
+        banded: bool,
+        noise: float = 0.0,
     ) -> "ColourScale":
         first, last = values
         places = first + (last - first) * (np.arange(len(colours)) + 0.5) / len(colours)
         order = slice(None, None, 1 if last > first else -1)
-        return cls(places[order], colours[order], banded)
+        return cls(places[order], colours[order], banded, noise)
 
     @cached_property
     def knots(self) -> NDArray[np.float64]:
@@ -117,9 +141,38 @@ class ColourScale:
     @cached_property
     def widths(self) -> NDArray[np.float64]:
         """Range of values for which each colour of the knots stands, shape (m,)."""
+        return self._widths(*self._runs)
+
+    @cached_property
+    def uncertainties(self) -> NDArray[np.float64]:
+        """Standard uncertainty of the value by the number of distinct colours, shape (m,).
+
+        Adjacent knots whose colours differ by no more than noise are not distinguished. The true
+        value and the value that is read are then both anywhere in their range; in the range of a
+        single knot its middle is read.
+        """
         first, last = self._runs
+        below, above = (self._alike(side) for side in (-1, 1))
+        alike = self._widths(first[below], last[above])
+        return np.sqrt((2 * alike**2 - self.widths**2) / 12)
+
+    def _widths(self, first: NDArray[np.intp], last: NDArray[np.intp]) -> NDArray[np.float64]:
         step = (self.values[-1] - self.values[0]) / max(len(self.values) - 1, 1)
         return np.asarray(self.values[last] - self.values[first] + step)
+
+    def _alike(self, side: int) -> NDArray[np.intp]:
+        """Return the farthest knot up to which colours are those of each knot, shape (m,)."""
+        count = len(self.labs)
+        result = np.arange(count)
+        growing = result.copy()
+        while growing.size:
+            beyond = result[growing] + side
+            growing, beyond = (of[(beyond >= 0) & (beyond < count)] for of in (growing, beyond))
+            apart = np.linalg.norm(self.labs[growing] - self.labs[beyond], axis=1)
+            alike = apart <= _COVERAGE * self.noise
+            growing = growing[alike]
+            result[growing] = beyond[alike]
+        return result
 
     @cached_property
     def labs(self) -> NDArray[np.float64]:
@@ -206,7 +259,8 @@ def colour_uncertainty(
     if scale.banded:
         wrong = erfc(widths / 2 / np.maximum(noise, 1e-9 * widths) / sqrt(2))
         noise = np.sqrt(wrong) * widths
-    return ColourUncertainty(_root_mean_square(widths) / sqrt(12), _root_mean_square(noise))
+    colours = np.interp(values, scale.knots, scale.uncertainties)
+    return ColourUncertainty(_root_mean_square(colours), _root_mean_square(noise))
 
 
 def _root_mean_square(values: NDArray[np.float64]) -> float:
@@ -246,9 +300,10 @@ def _equal_bands(colours: NDArray[np.float64]) -> int:
     apart = np.array([_misfits(labs, count) for count in tried]).reshape(-1, 2)
     if not len(apart):
         return 0
-    best = int(np.argmax(apart[:, 0] <= 1.3 * apart[:, 0].min() + 0.2))
-    of_bands, of_lines = apart[best]
-    return tried[best] if of_bands < _BANDED * of_lines else 0
+    of_bands, of_lines = apart.T
+    nearly = np.maximum(_AS_WELL * of_bands.min() + _AS_WELL_LAB, _CLEARLY * of_lines)
+    best = int(np.argmax(of_bands <= nearly))
+    return tried[best] if of_bands[best] < _BANDED * of_lines[best] else 0
 
 
 def _misfits(labs: NDArray[np.float64], count: int) -> tuple[float, float]:
@@ -256,15 +311,17 @@ def _misfits(labs: NDArray[np.float64], count: int) -> tuple[float, float]:
     edges = np.linspace(0, len(labs), count + 1)
     middles = np.array([np.median(_inner(labs, *ends), axis=0) for ends in pairwise(edges)])
     place = np.arange(len(labs)) + 0.5
-    inside = np.abs(place - edges[:, None]).min(axis=0) > _BLURRED
+    # A box that is off shifts the edges too; narrow bands have no pixels to spare.
+    margin = np.clip(len(labs) / count / 6, _BLURRED, 2 * _BLURRED)
+    inside = np.abs(place - edges[:, None]).min(axis=0) > margin
     centres = (edges[1:] + edges[:-1]) / 2
     lines = np.stack([np.interp(place, centres, part) for part in middles.T], axis=1)
-    inside &= (place > centres[0]) & (place < centres[-1])
-    if not inside.any():
+    between = inside & (place > centres[0]) & (place < centres[-1])
+    if not between.any():
         return np.inf, np.inf
     band = np.clip(np.searchsorted(edges, place) - 1, 0, count - 1)
     of_bands = np.linalg.norm(labs - middles[band], axis=1)[inside].mean()
-    return float(of_bands), float(np.linalg.norm(labs - lines, axis=1)[inside].mean())
+    return float(of_bands), float(np.linalg.norm(labs - lines, axis=1)[between].mean())
 
 
 def _inner(colours: NDArray[np.float64], first: float, last: float) -> NDArray[np.float64]:

@@ -1,5 +1,6 @@
 """Names, units and axes of fields in other programs' files."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
@@ -10,7 +11,7 @@ from pydantic import BeforeValidator, InstanceOf, PlainSerializer, WithJsonSchem
 
 from chipglow.io.sources.source import SourceError
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import POSITION, SI, Unit, parse_unit
+from chipglow.quantities.units import POSITION, SI, Unit, is_bare_number, parse_unit
 from chipglow.scene import READABLE
 from chipglow.scene.frame import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
 
@@ -74,6 +75,22 @@ def simple(name: str) -> str:
     """Return a name in lower case with words joined by underscores, without a unit in brackets."""
     text = name.split("(")[0].split("[")[0].strip().lower()
     return "_".join("".join(letter if letter.isalnum() else " " for letter in text).split())
+
+
+_UNIT_IN_BRACKETS: Final = re.compile(r"[\[(]([^\]),;]*)[^\])]*[\])]\s*$")
+_UNIT_OF_TEMPERATURE: Final = re.compile(r"[_\s](K|C|F|deg_?[CFK]|(?i:kelvin|celsius))$")
+
+
+def unit_in_name(label: str, name: str = "") -> str | None:
+    """Return the unit that the label of a field states: ``T (degC)``, ``T [K, mean]``, ``T_C``.
+
+    Without brackets it is looked for in temperatures alone: ``v_C`` may be a velocity of the chip.
+    """
+    stated = _UNIT_IN_BRACKETS.search(label)
+    if stated is None and name == "temperature":
+        stated = _UNIT_OF_TEMPERATURE.search(label)
+    text = stated[1].strip() if stated else ""
+    return None if not text or is_bare_number(text) else text
 
 
 def match_names(

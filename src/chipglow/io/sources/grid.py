@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import ARRAY_READERS, FileArray, open_arrays
-from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple
+from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, simple, unit_in_name
 from chipglow.io.sources.layout import (
     AXES,
     COORDINATES,
@@ -208,7 +208,8 @@ class _Grid:
         axes = axes_of(array, source.axes, self.notes, self._arrays)
         unit = SI
         if name != "material":
-            unit = unit_of(name, str(array), array.unit, source.units.unit_given(name), self.notes)
+            text = unit_in_name(array.short, name) if array.unit is None else array.unit
+            unit = unit_of(name, str(array), text, source.units.unit_given(name), self.notes)
         if name == "temperature":
             unit = scaled(unit, source.scale, source.offset)
         return _Layer(array, axes, unit)

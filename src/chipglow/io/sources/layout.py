@@ -202,7 +202,7 @@ def unit_of(name: str, label: str, text: str | None, given: Unit | None, notes: 
     """
     short = label.rsplit(": ", 1)[-1]
     if given is not None and (given != SI or name == "temperature"):
-        if text is not None and (own := _known_unit(text, name)) != given:
+        if text is not None and (own := known_unit(text, name)) != given:
             note_other_unit(short, text, notes, own is not None)
         return given
     if text is None:
@@ -216,7 +216,8 @@ def unit_of(name: str, label: str, text: str | None, given: Unit | None, notes: 
     return unit
 
 
-def _known_unit(text: str, name: str) -> Unit | None:
+def known_unit(text: str, name: str) -> Unit | None:
+    """Return the unit of a text; None if it is none of the quantity."""
     try:
         return parse_unit(text, SI_UNITS[name], name)
     except ValueError:
@@ -295,7 +296,7 @@ def _is_coordinate(array: FileArray, axis: str, dim: str) -> bool:
 
 def _only_counts(axis: str, array: FileArray) -> bool:
     """Return whether a list is 0, 1, 2, ... or 1, 2, 3, ... without a unit of its axis."""
-    if array.unit is not None and _known_unit(array.unit, axis) is not None:
+    if array.unit is not None and known_unit(array.unit, axis) is not None:
         return False
     numbers = _numbers(array)
     return bool(numbers[0] in (0.0, 1.0) and (np.diff(numbers) == 1.0).all() and numbers.size > 1)

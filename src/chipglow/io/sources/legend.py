@@ -122,6 +122,18 @@ def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
 
 def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
     """Return medians of the colours along a legend, from its bottom or left end, shape (n, 3)."""
+    return _unblurred(np.median(_bar(picture, box), axis=1).astype(np.uint8))
+
+
+def legend_noise(picture: Picture, box: Box) -> float:
+    """Return the standard deviation of colours of one value in a legend, in CIE L*a*b*."""
+    bar = lab(_bar(picture, box) / 255.0)
+    apart = np.linalg.norm(bar - np.median(bar, axis=1, keepdims=True), axis=2)
+    return float(np.sqrt((apart**2).mean()))
+
+
+def _bar(picture: Picture, box: Box) -> NDArray[np.uint8]:
+    """Return the middle of a legend from its bottom or left end, shape (n, pixels across, 3)."""
     left, top, right, bottom = check_box("legend", box, *picture.shape[:2])
     bar = picture[top:bottom, left:right]
     bar = bar[::-1] if bottom - top >= right - left else bar.transpose(1, 0, 2)
@@ -129,7 +141,7 @@ def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
         raise SourceError(
             f"legend: box {box} is {len(bar)} pixels long, expected {_SHORTEST} or more"
         )
-    return _unblurred(np.median(_middle(bar), axis=1).astype(np.uint8))
+    return np.asarray(_middle(bar))
 
 
 def _middle(bar: NDArray[Any]) -> NDArray[Any]:

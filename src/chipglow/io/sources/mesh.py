@@ -10,8 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
-from chipglow.io.sources.conventions import OTHER_NAMES, Placement, Units, match_names, simple
+from chipglow.io.sources.conventions import (
+    OTHER_NAMES,
+    Placement,
+    Units,
+    match_names,
+    simple,
+    unit_in_name,
+)
 from chipglow.io.sources.file_names import files_of
+from chipglow.io.sources.layout import known_unit, unit_of
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_flat import FlatMesh, flatten
@@ -28,7 +36,7 @@ from chipglow.io.sources.source import (
 )
 from chipglow.io.sources.triangles import NOTHING, rasterise
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import POSITION
+from chipglow.quantities.units import POSITION, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.text import Notes
 
@@ -105,6 +113,7 @@ class MeshSource(Source, Part):
         meshes = Meshes(self)
         flat = [meshes.flat(number, blocks) for number, blocks in meshes.ends.items()]
         found, notes = meshes.found, Notes(meshes.assumptions(), remarks=meshes.remarks())
+        notes += meshes.unit_notes
         return Survey(
             meshes.reader.kind,
             meshes.times(notes),
@@ -133,6 +142,8 @@ class Meshes:
         """The first and the last mesh."""
         self.found = self._find()
         """The file's fields by the names of a scene; a vector of velocity is both components."""
+        self.unit_notes = Notes()
+        self._units = {name: self._unit(name, theirs) for name, theirs in self.found.items()}
 
     def read(self, number: int) -> list[Block]:
         file = self.reader.file(number)
@@ -178,6 +189,14 @@ class Meshes:
         elif not set(_COMPONENTS) <= set(found):
             found = {ours: theirs for ours, theirs in found.items() if ours not in _COMPONENTS}
         return found
+
+    def _unit(self, name: str, theirs: str) -> Unit:
+        """Return and note the unit of a field: the one given, that of its name, or SI."""
+        label, given = f"{self.reader.file(0)}: {theirs}", self._source.units.unit_given(name)
+        text = unit_in_name(theirs, name)
+        if text and name == "plastic_strain" and known_unit(text, name) is None:
+            text = None  # a remark, such as (Avg: 75%)
+        return unit_of(name, label, text, given, self.unit_notes)
 
     def flat(self, number: int, blocks: Sequence[Block]) -> FlatMesh:
         """Return the triangles of a mesh, without workpiece that has no temperature."""
@@ -330,7 +349,7 @@ class Meshes:
 
     def _values(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float32]:
         """Return one value for each place, in SI."""
-        placement, unit = self._source.placement, self._source.units.of(name)
+        placement, unit = self._source.placement, self._units[name]
         if name not in _COMPONENTS:
             return unit.to_si(values.mean(axis=1))
         along = _COMPONENTS.index(name)

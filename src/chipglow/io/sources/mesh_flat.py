@@ -23,6 +23,7 @@ A field with second derivative f'' along an edge of length h is then off by up t
 
 _LINES_AND_POINTS: Final = (0, 1, 2, 3, 4, 21, 36, 60, 61, 68, 75)
 _NUDGE: Final = 1e-7
+_FLAT: Final = 1e-3  # depth of a mesh by its longest side, up to which it is flat
 _TOOL: Final = "chipglow: tool"
 _HIDDEN_GHOST: Final = 32
 
@@ -62,6 +63,8 @@ def flatten(
     if not solids:
         if section is not None and section != "facing":
             raise SourceError("mesh.section: a flat mesh has no section position")
+        if section is None:
+            _check_flat(grids, placement, unit)
         flat = [part for grid in grids for part in _flat(grid)]
     elif section is None:
         raise SourceError(
@@ -86,6 +89,19 @@ def _range(solids: Sequence[Any], placement: Placement, unit: float) -> str:
     ends = [grid.bounds[2 * placement.depth :][:2] for grid in solids]
     low, high = unit * min(end[0] for end in ends), unit * max(end[1] for end in ends)
     return f"a position along {'xyz'[placement.depth]} from {low:g} m to {high:g} m"
+
+
+def _check_flat(grids: Sequence[Any], placement: Placement, unit: float) -> None:
+    """Refuse flat elements in front of each other, such as the surface of a solid."""
+    bounds = np.array([np.reshape(grid.bounds, (3, 2)) for grid in grids])
+    sides = bounds[:, :, 1].max(axis=0, initial=0) - bounds[:, :, 0].min(axis=0, initial=0)
+    depth = sides[placement.depth]
+    if depth > _FLAT * sides.max(initial=0):
+        raise SourceError(
+            f"mesh.section: none for flat elements that extend over {unit * depth:g} m along "
+            f"{'xyz'[placement.depth]}, expected facing for those that the camera sees, or another "
+            "placement"
+        )
 
 
 def _is_solid(grid: Any) -> NDArray[np.bool_]:

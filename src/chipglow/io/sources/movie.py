@@ -20,7 +20,13 @@ from chipglow.io.sources.colour_scale import (
     colour_uncertainty,
 )
 from chipglow.io.sources.conventions import SI_UNITS, PlacedGrid, Placement
-from chipglow.io.sources.legend import LEAST_EXPLAINED, end_uncertainty, explained, legend_pixels
+from chipglow.io.sources.legend import (
+    LEAST_EXPLAINED,
+    end_uncertainty,
+    explained,
+    legend_noise,
+    legend_pixels,
+)
 from chipglow.io.sources.moving_pictures import MovieIndex, index_movie, pictures
 from chipglow.io.sources.overlays import (
     Box,
@@ -53,6 +59,12 @@ Pixel = tuple[float, float]
 """Place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
+_NOISE_OF_YUV: Final = 1.0
+"""Least noise in CIE L*a*b* of colours that are stored as 8 bits of luminance and chrominance.
+
+It is the median error of ramps in `viridis` and `jet` as MJPEG and H.264 of good quality. Within a
+uniform area it is the same everywhere, and so cannot be seen there.
+"""
 _LOWEST: Final = 0.02
 """Fraction of a scale up to which a colour at the border is taken for its lowest value."""
 
@@ -82,7 +94,11 @@ class FieldMovie(Part):
         ),
     ] = None
     bands: Annotated[
-        int, Parameter("Number of bands of the colour map; 0: no steps.", allowed="0, 2 to 256")
+        int,
+        Parameter(
+            "Number of bands of the colour map; 0: no steps, or as counted in the legend.",
+            allowed="0, 2 to 256",
+        ),
     ] = 0
     legend: Annotated[
         Box | None,
@@ -345,7 +361,7 @@ class MovieSource(Source, Part):
             with naming(paths[name]):
                 movie = self._movies[name]
                 movie.check_scale(name)
-                scale, legend, said = _scale(movie, movie.ends(name), picture)
+                scale, legend, said = _scale(movie, movie.ends(name), picture, index.codec)
                 background, also = self._background(self._cropped(picture), scale)
                 covered = box_mask(shape, self.covered)
                 if legend is not None:
@@ -430,7 +446,7 @@ def _uncertainty_of_legend(legend: Legend | None, ends: tuple[float, float]) -> 
 
 
 def _scale(
-    movie: FieldMovie, ends: tuple[float, float], picture: Picture
+    movie: FieldMovie, ends: tuple[float, float], picture: Picture, codec: str
 ) -> tuple[ColourScale, Legend | None, list[str]]:
     """Return the scale of a movie, its legend, and the assumptions."""
     if movie.legend is None:
@@ -438,7 +454,8 @@ def _scale(
     box = movie.legend
     pixels = legend_pixels(picture, box)
     legend = Legend(box, end_uncertainty(picture, box))
-    scale = ColourScale.from_legend(pixels, ends)
+    noise = max(legend_noise(picture, box), _NOISE_OF_YUV if "yuv" in codec else 0.0)
+    scale = ColourScale.from_legend(pixels, ends, movie.bands, noise)
     fraction = explained(picture, box, scale)
     if fraction < LEAST_EXPLAINED:
         raise SourceError(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import FileArray, open_arrays
-from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple
+from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple, unit_in_name
 from chipglow.io.sources.file_names import files_of
 from chipglow.io.sources.source import SourceError, required, table_errors
 from chipglow.text import NamedTable, Notes, read_named_table
@@ -119,8 +119,8 @@ def _read_text(path: Path) -> PointTable:
         labels = [re.split(r"[\[(]", name)[0].strip() or name for name in table.names]
         _check_labels(table, labels)
         columns, errors = table.columns()
-    units = [re.search(r"[\[(]([^\])]*)[\])]\s*$", name) for name in table.names]
-    known = {label: unit[1].strip() for label, unit in zip(labels, units, strict=True) if unit}
+    units = [unit_in_name(name) for name in table.names]
+    known = {label: unit for label, unit in zip(labels, units, strict=True) if unit is not None}
     wrong = {labels[index]: error for index, error in errors.items()}
     numbers = dict(zip(labels, columns, strict=True))
     return PointTable(str(path), numbers, known, wrong, table.notes)
