@@ -342,8 +342,14 @@ def test_a_command_refuses_in_one_line_and_writes_nothing(folder, command):
     [
         ("", "bad.csv: there is no number in it"),
         ("x,y,u,v\n1,2,3,4\n", "bad.csv, line 1: 'x' has no unit, expected a name such as x_um"),
-        ("x_um,y_um,visible_column,visible_row\n1,2,3\n", "line 2: '1,2,3', expected 4 numbers"),
-        ("x_um,y_um,visible_column,visible_row\n1,2,3,nan\n", "line 2: '1,2,3,nan', expected"),
+        (
+            "x_um,y_um,visible_column,visible_row\n1,2,3\n",
+            "line 2: has 3 cells separated by ',', expected 4",
+        ),
+        (
+            "x_um,y_um,visible_column,visible_row\n1,2,3,nan\n",
+            "line 2: visible_row is 'nan', expected a number",
+        ),
         ("x_um,y_um,visible_column,visible_row\n900,2,3,4\n", "outside the infrared image"),
         ("x_um,y_um,visible_column,visible_row\n9,20,3,400\n", "outside the visible picture"),
     ],
