@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
+from command import refusal
 
 from chipglow import AnnularAperturePSF, Band, Camera, Estimate, Measurement, Raster
 from chipglow.camera import Flag, ImageFormation
@@ -18,6 +20,7 @@ from chipglow.correction import (
 from chipglow.correction.cells import cut_cells
 from chipglow.correction.posterior import Image, Problem
 from chipglow.correction.zones import Motion, ShapedObject
+from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import EmissivityLine
 from chipglow.scene import Polygon, Region
 
@@ -345,3 +348,30 @@ def test_an_image_below_the_range_is_refused():
 def test_zones_out_of_limits_are_refused(settings):
     with pytest.raises(ValueError, match="zone plate"):
         Zone("plate", **settings)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with a measurement and its point spread function."""
+    kelvins, emissivity, samples, pixels = scene(12)
+    write_measurement(measured(kelvins, emissivity, samples, pixels), tmp_path / "chip.nc")
+    kernel = xr.Dataset({"weights": (("y", "x"), np.ones((3, 3)))}, attrs={"spacing": PITCH})
+    kernel.to_netcdf(tmp_path / "psf.nc", engine="h5netcdf")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("", "--psf: is missing; give --psf with --emissivity, or --study"),
+        ("--psf psf.nc --study s.yaml", "--study: cannot be combined with --psf"),
+        ("--psf psf.nc", "--emissivity: give a file of chipglow emissivity, or a number"),
+        ("--psf psf.nc --emissivity 1.7", "emissivity: is 1.7, expected more than 0 to 1"),
+        ("--psf psf.nc --emissivity e.nc", "e.nc: there is no such file"),
+        ("--psf none.nc --emissivity 0.7", "none.nc: there is no such file"),
+    ],
+)
+def test_the_command_refuses_in_one_line(folder, options, message):
+    assert message in refusal(f"correct chip.nc {options} --out corrected.nc")
+    assert not (folder / "corrected.nc").exists()

@@ -86,8 +86,10 @@ def correct(
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_frame
 
-    if (study is None) == (psf is None):
-        raise ValueError("--study: give either a study or --psf with --emissivity")
+    if study is None and psf is None:
+        raise ValueError("--psf: is missing; give --psf with --emissivity, or --study")
+    if study is not None and psf is not None:
+        raise ValueError("--study: cannot be combined with --psf, as the study states the camera")
     measurement = load_measurement(image, settings or ())
     with progress_bars() as progress:
         progress("correction", 0.0)
@@ -142,11 +144,10 @@ def _zones(
 
     if emissivity is None:
         raise ValueError("--emissivity: give a file of chipglow emissivity, or a number")
-    try:
-        lines: Any = lab.EmissivityLine.constant(float(emissivity), uncertainty)
-    except ValueError:
-        if not Path(emissivity).exists():
-            raise
+    lines: Any
+    if emissivity.replace(".", "", 1).isdigit():
+        lines = lab.EmissivityLine.constant(float(emissivity), uncertainty)
+    else:
         lines = lab.read_emissivity_lines(Path(emissivity))
     named = () if regions is None else lab.load_regions(regions)
     cutter = measurement.tool if tool is None else chosen_tool(measurement, tool)[0]

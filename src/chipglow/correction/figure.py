@@ -11,8 +11,9 @@ from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.quantities import ZERO_CELSIUS
 
-_PANEL_WIDTH: Final = 2.2
-_AROUND: Final = 0.85
+_PANEL_WIDTH: Final = 1.6
+"""Width of an image in inches, of which the page holds three with their colour bars."""
+
 _LARGEST_PERCENTILE: Final = 98.0
 """Upper end of the scale of half-widths: pixels near the range limit are far wider."""
 
@@ -31,11 +32,10 @@ def draw_correction(correction: Correction, measurement: Measurement, frame: int
     panels = (
         ImagePanel("measured", "radiance temperature / °C", measured, heat, scales.HEAT),
         ImagePanel("corrected", "true temperature / °C", corrected, heat, scales.HEAT),
-        ImagePanel("half-width of the 95 % interval", "K", half_width, widths),
+        ImagePanel("half-width (95 %)", "temperature / K", half_width, widths),
     )
-    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
     with drawing.style():
-        figure = drawing.new_figure(height)
+        figure = drawing.image_figure(raster, _PANEL_WIDTH, rows=1)
         for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
             panel.draw(figure, axes, raster)
             axes.label_outer()
