@@ -194,6 +194,8 @@ def print_case(case, results):
     print(f" {'better scenes':>13} {'held':>6} {'half-width':>10}")
     for place in PLACES:
         rows = [rows[case][place] for _, rows, _ in results if rows[case][place][0]]
+        if not rows:
+            continue
         counts, squares, held, half = (np.array(column) for column in zip(*rows, strict=True))
         errors = np.sqrt(squares.sum(axis=0) / counts.sum())
         better = (squares[:, -1] <= squares[:, 0]).mean()
