@@ -77,6 +77,7 @@ PROGRAMS = {
     "verification.py": ("momentum", {"| A free, spinning block": 4}),
 }
 NEEDED = {
+    "correction.py": ("skimage",),
     "app_latency.py": ("panel", "playwright"),
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movies.py": ("av",),
