@@ -9,16 +9,18 @@ from matplotlib import pyplot as plt
 def on_given_axes(result, *arguments):
     """Return axes on which a result is drawn; it must not make others."""
     figure, axes = plt.subplots()
+    open_before = plt.get_fignums()
     assert result.plot(*arguments, ax=axes) is axes
-    assert plt.get_fignums() == [figure.number]
+    assert plt.get_fignums() == open_before
     plt.close(figure)
     return axes
 
 
 def on_new_axes(result, *arguments):
     """Return new axes on which a result is drawn."""
+    open_before = plt.get_fignums()
     axes = result.plot(*arguments)
-    assert plt.get_fignums() == [axes.figure.number]
+    assert plt.get_fignums() == [*open_before, axes.figure.number]
     plt.close(axes.figure)
     return axes
 

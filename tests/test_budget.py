@@ -595,7 +595,7 @@ def test_impossible_parts_of_distributions_and_missing_sources_are_stated(plate,
 scene: {plate}
 surface: {{kind: uniform, emissivity: 0.98}}
 camera: {{psf: none, lower_limit: none}}
-analysis: {{reference: true, points: {{middle: [0 um, 0 um]}}}}
+analysis: {{reference: true-maximum, points: {{middle: [0 um, 0 um]}}}}
 uncertainty:
   inputs:
     surface.emissivity: {{standard: 0.05}}

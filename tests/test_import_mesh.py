@@ -191,7 +191,8 @@ def test_a_unit_in_the_name_of_a_field(tmp_path, label, given, kelvins, said):
         return
     assert only_frame(source).fields["temperature"][30, 40] == pytest.approx(kelvins, abs=1e-3)
     notes = source.survey().notes
-    about = [text for text in (*notes.assumed, *notes.remarks) if text.startswith(label)]
+    said_of = (*notes.assumed, *notes.warnings, *notes.remarks)
+    about = [text for text in said_of if text.startswith(label)]
     assert [said in text for text in about] == ([True] if said else [])
 
 
