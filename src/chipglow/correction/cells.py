@@ -177,7 +177,7 @@ class _Points:
 
     def of_zone(self, number: int) -> dict[str, Array]:
         """Return area, emissivity, centroid and second moments of a zone's part of each cell."""
-        # What does not shine, such as emissivity 0, is no part.
+        # Points without emission, such as those of emissivity 0, belong to no part.
         within = ((self.labels == number) & (self.emissivity > 0)).astype(np.float64)
         area = within.mean(axis=1)
         cell = np.flatnonzero(area > _LEAST_AREA)

@@ -82,15 +82,15 @@ def correct(
         counts.
     psf_uncertainty : float
         Relative standard uncertainty of the width of the point spread function, in addition to
-        that of a measured one.
+        the stated components of a measured one.
     outline_uncertainty : float
         Standard uncertainty of the position of the outlines in m. If it is positive, the position
         is estimated from each frame.
     surroundings : Estimate, optional
         Temperature of the surroundings in K; 293 K without uncertainty by default.
     noise : float, optional
-        Standard deviation of the noise in K at 600 K. By default that of the measurement's
-        detector, or estimated from the frame.
+        Standard deviation of the noise in K at 600 K. By default it follows from the measurement's
+        detector, or is estimated from the frame.
     seed : int
         Seed of the draws by which uncertainties are propagated.
     progress : callable, optional
@@ -114,7 +114,7 @@ def correct(
     weights w follow from the data around each place by expectation maximisation. The bias of the
     prior is estimated from the solution and corrected once. Uncertainties are propagated by the
     linearised solution: systematic errors by one change each, random fields by draws. The
-    temperature is that of the mean radiance over pixel and exposure.
+    temperature belongs to the mean radiance over pixel and exposure.
     """
     observed = zones if isinstance(zones, ObservedObject) else _shaped(zones, measurement.raster)
     _check(measurement, camera, observed, psf_uncertainty, outline_uncertainty)
@@ -163,14 +163,14 @@ def _check(
     seen, stated = measurement.band, camera.band
     if not np.allclose([seen.lower, seen.upper], [stated.lower, stated.upper], rtol=1e-6):
         raise ValueError(
-            f"correct: the camera's band is {_band(stated)}, but that of the measurement is "
+            f"correct: the camera's band is {_band(stated)}, but the measurement has the band "
             f"{_band(seen)}"
         )
     pitch = measurement.raster.spacing
     if abs(camera.pitch / pitch - 1) > _LARGEST_PITCH_ERROR:
         raise ValueError(
-            f"correct: the camera's pitch is {1e6 * camera.pitch:.6g} um, but that of the "
-            f"measurement is {1e6 * pitch:.6g} um"
+            f"correct: the camera's pitch is {1e6 * camera.pitch:.6g} um, but the "
+            f"measurement has {1e6 * pitch:.6g} um"
         )
     if camera.psf is None:
         raise ValueError("correct: the camera has no point spread function; state camera.psf")

@@ -1,4 +1,4 @@
-"""Zones from what the laboratory determined: emissivities of regions, and a tool."""
+"""Zones from results of the laboratory: emissivities of regions, and a tool."""
 
 from collections.abc import Mapping, Sequence
 from typing import Final
@@ -50,12 +50,12 @@ def known_zones(
         named = dict(emissivities)
     if elsewhere is not None and elsewhere not in named:
         raise ValueError(
-            f"elsewhere: {elsewhere!r} has no emissivity, expected one of {', '.join(named)}"
+            f"elsewhere: {elsewhere!r} has no emissivity; known are {', '.join(named)}"
         )
     if tool is not None and TOOL not in named:
         raise ValueError(
-            f"emissivity: none is named {TOOL!r}, but the measurement has a tool; expected one "
-            f"beside {', '.join(named)}"
+            f"emissivity: none of {', '.join(named)} is named {TOOL!r}, but the measurement has a "
+            "tool; determine its emissivity too"
         )
     outside = None if elsewhere is None else named[elsewhere]
     zones = [_zone(elsewhere or "elsewhere", outside, None, grain)]

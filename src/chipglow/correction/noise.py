@@ -1,4 +1,4 @@
-"""Noise of a frame: that of the stated detector, a stated one, or estimated from the frame."""
+"""Noise of a frame: stated, known from the detector, or estimated from the frame."""
 
 from typing import Final
 
@@ -23,7 +23,7 @@ _QUIET: Final = 0.1
 """Quantile of the blocks: detail of the object raises the estimate in most of them."""
 
 _LEAST: Final = 1e-4
-"""Least noise relative to the radiance, far below that of any camera."""
+"""Least noise relative to the radiance, far below the noise of any camera."""
 
 
 def noise_of(

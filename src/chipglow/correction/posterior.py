@@ -50,7 +50,7 @@ class Image:
     noise: Array
     """Standard deviation in W/(m² sr)."""
     under_range: NDArray[np.bool_]
-    """Pixels below the range; their radiance and noise are those of a uniform distribution."""
+    """Pixels below the range; their radiance and noise follow from a uniform distribution."""
     lower_bound: NDArray[np.bool_]
     """Saturated pixels: their radiance is at least the stated one."""
     missing: NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""What the corrected radiance owes to each source of uncertainty: changes of the solution."""
+"""Changes of the corrected radiance by each source of uncertainty."""
 
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
@@ -53,7 +53,7 @@ class Effect:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What is known of camera, object and surroundings, with standard uncertainties."""
+    """Knowledge of camera, object and surroundings, with standard uncertainties."""
 
     observed: ObservedObject
     band: Band
@@ -208,8 +208,8 @@ def _range_images(posterior: Posterior) -> list[Array]:
 def _border_image(posterior: Posterior) -> Array:
     """Return the standard uncertainty of the image by the radiance beyond it.
 
-    The solution takes it as that of the edge, as cameras do. It may as well resemble what each
-    pixel sees within the image: all values between the two are equally probable.
+    The solution takes it as constant beyond the edge, as cameras do. It may as well resemble the field
+    of view of each pixel within the image: all values between the two are equally probable.
     """
     formation = posterior.problem.formation
     within = replace(formation, beyond="nothing")
@@ -224,7 +224,7 @@ class OutlineFit:
 
     motion: Motion
     effects: Array
-    """Changes of the parts' values by what remains uncertain of it, (3, part)."""
+    """Changes of the parts' values by the remaining uncertainty of the motion, (3, part)."""
     standard_uncertainty: Motion
 
     def moves(self, least: float) -> bool:

@@ -1,4 +1,4 @@
-"""What is known of the observed object: zones with their emissivity, and their outlines."""
+"""Zones of the observed object: their emissivity and their outlines."""
 
 from abc import ABC, abstractmethod
 from dataclasses import astuple, dataclass, replace
@@ -29,7 +29,7 @@ class Zone:
     emissivity : float or None
         Emissivity, over 0 to 1; None: not known, so that no temperature is determined there.
     shape : Region, Tool or None
-        Where it is, in the measurement's coordinates; None: all that no other zone covers.
+        Where it is, in the measurement's coordinates; None: the rest of the image.
     uncertainty : float
         Standard uncertainty of the emissivity that is common to the zone.
     texture : float
@@ -85,7 +85,7 @@ class ObservedObject(ABC):
 
     @abstractmethod
     def moved(self, motion: Motion) -> "ObservedObject":
-        """Return the object with its outlines displaced by `motion` from where they are stated."""
+        """Return the object with its outlines displaced by `motion` from their stated position."""
 
     def look_up(self, x: Array, y: Array) -> tuple[Labels, Array]:
         """Return the label and the emissivity of points in m, each of the shape of `x`."""

@@ -1,4 +1,4 @@
-"""Correction of measurements of a study: camera, emissivity and outlines are those of its scene."""
+"""Correction of measurements with the camera, emissivity and outlines of a study."""
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def correct_study(
     Parameters
     ----------
     study : Study
-        Camera, surface and scene. The scene's coordinates and times are those of the measurement.
+        Camera, surface and scene. The measurement has the scene's coordinates and times.
     measurement : Measurement
         Frames within the time of the scene.
     chip : str, optional

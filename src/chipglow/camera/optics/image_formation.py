@@ -17,7 +17,7 @@ from chipglow.scene import Raster
 from chipglow.scene.raster import check_shape
 
 Gather: TypeAlias = Callable[[Array, Raster, Raster, float], Array]
-"""What the pixels receive of samples: takes samples, their raster, pixels and fill factor."""
+"""Function from samples, their raster, pixels and fill factor to the values of the pixels."""
 
 
 class _Step(NamedTuple):
@@ -49,8 +49,8 @@ class ImageFormation:
     beyond : {"edge", "nothing"}
         Radiance beyond the samples: that of the edge continues, or none.
     gather : callable
-        What the pixels receive of samples; their mean over each pixel's square by default. The
-        adjoint is defined for the default alone.
+        Function from samples to pixels; by default the mean over each pixel's square. The adjoint
+        is defined for the default alone.
 
     Notes
     -----
@@ -79,7 +79,7 @@ class ImageFormation:
         values = np.asarray(image, np.float64)
         check_shape("image formation: image", values.shape, self.pixels.shape)
         if self.gather is not integrate:
-            raise ValueError("image formation: what the pixels gather is not linear")
+            raise ValueError("image formation: the map from samples to pixels is not linear")
         for step in reversed(self._steps):
             values = step.adjoint(values)
         return values
