@@ -208,8 +208,8 @@ def _range_images(posterior: Posterior) -> list[Array]:
 def _border_image(posterior: Posterior) -> Array:
     """Return the standard uncertainty of the image by the radiance beyond it.
 
-    The solution takes it as constant beyond the edge, as cameras do. It may as well resemble the field
-    of view of each pixel within the image: all values between the two are equally probable.
+    The solution takes it as constant beyond the edge, as cameras do. It may as well resemble the
+    surroundings of each pixel within the image; all values between are equally probable.
     """
     formation = posterior.problem.formation
     within = replace(formation, beyond="nothing")
