@@ -360,16 +360,21 @@ class Camera(Part):
         return self._received(image, scene)[0]
 
     def image_formation(
-        self, samples: Raster, beyond: Beyond = "edge", gather: Gather = integrate
+        self,
+        samples: Raster,
+        beyond: Beyond = "edge",
+        gather: Gather = integrate,
+        pixels: Raster | None = None,
     ) -> ImageFormation:
         """Return the linear map from the radiance of samples to the radiance of the pixels.
 
         It has an adjoint, for corrections of measured images. Radiance beyond the samples continues
-        as at the edge, or is none; `gather` is as in `form_image`.
+        as at the edge, or is none; `gather` is as in `form_image`. The pixels are those of the
+        camera on the samples, unless stated.
         """
         return ImageFormation(
             samples,
-            self.pixels(samples),
+            self.pixels(samples) if pixels is None else pixels,
             self.psf,
             self.psf_order == "detector",
             self.fill_factor,

@@ -80,7 +80,7 @@ def correct(
 ) -> None:
     """Determine the true temperature of every pixel, with its uncertainty."""
     from chipglow.cli.progress import progress_bars
-    from chipglow.correction import ROOM, place_frame, places_of, write_correction
+    from chipglow.correction import place_frame, places_of, write_correction
     from chipglow.correction.figure import draw_correction
     from chipglow.laboratory.emissivity import load_regions, reflected_temperature
     from chipglow.laboratory.measurement import load_measurement
@@ -113,7 +113,7 @@ def correct(
                 psf_uncertainty=psf_uncertainty,
                 outline_uncertainty=outline_uncertainty,
                 surroundings=reflected_temperature(
-                    ROOM if reflected is None else reflected, reflected_uncertainty or 0.0
+                    293.0 if reflected is None else reflected, reflected_uncertainty or 0.0
                 ),
                 noise=noise,
                 progress=partial(progress, "correction"),

@@ -1,6 +1,6 @@
 """The true temperature of every pixel from measured frames, with its uncertainty."""
 
-from chipglow.correction.correct import ROOM as ROOM, correct as correct
+from chipglow.correction.correct import correct as correct
 from chipglow.correction.correction import (
     UNDETERMINED as UNDETERMINED,
     Correction as Correction,

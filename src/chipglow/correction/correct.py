@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.special import stdtrit
 
-from chipglow.camera import Camera, Flag, ImageFormation, Measurement
+from chipglow.camera import Camera, Flag, Measurement
 from chipglow.correction.cells import Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag
 from chipglow.correction.noise import noise_of
@@ -28,15 +28,13 @@ from chipglow.correction.sensitivity import (
     texture_effect,
 )
 from chipglow.correction.zones import Motion, ObservedObject, ShapedObject, Zone
+from chipglow.laboratory.emissivity import reflected_temperature
 from chipglow.quantities import Array
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
-
-ROOM: Final = 293.0
-"""Temperature of the surroundings in K if none is stated: the paper's laboratory."""
 
 _MODEL_ERROR: Final = 5e-4
 """Relative standard uncertainty of the predicted image.
@@ -116,14 +114,17 @@ def correct(
     linearised solution: systematic errors by one change each, random fields by draws. The
     temperature belongs to the mean radiance over pixel and exposure.
     """
-    observed = zones if isinstance(zones, ObservedObject) else _shaped(zones, measurement.raster)
+    if isinstance(zones, ObservedObject):
+        observed = zones
+    else:
+        observed = ShapedObject(tuple(zones), measurement.raster)
     _check(measurement, camera, observed, psf_uncertainty, outline_uncertainty)
     known = Knowledge(
         observed,
         measurement.band,
         psf_uncertainty,
         outline_uncertainty,
-        Estimate(np.array(ROOM)) if surroundings is None else surroundings,
+        reflected_temperature() if surroundings is None else surroundings,
     )
     frames = [
         _corrected(
@@ -138,10 +139,6 @@ def correct(
         for frame in range(len(measurement))
     ]
     return _joined(measurement, frames, known)
-
-
-def _shaped(zones: Sequence[Zone], pixels: Raster) -> ShapedObject:
-    return ShapedObject(tuple(zones), pixels)
 
 
 def _part_of(
@@ -299,14 +296,7 @@ def _solution(
     progress: Callable[[float], None],
 ) -> Posterior:
     parts = cut_cells(known.observed, pixels)
-    formation = ImageFormation(
-        parts.cells,
-        pixels,
-        camera.psf,
-        camera.psf_order == "detector",
-        camera.fill_factor,
-        camera.optics,
-    )
+    formation = camera.image_formation(parts.cells, pixels=pixels)
     room = float(known.band.radiance(known.surroundings.values))
     cells = parts.cells.rows * parts.cells.columns
     mirrored = np.bincount(parts.cell, parts.area * (1 - parts.emissivity), cells)

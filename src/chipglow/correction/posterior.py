@@ -92,10 +92,6 @@ class Problem:
         """Return the mean blackbody radiance of the parts in W/(m² sr)."""
         return np.asarray(np.exp(self.parts.at_centroids @ x))
 
-    def model(self, x: Array) -> Array:
-        """Return the image that a solution predicts."""
-        return Posterior(self, x).predicted
-
     def solve(self, generator: np.random.Generator, check: Callable[[], None]) -> "Posterior":
         """Return the solution, with weights of the prior that follow from the data.
 

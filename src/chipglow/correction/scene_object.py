@@ -23,8 +23,9 @@ def observed_scene(
 ) -> SampledObject:
     """Return zones and emissivity of a scene during an exposure that begins at `start` in s."""
     plain = replace(camera, reflected=None)
-    seen = plain.expose(scene, surface.without_texture(), start).mean_radiance
-    black = plain.expose(scene, UniformSurface(1.0), start).mean_radiance
+    surfaces = surface.without_texture(), UniformSurface(1.0)
+    fields = [plain.prepare(one, scene) for one in surfaces]
+    seen, black = (one.mean_radiance for one in plain.expose_fields(scene, fields, start))
     material = scene.frame(scene.frame_at(start + camera.integration_time / 2)).material
     shines = (seen > 0) & (black > 0)
     emissivity = np.divide(seen, black, out=np.zeros_like(seen), where=shines)
