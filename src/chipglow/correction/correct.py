@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from chipglow.camera import Camera, Flag, Measurement
 from chipglow.correction.cells import Parts, cut_cells
-from chipglow.correction.correction import Correction, CorrectionFlag
+from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
 from chipglow.correction.posterior import Image, Posterior, Problem
 from chipglow.correction.sensitivity import (
@@ -138,7 +138,12 @@ def correct(
         )
         for frame in range(len(measurement))
     ]
-    return _joined(measurement, frames, known)
+    return joined(
+        [
+            _correction_of(measurement, frame, solved, observed.zones)
+            for frame, solved in enumerate(frames)
+        ]
+    )
 
 
 def _part_of(
@@ -304,21 +309,20 @@ def _solution(
     return Problem(image, parts, formation, reflected).solve(generator, lambda: progress(0.0))
 
 
-def _joined(measurement: Measurement, frames: Sequence[_Frame], known: Knowledge) -> Correction:
-    """Return the frames' solutions on the pixels as a dataset."""
+def _correction_of(
+    measurement: Measurement, frame: int, solved: _Frame, zones: Sequence[Zone]
+) -> Correction:
+    """Return the solution of one frame on the pixels."""
     pixels, band = measurement.raster, measurement.band
-    zones = known.observed.zones
-    datasets = [_on_pixels(one, measurement, number, zones) for number, one in enumerate(frames)]
-    coordinates = raster_coordinates(pixels, measurement.times)
-    data = xr.concat(datasets, "time", data_vars="all", coords="minimal").assign_coords(coordinates)
+    data = _on_pixels(solved, measurement, frame, zones).expand_dims("time")
+    data = data.assign_coords(raster_coordinates(pixels, measurement.times[[frame]]))
     data.attrs = {
         "pitch": pixels.spacing,
         "band_lower": band.lower,
         "band_upper": band.upper,
         "zones": ", ".join(zone.name for zone in zones),
+        **solved.notes.attrs(),
     }
-    notes = sum((one.notes for one in frames), Notes())
-    data.attrs |= notes.attrs()
     return Correction(data)
 
 
