@@ -10,7 +10,8 @@ often the calibration has a warning.
 import numpy as np
 from common import arguments, print_head, print_row
 
-from chipglow.camera import Blackbody, LinearCalibration, SakumaHattori, fit_calibration
+from chipglow.camera import LinearCalibration, SakumaHattori
+from chipglow.laboratory.recordings import Blackbody, fit_calibration
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)

@@ -14,8 +14,8 @@ from math import isfinite
 import numpy as np
 from common import arguments, print_head, print_row, timed
 
+from chipglow.chip import NoShearBandError, find_shear_band, segmentation
 from chipglow.cutting import AISI_1045, CuttingConditions, CuttingSimulation, Numerics, OutputWindow
-from chipglow.laboratory.chip import NoShearBandError, find_shear_band, segmentation
 from chipglow.scene import Material, Raster, sample
 
 CELLS = (20.0, 14.0, 10.0, 7.0, 5.0)

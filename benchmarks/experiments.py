@@ -21,11 +21,11 @@ import yaml
 from common import arguments, minus, print_tables, timed
 
 from chipglow import cutting
+from chipglow.chip import chip_metrics, contact_length, segmentation
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import GREY
 from chipglow.io import atomic_path
-from chipglow.laboratory.chip import chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity
 from chipglow.scene import FIELD_UNITS, Raster, Scene, ToolGeometry
 from chipglow.scene.scene import FORCE_UNITS

@@ -23,7 +23,7 @@ from matplotlib.colors import hsv_to_rgb
 from PIL import Image
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.movie import FieldMovie, MovieSource
+from chipglow.io.sources.movies.movie import FieldMovie, MovieSource
 from chipglow.scene import Raster
 
 COLDEST, HOTTEST = 293.0, 1400.0

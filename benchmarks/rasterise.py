@@ -12,8 +12,8 @@ import numpy as np
 import pyvista
 from common import arguments, print_head, print_row, timed
 
-from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.triangles import rasterise
+from chipglow.io.sources.meshes.mesh import MeshSource
+from chipglow.io.sources.meshes.triangles import rasterise
 from chipglow.scene import Raster
 
 RASTER = Raster(left=0.0, top=810e-6, spacing=1e-6, rows=810, columns=900)

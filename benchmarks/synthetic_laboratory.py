@@ -30,7 +30,7 @@ from scipy.optimize import brentq
 from chipglow import camera
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
-from chipglow.laboratory import measurement
+from chipglow.laboratory import recordings
 from chipglow.laboratory.emissivity import (
     EmissivityLine,
     determine_emissivity,
@@ -284,23 +284,23 @@ class Evaluation:
         """Calibration by the blackbodies, as ``chipglow calibrate`` makes it."""
         points = read_calibration_points(
             self.folder / "points.csv",
-            lambda file: measurement.uniform_counts(self.folder / file, self.fields)[0],
+            lambda file: recordings.uniform_counts(self.folder / file, self.fields)[0],
         )
         measured = points["temperature"], points["counts"], BAND
         stated = points["count_uncertainty"], points["temperature_uncertainty"], CERTIFICATE
-        fit = camera.fit_calibration(
+        fit = recordings.fit_calibration(
             camera.LinearCalibration, *measured, *stated, integration_time=INTEGRATION_TIME
         )
         path = self.folder / "calibration.yaml"
-        path.write_text(measurement.calibration_text(measurement.CalibrationDescription.of(fit)))
-        return measurement.load_calibration(path)
+        path.write_text(recordings.calibration_text(recordings.CalibrationDescription.of(fit)))
+        return recordings.load_calibration(path)
 
     def images(self, pattern):
         fields = [*self.fields, f"calibration={self.folder.resolve() / 'calibration.yaml'}"]
         paths = sorted(self.folder.glob(pattern))
         if not pattern.endswith("hcc"):
             fields += STACK_FIELDS
-        return [measurement.load_measurement(path, fields) for path in paths]
+        return [recordings.load_measurement(path, fields) for path in paths]
 
     def results(self):
         calibration = self.calibrated()  # whose file the images need

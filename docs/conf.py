@@ -12,7 +12,7 @@ from field_tables import field_tables  # noqa: E402
 from sample_files import SAMPLES, write_archive  # noqa: E402
 
 from chipglow.io import ImportDescription  # noqa: E402
-from chipglow.laboratory.measurement import MeasurementDescription  # noqa: E402
+from chipglow.laboratory.recordings import MeasurementDescription  # noqa: E402
 from chipglow.study import Study, study_text  # noqa: E402
 
 project = "chipglow"

@@ -33,7 +33,7 @@ from chipglow.analysis import (
 from chipglow.analysis.heated import heated_objects
 from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
 from chipglow.camera.optics.sampling import LEAST_COVERED
-from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
+from chipglow.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene, ToolGeometry, sample
 from chipglow.scene.lines import nearest

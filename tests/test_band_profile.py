@@ -13,8 +13,9 @@ from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
 
 from chipglow.camera import Flag, Measurement
+from chipglow.chip import NoShearBandError
 from chipglow.io import read_measurement, write_measurement
-from chipglow.laboratory.chip import NoShearBandError, Stage, ThermalImage, band_profile, find_band
+from chipglow.laboratory.chip import Stage, ThermalImage, band_profile, find_band
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
 from chipglow.uncertainty import from_xarray
 

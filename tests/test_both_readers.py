@@ -14,8 +14,8 @@ from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Stated
 from chipglow.io.importing import Import
 from chipglow.io.sources import SourceError, Units
-from chipglow.io.sources.grid import GridSource
-from chipglow.laboratory.measurement import load_measurement
+from chipglow.io.sources.grids.grid import GridSource
+from chipglow.laboratory.recordings import load_measurement
 from chipglow.quantities.units import parse_unit
 from chipglow.scene import Raster
 

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from chipglow.camera import MODELS, Blackbody, fit_calibration
+from chipglow.camera import MODELS
+from chipglow.laboratory.recordings import Blackbody, fit_calibration
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)

@@ -9,9 +9,10 @@ import pytest
 from command import typed
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 
-from chipglow.camera import LinearCalibration, Measurement, SakumaHattori, fit_calibration
+from chipglow.camera import LinearCalibration, Measurement, SakumaHattori
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
+from chipglow.laboratory.recordings import fit_calibration
 from chipglow.radiometry.band import SECOND_RADIATION_CONSTANT
 from chipglow.uncertainty import Estimate
 

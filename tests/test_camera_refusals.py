@@ -22,8 +22,8 @@ from chipglow.camera import (
     ReadNoise,
     SakumaHattori,
     Veil,
-    fit_calibration,
 )
+from chipglow.laboratory.recordings import fit_calibration
 from chipglow.radiometry import Band, RatioThermometer, TabulatedResponse
 from chipglow.scene import Raster, Scene, ToolGeometry
 from chipglow.study import Study, load_study

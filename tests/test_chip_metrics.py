@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from serrated_chip import SerratedChip
 
-from chipglow.laboratory.chip import chip_metrics
+from chipglow.chip import chip_metrics
 from chipglow.scene import Material, Raster, Scene
 from chipglow.scene.scene import FORCE_UNITS
 

@@ -13,7 +13,7 @@ from chipglow.io.digest import is_intact
 from chipglow.io.packing import COMPRESSION, chunk_of, read_chunk
 from chipglow.io.scene_file import is_scene
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import open_arrays
+from chipglow.io.sources.grids.arrays import open_arrays
 
 
 def flip(path, place, bit=0):

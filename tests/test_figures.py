@@ -19,8 +19,8 @@ import chipglow
 from chipglow.camera import AnnularAperturePSF, Camera, LinearCalibration
 from chipglow.laboratory.chip.figures import draw_rake_grid
 from chipglow.laboratory.emissivity.figure import draw_emissivity
-from chipglow.laboratory.measurement.figures import draw_calibrations
 from chipglow.laboratory.psf.figure import draw_knife_edge
+from chipglow.laboratory.recordings.figures import draw_calibrations
 from chipglow.report.scene_figure import draw_scene
 
 sys.path.append(str(ROOT / "docs"))
@@ -73,7 +73,7 @@ def test_knife_edge():
 
 @compared
 def test_calibration():
-    from chipglow.camera import fit_calibration
+    from chipglow.laboratory.recordings import fit_calibration
 
     kelvins = np.arange(573.15, 1274.0, 100.0)
     counts = 400.0 + 1.8 * chipglow.Band(3.8e-6, 5.1e-6).radiance(kelvins)

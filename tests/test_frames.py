@@ -5,8 +5,8 @@ import pandas as pd
 from rich.console import Console
 
 from chipglow.cli.tables import screen_table
+from chipglow.io.result_file import write_frame
 from chipglow.laboratory.registration import fit_points
-from chipglow.laboratory.result_file import write_frame
 from chipglow.scene import Raster
 
 RASTER = Raster(0.0, 1e-3, 1e-5, 100, 100)

@@ -15,7 +15,7 @@ from PIL import Image, ImageOps, PngImagePlugin
 from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Stated
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.grids.grid import GridSource
 from chipglow.scene import Raster
 
 ROWS, COLUMNS = 12, 16

@@ -9,10 +9,10 @@ from hypothesis import given, settings, strategies as st
 from refusals import refused_on
 
 from chipglow.io.sources import Placement, SourceError, Units
-from chipglow.io.sources.cloud import CloudSource
+from chipglow.io.sources.points.cloud import CloudSource
+from chipglow.io.sources.points.sampling import Cloud, neighbour_distance, sample_cloud
 from chipglow.quantities.units import CELSIUS, Unit
 from chipglow.scene import Raster
-from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 
 A = 2e-6
 COLUMNS, ROWS = 30, 20

@@ -15,9 +15,9 @@ from chipglow.io import (
     prospect,
     read_measurement,
 )
-from chipglow.io.sources.cloud import CloudSource
-from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import MovieSource
+from chipglow.io.sources.meshes.mesh import MeshSource
+from chipglow.io.sources.movies.movie import MovieSource
+from chipglow.io.sources.points.cloud import CloudSource
 from chipglow.scene import Material, ToolGeometry
 
 pytestmark = pytest.mark.usefixtures("read_here")

@@ -18,7 +18,7 @@ from refusals import refused_on
 
 from chipglow.io.sources import Placement, Units
 from chipglow.io.sources.conventions import SI_UNITS
-from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.grids.grid import GridSource
 from chipglow.quantities.units import (
     CELSIUS,
     HEAT_TRANSFER,

@@ -12,7 +12,7 @@ from plane_mesh import HEIGHT, RASTER, WIDTH, X, Y, only_frame, temperature
 from chipglow.io.importing import Import, prospect
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, SourceError, Units
-from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.meshes.mesh import MeshSource
 from chipglow.quantities.units import CELSIUS, Unit, parse_unit
 from chipglow.scene import Material, Raster
 

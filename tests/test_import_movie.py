@@ -26,15 +26,15 @@ from movies import (
 )
 from PIL import Image
 
+from chipglow.io.nearest import extended, nearest
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.colour_scale import ColourScale, colour_uncertainty, lab
 from chipglow.io.sources.conventions import Placement
-from chipglow.io.sources.legend import end_uncertainty, legend_pixels
-from chipglow.io.sources.movie import FieldMovie, MovieSource
-from chipglow.io.sources.moving_pictures import index_movie, pictures
-from chipglow.io.sources.overlays import dark_lines
+from chipglow.io.sources.movies.colour_scale import ColourScale, colour_uncertainty, lab
+from chipglow.io.sources.movies.legend import end_uncertainty, legend_pixels
+from chipglow.io.sources.movies.movie import FieldMovie, MovieSource
+from chipglow.io.sources.movies.overlays import dark_lines
+from chipglow.io.sources.movies.pictures import index_movie, pictures
 from chipglow.scene import FILLED, Material, Raster
-from chipglow.scene.nearest import extended, nearest
 
 ENDS = (293.0, 1400.0)
 LEVEL = (ENDS[1] - ENDS[0]) / 256

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from chipglow.io.sources import Placement
-from chipglow.io.sources.cloud import CloudSource
-from chipglow.io.sources.colour_scale import ColourScale
-from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import FieldMovie, MovieSource
+from chipglow.io.sources.grids.grid import GridSource
+from chipglow.io.sources.meshes.mesh import MeshSource
+from chipglow.io.sources.meshes.triangles import rasterise
+from chipglow.io.sources.movies.colour_scale import ColourScale
+from chipglow.io.sources.movies.movie import FieldMovie, MovieSource
+from chipglow.io.sources.points.cloud import CloudSource
 from chipglow.io.sources.source import even_times
-from chipglow.io.sources.triangles import rasterise
 from chipglow.scene import Raster
 from chipglow.text import Notes
 

@@ -5,8 +5,8 @@ from refusals import refused_on
 from tecplot_file import ZoneOfFile, extras_of_header, write_tecplot
 
 from chipglow.io.sources import Placement, SourceError
-from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.tecplot_binary import binary_zones
+from chipglow.io.sources.meshes.mesh import MeshSource
+from chipglow.io.sources.meshes.tecplot_binary import binary_zones
 from chipglow.scene import Material, Raster
 
 pv = pytest.importorskip("pyvista")

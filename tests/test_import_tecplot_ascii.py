@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.meshes.mesh import MeshSource
 from chipglow.scene import Material, Raster
 
 pytest.importorskip("pyvista")

@@ -9,13 +9,13 @@ import pytest
 from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
 
 from chipglow.io import open_scene, unfinished_scenes
+from chipglow.io.completion import Completion, complete, optical_flow, strain_rate_along
 from chipglow.io.importing import Import, View, import_scene, kept_import, prospect, read_scene
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import SourceError, Units
-from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.grids.grid import GridSource
 from chipglow.quantities.units import CELSIUS
 from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
-from chipglow.scene.completion import Completion, complete, optical_flow, strain_rate_along
 
 RASTER = Raster(0.0, 100e-6, 2e-6, 50, 60)
 WHOLE = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")

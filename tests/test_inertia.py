@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
+from chipglow.chip import Inertia, inertia
 from chipglow.cli.screen import begin
 from chipglow.cli.studies import say_of_cut
 from chipglow.cutting import AISI_1045, CuttingConditions, CuttingSimulation, Numerics
-from chipglow.laboratory.chip import Inertia, inertia
 from chipglow.scene import ENERGY_UNITS, Scene
 from chipglow.scene.scene import FORCE_UNITS
 

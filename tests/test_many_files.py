@@ -11,7 +11,7 @@ from command import refusal, typed
 from chipglow.io import read_measurement
 from chipglow.io.sandbox import Sandbox, one_process
 from chipglow.io.sources.source import SourceError
-from chipglow.laboratory.measurement import camera_file, load_measurement
+from chipglow.laboratory.recordings import camera_file, load_measurement
 
 RADIANCES = (300.0, 400.0, 500.0)
 SETTINGS = (

@@ -23,22 +23,22 @@ from chipglow.camera import (
     ReadNoise,
     Recording,
     SakumaHattori,
-    fit_calibration,
 )
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_response, read_table
-from chipglow.laboratory.measurement import (
+from chipglow.laboratory.recordings import (
     CalibrationDescription,
     MeasurementDescription,
     calibration_text,
+    fit_calibration,
     load_calibration,
     load_description,
     load_measurement,
     measurement_text,
     uniform_counts,
 )
-from chipglow.laboratory.measurement.radiometric_calibration import calibrate_recording
+from chipglow.laboratory.recordings.radiometric_calibration import calibrate_recording
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import ToolGeometry
 from chipglow.text import DescriptionError

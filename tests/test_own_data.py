@@ -11,8 +11,8 @@ from test_io import a_file, a_measurement_file
 from chipglow.app.opening import open_uploaded
 from chipglow.camera import MeasuredPSF
 from chipglow.io import open_scene, read_measurement
-from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.mesh_vtk import VtkReader
+from chipglow.io.sources.grids.grid import GridSource
+from chipglow.io.sources.meshes.vtk import VtkReader
 
 
 def an_array(folder, file, name, shape, **attributes):

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from chipglow import quantities
 from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
 from chipglow.io import ImportDescription, import_text
-from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
+from chipglow.laboratory.recordings import MeasurementDescription, measurement_text
 from chipglow.quantities import Family, Parameter, Part, adapter, problem
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.study import Study, study_text

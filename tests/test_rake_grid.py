@@ -8,8 +8,8 @@ from drawn import in_a_notebook, legend_of, on_given_axes, on_new_axes, points_o
 from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import Flag, Measurement
-from chipglow.io import read_measurement, write_measurement
-from chipglow.laboratory.chip import load_tool, rake_grid
+from chipglow.io import load_tool, read_measurement, write_measurement
+from chipglow.laboratory.chip import rake_grid
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, ToolGeometry, ToolOutline
 from chipglow.text import DescriptionError

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.spatial import Delaunay
 
-from chipglow.io.sources.triangles import NOTHING, rasterise, split_quads
+from chipglow.io.sources.meshes.triangles import NOTHING, rasterise, split_quads
 from chipglow.scene import Raster
 
 RASTER = Raster(left=-2.0, top=7.0, spacing=0.25, rows=32, columns=40)

@@ -13,10 +13,14 @@ from chipglow.camera import (
     PlanckConversion,
     Recording,
     find_bad_pixels,
-    fit_calibration,
     replace_bad_pixels,
 )
-from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
+from chipglow.laboratory.recordings import (
+    ImagePosition,
+    calibrate_recording,
+    fit_calibration,
+    flag_fractions,
+)
 from chipglow.radiometry import Band, ObjectParameters
 
 BAND = Band(3.8e-6, 5.1e-6)

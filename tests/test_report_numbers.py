@@ -11,7 +11,7 @@ from GTC import type_a
 from jinja2 import nodes
 
 from chipglow.analysis import CuttingForces, image_error, line_error
-from chipglow.laboratory.chip import ChipMetrics, ChipScan, CutHistory, Inertia, Segmentation
+from chipglow.chip import ChipMetrics, ChipScan, CutHistory, Inertia, Segmentation
 from chipglow.report import numbers, result_rows
 from chipglow.report.facts import Facts
 from chipglow.report.page import environment, texts

@@ -5,8 +5,8 @@ from math import nan
 import pytest
 from analytic_chip import AnalyticChip
 
+from chipglow.chip import resolution_warnings
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, unresolved
-from chipglow.laboratory.chip import resolution_warnings
 from chipglow.scene import Scene, ToolGeometry
 
 

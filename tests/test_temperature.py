@@ -9,9 +9,10 @@ from command import typed, words
 from drawn import in_a_notebook, on_given_axes, on_new_axes, points_of
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 
-from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement, fit_calibration
+from chipglow.camera import CalibrationErrors, Flag, LinearCalibration, Measurement
 from chipglow.io import write_measurement
 from chipglow.laboratory import emissivity as em
+from chipglow.laboratory.recordings import fit_calibration
 from chipglow.scene import Area, Polygon, Region
 from chipglow.uncertainty import Estimate, from_xarray
 

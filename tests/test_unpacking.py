@@ -9,8 +9,8 @@ import xarray as xr
 from scipy.io import netcdf_file
 
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import open_arrays
-from chipglow.io.sources.unpacking import unpack
+from chipglow.io.sources.grids.arrays import open_arrays
+from chipglow.io.sources.grids.unpacking import unpack
 
 nan = np.nan
 

@@ -18,10 +18,10 @@ from tecplot_file import ZoneOfFile, extras_of_header, write_tecplot
 from vtkmodules.vtkIOExodus import vtkExodusIIWriter
 from vtkmodules.vtkIOParallel import vtkEnSightWriter
 
-from chipglow.io.sources.cloud import CloudSource
-from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.movie import FieldMovie, MovieSource
+from chipglow.io.sources.grids.grid import GridSource
+from chipglow.io.sources.meshes.mesh import MeshSource
+from chipglow.io.sources.movies.movie import FieldMovie, MovieSource
+from chipglow.io.sources.points.cloud import CloudSource
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from movies import CODECS, GIF, NamedMap, drawn, encode, known_field

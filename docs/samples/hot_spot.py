@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from chipglow.io.sources.movie import FieldMovie, MovieSource
+from chipglow.io.sources.movies.movie import FieldMovie, MovieSource
 
 MOVIE = Path(__file__).parents[1] / "data" / "hot-spot.avi"
 COLDEST, HOTTEST = 293.15, 1400.15

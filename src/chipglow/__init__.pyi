@@ -2,6 +2,7 @@ from . import (
     analysis as analysis,
     app as app,
     camera as camera,
+    chip as chip,
     correction as correction,
     cutting as cutting,
     io as io,
@@ -72,12 +73,12 @@ from .laboratory.emissivity import (
     read_emissivity_map as read_emissivity_map,
     true_temperature as true_temperature,
 )
-from .laboratory.measurement import load_measurement as load_measurement
 from .laboratory.psf import (
     edge_image as edge_image,
     knife_edge as knife_edge,
     write_psf as write_psf,
 )
+from .laboratory.recordings import load_measurement as load_measurement
 from .laboratory.registration import (
     align_times as align_times,
     fit_dots as fit_dots,

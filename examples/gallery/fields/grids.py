@@ -18,7 +18,7 @@ from matplotlib.cbook import get_sample_data
 
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import VOID
-from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.grids.grid import GridSource
 from chipglow.scene import Raster
 
 path = get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)

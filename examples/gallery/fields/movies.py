@@ -24,7 +24,7 @@ from samples.hot_spot import MOVIE, source, truth
 
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, SIGNED
-from chipglow.io.sources.moving_pictures import index_movie, pictures
+from chipglow.io.sources.movies.pictures import index_movie, pictures
 from chipglow.scene import FILLED, Material, Raster
 
 movie = source()

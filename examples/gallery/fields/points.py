@@ -20,7 +20,7 @@ import sample_files
 
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import VOID
-from chipglow.io.sources.cloud import CloudSource
+from chipglow.io.sources.points.cloud import CloudSource
 from chipglow.scene import Raster
 
 path = sample_files.folder("import-points") / "taichi-mpm99.npz"

@@ -33,12 +33,11 @@ from chipglow.camera import (
     Recording,
     SakumaHattori,
     find_bad_pixels,
-    fit_calibration,
 )
 from chipglow.drawing.drawing import new_figure, show_image, style
 from chipglow.drawing.scales import HEAT, KELVIN
-from chipglow.laboratory.measurement import calibrate_recording
-from chipglow.laboratory.measurement.figures import draw_calibrations
+from chipglow.laboratory.recordings import calibrate_recording, fit_calibration
+from chipglow.laboratory.recordings.figures import draw_calibrations
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)

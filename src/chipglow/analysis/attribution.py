@@ -16,8 +16,8 @@ from chipglow.analysis.images import Array, ExposureImages, read_temperature, re
 from chipglow.analysis.places import Place
 from chipglow.camera import UNUSABLE, Camera, Exposure, range_flags
 from chipglow.camera.exposure import View, expose
+from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.optics.sampling import integrate, largest
-from chipglow.camera.sweep import Check
 from chipglow.quantities import Parameter, Part
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.heated import HeatedObject
 from chipglow.analysis.places import TOUCHING
-from chipglow.cutting import EnergyHistory
-from chipglow.laboratory.chip import (
+from chipglow.chip import (
     ChipMetrics,
     CutHistory,
     Inertia,
@@ -23,6 +22,7 @@ from chipglow.laboratory.chip import (
     cut_history,
     inertia,
 )
+from chipglow.cutting import EnergyHistory
 from chipglow.scene import ENERGY_UNITS, Frame, Scene
 
 Progress: TypeAlias = Callable[[str, float], None]

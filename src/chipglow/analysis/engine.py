@@ -29,7 +29,7 @@ from chipglow.analysis.reductions import (
 )
 from chipglow.camera import Camera, Flag, GaussianPSF, Measurement
 from chipglow.camera.exposure import sparse_frames, surroundings_radiance
-from chipglow.laboratory.chip import (
+from chipglow.chip import (
     NoContactError,
     NoShearBandError,
     ShearBand,

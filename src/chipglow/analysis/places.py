@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.images import Array, Stack
-from chipglow.laboratory.chip import ShearBand
+from chipglow.chip import ShearBand
 from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point

@@ -15,8 +15,8 @@ from chipglow.analysis.places import LINE_REACH, TOUCHING
 from chipglow.app.controls import CURSOR, LINES, Controls, rounded, shown_study
 from chipglow.app.pictures import MeasurementModel, Model, SceneModel, with_samples
 from chipglow.camera import Measurement
+from chipglow.chip import Instant, Segment
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
-from chipglow.laboratory.chip import Instant, Segment
 from chipglow.quantities import unchecked
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study

@@ -25,7 +25,7 @@ from chipglow.app.controls import (
     State,
 )
 from chipglow.camera import Camera, Exposure, Measurement
-from chipglow.camera.sweep import Check
+from chipglow.camera.exposure_kernels import Check
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
 from chipglow.quantities import Array, Brief

@@ -1,6 +1,6 @@
 """Virtual and real cameras: optics, exposure, detector, calibration and measurement."""
 
-from chipglow.camera.calibration.calibration import (
+from chipglow.camera.calibration import (
     MODELS as MODELS,
     Calibration as Calibration,
     CalibrationErrors as CalibrationErrors,
@@ -8,11 +8,6 @@ from chipglow.camera.calibration.calibration import (
     FittedCalibration as FittedCalibration,
     LinearCalibration as LinearCalibration,
     SakumaHattori as SakumaHattori,
-)
-from chipglow.camera.calibration.fit import (
-    Blackbody as Blackbody,
-    CalibrationFit as CalibrationFit,
-    fit_calibration as fit_calibration,
 )
 from chipglow.camera.camera import (
     PAPER_LIMIT as PAPER_LIMIT,

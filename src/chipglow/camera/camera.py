@@ -15,6 +15,7 @@ from chipglow.camera.detector.flat_field import FlatFieldCalibration, flat_field
 from chipglow.camera.detector.response import OperationPoint, RangeResponse, in_tables
 from chipglow.camera.detector.terms import EquivalentNoise, Lag, follows, lagged
 from chipglow.camera.exposure import Exposure, View, expose, sparse_frames
+from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.convolution import Beyond, images, without_rounding
@@ -22,7 +23,6 @@ from chipglow.camera.optics.image_formation import Gather, ImageFormation, sensi
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import OpticsTerm
-from chipglow.camera.sweep import Check
 from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
 from chipglow.radiometry import Band

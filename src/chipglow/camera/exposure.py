@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Check, Sums
+from chipglow.camera.exposure_kernels import BATCH, STEPS_PER_KELVIN, Check, Sums
 from chipglow.quantities import Array, Brief
 from chipglow.quantities.units import COLDEST, HOTTEST
 from chipglow.radiometry import Band

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.camera.calibration.calibration import CALIBRATION, CalibrationErrors
+from chipglow.camera.calibration import CALIBRATION, CalibrationErrors
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool

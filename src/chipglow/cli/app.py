@@ -134,7 +134,7 @@ def init(
 ) -> None:
     """Write the paper's study as a commented YAML file."""
     from chipglow.io import atomic_path, import_description, import_text
-    from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
+    from chipglow.laboratory.recordings import MeasurementDescription, measurement_text
     from chipglow.study import Study, study_text
     from chipglow.text import json_schema
 

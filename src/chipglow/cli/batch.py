@@ -19,7 +19,7 @@ _NAMED: Final = 3
 
 def load_measurements(images: Sequence[Path], settings: Iterable[str]) -> "list[Measurement]":
     """Read measurements or camera files, with a progress bar for several."""
-    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.recordings import load_measurement
 
     settings = list(settings)
     with many_files(images) as files:

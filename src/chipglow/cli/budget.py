@@ -36,7 +36,7 @@ def budget(
 ) -> None:
     """State the uncertainty of the error of a single reading, and what it comes from."""
     from chipglow.cli.progress import progress_bars
-    from chipglow.laboratory.result_file import write_frame
+    from chipglow.io.result_file import write_frame
     from chipglow.study import load_study, study_budget
     from chipglow.text import Notes
 

@@ -10,8 +10,8 @@ from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
-    from chipglow.camera import CalibrationFit, FittedCalibration
-    from chipglow.laboratory.measurement import BlackbodyCalibration
+    from chipglow.camera import FittedCalibration
+    from chipglow.laboratory.recordings import BlackbodyCalibration, CalibrationFit
 
 _NUMBERS: Final = (
     "chi_squared", "degrees_of_freedom", "probability", "information_criterion"
@@ -69,9 +69,9 @@ def calibrate(
     It is valid between the coldest and the hottest blackbody. Pixels outside are flagged.
     """
     from chipglow.camera import MODELS
-    from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
-    from chipglow.laboratory.measurement.description import band_of
-    from chipglow.laboratory.measurement.figures import draw_calibrations
+    from chipglow.laboratory.recordings import calibrate_blackbodies, write_calibration
+    from chipglow.laboratory.recordings.description import band_of
+    from chipglow.laboratory.recordings.figures import draw_calibrations
 
     try:
         camera_band = band_of(band)
@@ -169,8 +169,8 @@ def psf(
 ) -> None:
     """Determine the point spread function and MTF of a camera from images of an edge."""
     from chipglow.laboratory import psf as lab
-    from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.psf.figure import sentences
+    from chipglow.laboratory.recordings import load_measurement
 
     window = _region(region)
     images = [lab.load_edge(path, settings or (), window) for path in edges]

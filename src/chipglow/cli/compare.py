@@ -57,11 +57,12 @@ def compare(
     settings: opt.Settings = None,
 ) -> None:
     """Compare a measurement with simulations and report the best fit at each place."""
+    from chipglow.cli.tool_choice import chosen_tool
     from chipglow.drawing.scales import shown_frame
+    from chipglow.io import read_curve
     from chipglow.laboratory import comparison as lab
-    from chipglow.laboratory.chip import chosen_tool, read_curve
     from chipglow.laboratory.comparison.comparison import COVERAGE
-    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.recordings import load_measurement
 
     if not 0.0 <= emissivity_uncertainty < 1.0:
         raise ValueError(f"--emissivity-uncertainty: {emissivity_uncertainty:g}, expected 0 to < 1")

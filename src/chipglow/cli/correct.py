@@ -82,9 +82,9 @@ def correct(
     from chipglow.cli.progress import progress_bars
     from chipglow.correction import place_frame, places_of, write_correction
     from chipglow.correction.figure import draw_correction
+    from chipglow.io.result_file import write_frame
     from chipglow.laboratory.emissivity import load_regions, reflected_temperature
-    from chipglow.laboratory.measurement import load_measurement
-    from chipglow.laboratory.result_file import write_frame
+    from chipglow.laboratory.recordings import load_measurement
 
     if study is None and psf is None:
         raise ValueError("--psf: is missing; give --psf with --emissivity, or --study")
@@ -138,9 +138,9 @@ def _zones(
     tool: str | None,
 ) -> "tuple[Zone, ...]":
     """Return the zones that the options describe."""
+    from chipglow.cli.tool_choice import chosen_tool
     from chipglow.correction import known_zones
     from chipglow.laboratory import emissivity as lab
-    from chipglow.laboratory.chip import chosen_tool
 
     if emissivity is None:
         raise ValueError("--emissivity: give a file of chipglow emissivity, or a number")

@@ -48,9 +48,9 @@ def emissivity(
     settings: opt.Settings = None,
 ) -> None:
     """Determine emissivity from images of an object of known temperature."""
+    from chipglow.io.result_file import write_frame
     from chipglow.laboratory import emissivity as lab
     from chipglow.laboratory.emissivity.figure import draw_emissivity
-    from chipglow.laboratory.result_file import write_frame
 
     if len(reference) not in (1, len(images)):
         raise ValueError(
@@ -175,9 +175,9 @@ def temperature(
     settings: opt.Settings = None,
 ) -> None:
     """Determine the true temperature of regions of known emissivity."""
+    from chipglow.io.result_file import write_frame
     from chipglow.laboratory import emissivity as lab
-    from chipglow.laboratory.measurement import load_calibration, load_measurement
-    from chipglow.laboratory.result_file import write_frame
+    from chipglow.laboratory.recordings import load_calibration, load_measurement
 
     if each and study is not None:
         raise ValueError("--each and --study cannot be combined: a study is of one measurement")

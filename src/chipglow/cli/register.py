@@ -74,12 +74,12 @@ def register(
     settings: opt.Settings = None,
 ) -> None:
     """Map each point of an infrared image to a visible image."""
+    from chipglow.io import load_tool
+    from chipglow.io.result_file import write_frame
     from chipglow.laboratory import registration as lab
-    from chipglow.laboratory.chip import load_tool
-    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.recordings import load_measurement
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
     from chipglow.laboratory.registration.files import PICTURE_SUFFIXES, write_blink
-    from chipglow.laboratory.result_file import write_frame
 
     if pairs is not None and align is None:
         raise ValueError("--pairs requires --align")

@@ -15,7 +15,7 @@ from chipglow.cli.screen import current, figure, finish
 from chipglow.drawing.scales import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
-from chipglow.laboratory.measurement import flag_fractions
+from chipglow.laboratory.recordings import flag_fractions
 from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
 
@@ -74,7 +74,7 @@ def show(path: Path, at: float | None, plot: Path | None) -> None:
 
 
 def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
-    from chipglow.laboratory.measurement.figures import draw_measurement
+    from chipglow.laboratory.recordings.figures import draw_measurement
 
     measurement = read_measurement(path)
     times = measurement.times

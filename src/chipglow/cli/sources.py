@@ -42,7 +42,7 @@ def convert(
 def _convert_one(source: Path, out: Path | None, settings: list[str]) -> None:
     from chipglow.cli.showing import say_measurement
     from chipglow.io import is_measurement, write_measurement
-    from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
+    from chipglow.laboratory.recordings import load_description, load_recording, measurement_of
 
     if is_measurement(source):
         raise ValueError(f"{source}: already a measurement; expected a camera file")
@@ -74,7 +74,7 @@ def _convert_many(
 
     from chipglow.cli.batch import common_notes, for_each, output_files
     from chipglow.io import is_measurement, write_measurement
-    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.recordings import load_measurement
 
     targets = {} if out is None else output_files(sources, out, ".nc", inputs, force)
     notes = {}

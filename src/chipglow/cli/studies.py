@@ -12,7 +12,7 @@ from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
 if TYPE_CHECKING:
-    from chipglow.laboratory.chip import Inertia
+    from chipglow.chip import Inertia
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 ERROR_FOLDER: Final = Path("chipglow-error")
@@ -110,9 +110,9 @@ def cut(
     """Run only the cutting simulation of a study."""
     from shutil import copyfile
 
+    from chipglow.chip import inertia, resolution_warnings
     from chipglow.cli.progress import confirm_cost, progress_bars
     from chipglow.io import atomic_path, open_scene
-    from chipglow.laboratory.chip import inertia, resolution_warnings
     from chipglow.study import cut as compute, load_study, preview_raster
 
     loaded = load_study(study)
@@ -198,7 +198,7 @@ def wavelengths(
     """Compare spectral bands and two-band ratios: the error against the true temperature."""
     from chipglow.analysis import wavelengths_frame
     from chipglow.cli.progress import confirm_cost, progress_bars
-    from chipglow.laboratory.result_file import write_frame
+    from chipglow.io.result_file import write_frame
     from chipglow.report.wavelength_figure import draw_wavelengths
     from chipglow.study import load_study, wavelengths as compare
     from chipglow.text import Notes

@@ -57,7 +57,7 @@ def sweep(
     """Run a study at many settings and tabulate the errors."""
     from chipglow.cli.progress import progress_bars
     from chipglow.io import write_dataset
-    from chipglow.laboratory.result_file import write_frame
+    from chipglow.io.result_file import write_frame
     from chipglow.study import Method, load_study, sweep as compute
     from chipglow.study.workers import connected
     from chipglow.text import Notes
@@ -111,7 +111,7 @@ def design(
 ) -> None:
     """Find the settings of camera and surface with the smallest bias and uncertainty."""
     from chipglow.cli.progress import progress_bars
-    from chipglow.laboratory.result_file import write_frame
+    from chipglow.io.result_file import write_frame
     from chipglow.study import Method, design as search, load_study
     from chipglow.study.design_figure import draw_design
     from chipglow.text import Notes

@@ -1,4 +1,5 @@
 from .atomic import atomic_folder as atomic_folder, atomic_path as atomic_path
+from .column_file import read_curve as read_curve
 from .import_file import (
     ImportDescription as ImportDescription,
     import_description as import_description,
@@ -19,6 +20,7 @@ from .measurement_file import (
     write_measurement as write_measurement,
 )
 from .movie_file import check_movie_path as check_movie_path, movie_writer as movie_writer
+from .result_file import write_frame as write_frame, write_result as write_result
 from .scene_file import (
     SCENE_FORMAT as SCENE_FORMAT,
     SceneWriter as SceneWriter,
@@ -29,4 +31,8 @@ from .scene_file import (
     write_scene as write_scene,
 )
 from .spool import UnfinishedScene as UnfinishedScene, unfinished_scenes as unfinished_scenes
-from .tool_section import ToolSection as ToolSection, read_tool_outline as read_tool_outline
+from .tool_section import (
+    ToolSection as ToolSection,
+    load_tool as load_tool,
+    read_tool_outline as read_tool_outline,
+)

@@ -170,3 +170,12 @@ def read_bad_pixels(path: str | os.PathLike[str], shape: tuple[int, int]) -> NDA
             )
         mask[int(row), int(column)] = True
     return mask
+
+
+def read_curve(path: str | os.PathLike[str]) -> Array:
+    """Read a curve from a CSV file."""
+    path = Path(path)
+    curve, _ = read_polyline(path)
+    if len(curve) < 2:
+        raise ValueError(f"{path}: {len(curve)} points, expected 2 or more")
+    return curve

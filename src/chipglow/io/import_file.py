@@ -5,19 +5,19 @@ from dataclasses import dataclass, field, fields, make_dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
+from chipglow.io.completion import Completion
 from chipglow.io.importing import Import, View
 from chipglow.io.measurement_file import holds
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, Units
-from chipglow.io.sources.cloud import CloudSource
-from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.mesh import MeshSource
-from chipglow.io.sources.mesh_vtk import OTHER_HDF
-from chipglow.io.sources.movie import MovieSource
+from chipglow.io.sources.grids.grid import GridSource
+from chipglow.io.sources.meshes.mesh import MeshSource
+from chipglow.io.sources.meshes.vtk import OTHER_HDF
+from chipglow.io.sources.movies.movie import MovieSource
+from chipglow.io.sources.points.cloud import CloudSource
 from chipglow.io.tool_section import ToolSection
 from chipglow.quantities import Family, FileBeside, Parameter, Part, adapter
 from chipglow.quantities.units import TIME
-from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by, has_names_of_columns
 
 IMPORT_SOURCES: Final = Family("import_source")

@@ -13,15 +13,15 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 
+from chipglow.io.completion import Completion, complete
 from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
-from chipglow.io.sources.layout import check_times
 from chipglow.io.sources.plausible import check_temperatures, doubt_of_size
+from chipglow.io.sources.source import check_times
 from chipglow.io.spool import UnfinishedScene, unfinished_scenes
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import COLDEST, HOTTEST, LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
-from chipglow.scene.completion import Completion, complete
 from chipglow.text import Notes, needs_extra
 
 SAMPLES_ACROSS: Final = 900

@@ -10,7 +10,9 @@ from pydantic import AfterValidator
 from chipglow.cutting import material_names, tool_material
 from chipglow.io.column_file import read_polyline
 from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities.units import Position
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline, ToolOutlineError
+from chipglow.text import load_described
 
 
 def _known(name: str) -> str:
@@ -60,6 +62,30 @@ class ToolSection(Part):
             except ValueError as error:
                 raise ValueError(f"outline: {error}") from None
         return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.declared()})
+
+
+@dataclass(frozen=True)
+class ToolDescription(ToolSection):
+    """A cutting tool and where it is."""
+
+    tip: Annotated[
+        tuple[Position, Position] | None,
+        Parameter(
+            "Where the tip is in the measurement's coordinates: x of the edge's leftmost point, y "
+            "of its lowest one; at the origin by default.",
+            allowed="none, or [-12 um, 3.5 um]",
+        ),
+    ] = None
+
+    def build(self) -> Tool:
+        """Return the tool in the measurement's coordinates."""
+        tool = super().build()
+        return tool if self.tip is None else tool.at(self.tip)
+
+
+def load_tool(path: str | Path) -> Tool:
+    """Read a tool from a YAML file."""
+    return load_described(ToolDescription, path).build()
 
 
 def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:

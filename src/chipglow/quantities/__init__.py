@@ -19,6 +19,7 @@ from chipglow.quantities.part import (
     problem as problem,
     unchecked as unchecked,
 )
+from chipglow.quantities.quotient import quotient as quotient
 from chipglow.quantities.settings import (
     Setting as Setting,
     changed as changed,

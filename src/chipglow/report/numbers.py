@@ -12,7 +12,7 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 from chipglow.analysis import CuttingForces
 from chipglow.camera import Camera, FlatFieldCalibration
-from chipglow.laboratory.chip import ChipMetrics, Segment, Segmentation
+from chipglow.chip import ChipMetrics, Segment, Segmentation
 from chipglow.report.shown_units import SHOWN_UNITS
 from chipglow.scene import Raster
 

@@ -11,8 +11,8 @@ import pandas as pd
 
 from chipglow.analysis import Analysis, Cut, Distribution, Headline, one_draw
 from chipglow.analysis.distribution import student_factor
+from chipglow.chip import Segment
 from chipglow.drawing.scales import KELVIN
-from chipglow.laboratory.chip import Segment
 from chipglow.quantities.format import quantity_text
 from chipglow.report import numbers, paper
 from chipglow.report.facts import Facts

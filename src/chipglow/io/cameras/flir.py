@@ -25,7 +25,7 @@ from chipglow.io.cameras.binary import (
     text_of,
 )
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.images import ORIENTATION, roughness
+from chipglow.io.sources.grids.images import ORIENTATION, roughness
 from chipglow.io.sources.source import reading, required
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.text import Notes

@@ -14,19 +14,18 @@ from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
 from chipglow.io.cameras.binary import chosen_frames, evenly
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import ARRAY_READERS, FileArray, open_arrays
-from chipglow.io.sources.layout import (
+from chipglow.io.sources.conventions import note_other_unit
+from chipglow.io.sources.grids.arrays import ARRAY_READERS, FileArray, open_arrays
+from chipglow.io.sources.grids.layout import (
     AXES,
     ROW_0,
     ascends,
     axes_of,
-    check_times,
     coordinate,
     even_positions,
     find_fields,
     is_reversed,
     may_be_field,
-    note_other_unit,
     read_frames,
     read_list,
     scaled,
@@ -34,7 +33,7 @@ from chipglow.io.sources.layout import (
     without,
 )
 from chipglow.io.sources.plausible import check_sides, check_temperatures, check_tenths
-from chipglow.io.sources.source import span_of
+from chipglow.io.sources.source import check_times, span_of
 from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.scene import Raster
 from chipglow.text import Notes

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, InstanceOf, PlainSerializer, WithJsonSchema
 
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, naming
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION, SI, Unit, is_bare_number, parse_unit
 from chipglow.scene import READABLE
 from chipglow.scene.frame import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
+from chipglow.text import Notes
 
 SI_UNITS: Final[Mapping[str, str]] = {
     **FIELD_UNITS,
@@ -282,3 +283,42 @@ class Placement(Part):
         if name.startswith("material"):
             values = values - self.origin[number]
         return values * self.signs[number]
+
+
+def unit_of(name: str, label: str, text: str | None, given: Unit | None, notes: Notes) -> Unit:
+    """Return and note the unit of a quantity: the one given, else that of the file's text, else SI.
+
+    SI counts as given for temperatures only: other units of a description are SI by default.
+    """
+    short = label.rsplit(": ", 1)[-1]
+    if given is not None and (given != SI or name == "temperature"):
+        if text is not None and (own := known_unit(text, name)) != given:
+            note_other_unit(short, text, notes, own is not None)
+        return given
+    if text is None:
+        if SI_UNITS[name] != "1":
+            notes.assumed.append(f"{short} is in {SI_UNITS[name]}: the file states no unit.")
+        return SI
+    with naming(label):
+        unit = parse_unit(text, SI_UNITS[name], name)
+    if unit != SI:
+        notes.remarks.append(f"{short} is in {text!r}.")
+    return unit
+
+
+def known_unit(text: str, name: str) -> Unit | None:
+    """Return the unit of a text; None if it is none of the quantity."""
+    try:
+        return parse_unit(text, SI_UNITS[name], name)
+    except ValueError:
+        return None
+
+
+def note_other_unit(short: str, text: str | None, notes: Notes, contradicts: bool) -> None:
+    """Note that a file states another unit than the one that is given and used.
+
+    It is a warning if the file's text is a unit, which contradicts the given one.
+    """
+    if text is not None:
+        place = notes.warnings if contradicts else notes.remarks
+        place.append(f"{short} is in {text!r}; the given unit is used instead.")

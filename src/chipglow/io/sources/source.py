@@ -176,3 +176,15 @@ class Source(ABC):
         SourceError
             If a frame cannot be read.
         """
+
+
+def check_times(name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return times, which must ascend."""
+    wrong = np.flatnonzero(np.diff(times) <= 0)
+    if wrong.size:
+        i = int(wrong[0])
+        raise SourceError(
+            f"{name}: does not ascend, frame {i + 1} is at {times[i + 1]:.9g} s after "
+            f"{times[i]:.9g} s"
+        )
+    return times

@@ -14,10 +14,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
-from chipglow.camera.calibration.calibration import CALIBRATION
+from chipglow.camera.calibration import CALIBRATION
+from chipglow.chip.ridge import NoShearBandError, across_curve, arc_length, normals_of
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
-from chipglow.laboratory.chip.ridge import NoShearBandError, across_curve, arc_length, normals_of
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates, spline_filter
 
 from chipglow.camera import Flag, Measurement
-from chipglow.laboratory.chip.ridge import (
+from chipglow.chip.ridge import (
     NoShearBandError,
     PolarGrid,
     across_curve,

@@ -8,9 +8,9 @@ from uuid import uuid4
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.quantities import ZERO_CELSIUS, Array, quotient
 from chipglow.uncertainty import Cause, Component, Estimate
 
 FRAMES: Final = "frames"
@@ -31,13 +31,6 @@ def frame_numbers(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]
     return numbers
 
 
-def ratio(part: Array, whole: ArrayLike) -> Array:
-    """Return the quotient; NaN where the divisor is not positive."""
-    divisor = np.asarray(whole, np.float64)
-    unknown = np.full(np.broadcast_shapes(part.shape, divisor.shape), np.nan)
-    return np.asarray(np.divide(part, divisor, out=unknown, where=divisor > 0))
-
-
 def changed(estimate: Estimate, change: Callable[[Array], Array]) -> Estimate:
     """Return an estimate of which a linear change is made to the values and to every effect."""
     components = []
@@ -53,7 +46,7 @@ def frame_mean(estimate: Estimate) -> Estimate:
     count = known.sum(axis=0)
 
     def mean(values: Array) -> Array:
-        return ratio(np.where(known, values, 0.0).sum(axis=0), count)
+        return quotient(np.where(known, values, 0.0).sum(axis=0), count)
 
     return changed(estimate, mean)
 
@@ -66,7 +59,7 @@ def frame_scatter(frames: Array) -> Component:
     """
     known = np.isfinite(frames)
     count = known.sum(axis=0)
-    mean = ratio(np.where(known, frames, 0.0).sum(axis=0), count)
+    mean = quotient(np.where(known, frames, 0.0).sum(axis=0), count)
     away = np.where(known, frames - mean, 0.0)
     longer = _longer(away)
     patterns = away * np.sqrt(longer / np.maximum(count * (count - 1), 1))

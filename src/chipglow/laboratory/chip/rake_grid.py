@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera import UNUSABLE, Measurement
-from chipglow.camera.calibration.calibration import CALIBRATION
+from chipglow.camera.calibration import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.laboratory.chip.frames import (
     FRAMES,
@@ -21,7 +21,6 @@ from chipglow.laboratory.chip.frames import (
     frame_numbers,
     frame_scatter,
     known_uncertainty,
-    ratio,
 )
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
@@ -29,7 +28,7 @@ from chipglow.laboratory.chip.tool_position import (
     contribution,
     tool_of,
 )
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import Array, Brief, quotient
 from chipglow.scene import Raster, Tool
 from chipglow.scene.tool_outline import tool_attributes
 from chipglow.text import Notes, result_html
@@ -104,7 +103,7 @@ class RakeGrid(Brief):
     def frame_standard_deviation(self) -> Array:
         """Standard deviation of `mean` between those frames in K, shape (m, n); NaN for one."""
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
-        return np.sqrt(ratio((away**2).sum(axis=0), self.frame_count - 1))
+        return np.sqrt(quotient((away**2).sum(axis=0), self.frame_count - 1))
 
     @property
     def bars(self) -> Array:
@@ -302,9 +301,9 @@ class _Squares:
         kept = self._sum(good)
         left_out = (kept < number) | (number == 0) | ~self.whole
         mean = np.where(left_out, np.nan, self._sum(self.weight * value))
-        plain = ratio(self._sum(value), number)
+        plain = quotient(self._sum(value), number)
         away = value - plain.ravel()[self.square]
-        deviation = np.sqrt(ratio(self._sum(away**2), number - 1))
+        deviation = np.sqrt(quotient(self._sum(away**2), number - 1))
         return mean, np.where(left_out, np.nan, deviation), kept.astype(np.int64)
 
     def mean(self, values: Array) -> Array:

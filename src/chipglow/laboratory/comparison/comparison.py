@@ -10,9 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
+from chipglow.chip import NoShearBandError
 from chipglow.laboratory.chip import (
     BandProfile,
-    NoShearBandError,
     RakeGrid,
     ThermalImage,
     ToolUncertainty,

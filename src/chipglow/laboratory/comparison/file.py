@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from chipglow.camera import Measurement
+from chipglow.io.result_file import write_frame
 from chipglow.laboratory.comparison.comparison import Comparison
-from chipglow.laboratory.measurement import load_measurement
-from chipglow.laboratory.result_file import write_frame
+from chipglow.laboratory.recordings import load_measurement
 
 
 def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:

@@ -10,7 +10,10 @@ import xarray as xr
 
 from chipglow.camera import MeasuredPSF
 from chipglow.io import is_measurement, is_scene, write_dataset
-from chipglow.laboratory.measurement import (
+from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
+from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, psf_kernel
+from chipglow.laboratory.psf.psf_fit import ModelFit
+from chipglow.laboratory.recordings import (
     load_calibration,
     load_description,
     load_measurement,
@@ -19,9 +22,6 @@ from chipglow.laboratory.measurement import (
     pixel_correction,
     repaired_signal,
 )
-from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
-from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, psf_kernel
-from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.text import DescriptionError, load_described

@@ -1,1 +1,0 @@
-"""From counts to radiance: calibrations and their fit to blackbodies."""

@@ -1,0 +1,1 @@
+"""Meshes: files of finite elements, and their fields on the samples of a raster."""

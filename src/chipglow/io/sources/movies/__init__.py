@@ -1,0 +1,1 @@
+"""Movies in false colour: their pictures, and the values of the colours."""

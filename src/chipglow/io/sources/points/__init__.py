@@ -1,0 +1,1 @@
+"""Scattered points: their files, and their fields on the samples of a raster."""

@@ -1,0 +1,13 @@
+"""Quotients of arrays whose divisor may be zero."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chipglow.quantities.units import Array
+
+
+def quotient(part: Array, whole: ArrayLike) -> Array:
+    """Return the quotient; NaN where the divisor is not positive."""
+    divisor = np.asarray(whole, np.float64)
+    unknown = np.full(np.broadcast_shapes(part.shape, divisor.shape), np.nan)
+    return np.asarray(np.divide(part, divisor, out=unknown, where=divisor > 0))
