@@ -26,12 +26,21 @@ from chipglow.analysis import (
     image_error,
     line_error,
     one_draw,
-    reference_temperature,
     sensitivity_error,
     sensitivity_psf_fraction,
 )
 from chipglow.analysis.heated import heated_objects
-from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
+from chipglow.camera import (
+    EVERY,
+    Camera,
+    Detector,
+    Effect,
+    EnergyResponse,
+    Exposure,
+    GaussianPSF,
+    ReadNoise,
+    reference_temperature,
+)
 from chipglow.camera.optics.sampling import LEAST_COVERED
 from chipglow.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
@@ -630,19 +639,19 @@ def exposure_at(study, name):
 
 
 def test_an_effect_switched_off_is_one_more_row(chip):
-    """Without motion the camera sees what radiates in the middle of the exposure."""
+    """Without motion the camera sees the hottest moment of the exposure."""
     scene = chip.scene()
 
-    def still(camera, exposure):
-        return camera, replace(exposure, mean_radiance=exposure.centre_radiance)
+    def still(exposure):
+        return replace(exposure, mean_radiance=exposure.peak_radiance.astype(float))
 
     place = PointPlace("here", (-60e-6, 80e-6))
     plan = Plan(exposures=1, phases=1, textures=1, places=(place,))
-    effects = {**CASES, "without motion": still}
+    effects = {**CASES, "without motion": EVERY - {Effect.MOTION}}
     result = analyse(scene, {"chip 1": CHIP_1}, CAMERA, plan, effects=effects)
     row = result.data.measured.sel(reading="here, pixel").isel(exposure=0, texture=0, pixel_phase=0)
     exposure = CAMERA.expose(scene, CHIP_1, float(result.data.exposure[0]))
-    for effect, seen in (("all", exposure), ("without motion", still(CAMERA, exposure)[1])):
+    for effect, seen in (("all", exposure), ("without motion", still(exposure))):
         errors = error_images(CAMERA, seen)
         expected = nearest(errors.measured.values, CAMERA.pixels(scene.raster), place.point)
         assert row.sel(effects=effect) == pytest.approx(float(expected), abs=1e-9)

@@ -9,7 +9,6 @@ import pytest
 
 from chipglow.analysis import error_images
 from chipglow.analysis.attribution import (
-    BLUR,
     REST,
     attribute,
     interaction_matrix,
@@ -104,7 +103,7 @@ def test_sampled_values_close_and_lie_within_their_standard_errors():
 @pytest.mark.parametrize("reference", ["true-maximum", "maximum"])
 def test_contributions_and_waterfall_add_up_to_the_error_of_every_pixel(scene, reference):
     data = attribute(scene, CAMERA, UniformSurface(0.6), reference=reference)
-    names = ["exposure", "psf", "footprint", "detector", "digitiser"]
+    names = ["motion", "psf", "footprint", "detector", "digitiser"]
     expected = ["emissivity", "reflection", *names] if reference == "true-maximum" else names
     assert list(data.effect.values) == expected
     for name in ("contribution", "waterfall"):
@@ -139,10 +138,10 @@ def test_two_effects_have_the_mean_of_both_orders_of_figure_6(scene):
     exposing = (moved - hottest + both - still) / 2
     gathering = (still - hottest + both - moved) / 2
     # The camera's table of temperatures is within 1e-7 of its inverse.
-    np.testing.assert_allclose(data.contribution.sel(effect="exposure"), exposing, atol=1e-6)
+    np.testing.assert_allclose(data.contribution.sel(effect="motion"), exposing, atol=1e-6)
     np.testing.assert_allclose(data.contribution.sel(effect="footprint"), gathering, atol=1e-6)
     expected = both - still - moved + hottest
-    pair = data.interaction.sel(effect="exposure", other_effect="footprint")
+    pair = data.interaction.sel(effect="motion", other_effect="footprint")
     np.testing.assert_allclose(pair, expected, atol=1e-6)
 
 
@@ -233,7 +232,7 @@ def test_terms_of_a_saturated_detector_have_the_effects_of_a_literal_computation
 
 def test_over_eight_effects_are_sampled_and_close(scene):
     camera = replace(CAMERA, optics=(Veil(0.1, 30e-6),))
-    effects = ("emissivity", "reflection", "exposure", "psf", "footprint")
+    effects = ("emissivity", "reflection", "motion", "psf", "footprint")
     terms = ("veil", "shot-noise", "read-noise")
     surface = UniformSurface(0.6)
     data = attribute(scene, camera, surface, effects=(*effects, *terms), permutations=16)
@@ -249,7 +248,7 @@ def test_a_psf_that_includes_the_footprint_is_one_effect_with_it(scene):
     weights = GaussianPSF(8e-6).kernel(2e-6)
     psf = MeasuredPSF(weights, 2e-6, includes=("footprint",))
     data = attribute(scene, replace(CAMERA, psf=psf), UniformSurface(0.6))
-    assert BLUR in data.effect.values
+    assert "psf and footprint" in data.effect.values
     np.testing.assert_allclose(data.contribution.sum("effect"), error_of(data), atol=ROUNDING)
 
 

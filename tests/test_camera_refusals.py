@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chipglow.analysis import RatioPair
 from chipglow.camera import (
     CalibrationErrors,
     Camera,
@@ -18,7 +19,6 @@ from chipglow.camera import (
     PhotonResponse,
     Pupil,
     PupilPSF,
-    RatioCamera,
     ReadNoise,
     SakumaHattori,
     Veil,
@@ -111,11 +111,11 @@ REFUSED = {
     "set numerical_aperture, f_number or working": Pupil,
     "and working_f_number can be combined": lambda: Pupil(numerical_aperture=0.3, f_number=2.0),
     "bands: .* the band of the shorter wavelengths": lambda: RatioThermometer(LONG, SHORT),
-    "the band of the shorter wavelengths first": lambda: RatioCamera(*TWO[::-1]),
-    "pitch is .* both must be the same": lambda: RatioCamera(TWO[0], Camera(LONG, 5e-6)),
-    "shape is .* both must be the same": lambda: RatioCamera(TWO[0], replace(TWO[1], shape=(3, 3))),
-    "shift": lambda: RatioCamera(*TWO, shift=(np.nan, 0.0)),
-    "delay": lambda: RatioCamera(*TWO, delay=np.inf),
+    "the band of the shorter wavelengths first": lambda: RatioPair(*TWO[::-1]),
+    "pitch is .* both must be the same": lambda: RatioPair(TWO[0], Camera(LONG, 5e-6)),
+    "shape is .* both must be the same": lambda: RatioPair(TWO[0], replace(TWO[1], shape=(3, 3))),
+    "shift": lambda: RatioPair(*TWO, shift=(np.nan, 0.0)),
+    "delay": lambda: RatioPair(*TWO, delay=np.inf),
     "band: .* upper=3e-06": lambda: Band(5e-6, 3e-6),
     "band: .* lower=0,": lambda: Band(0, 1e-6),
     "band: upper=5.1 m is longer than 1 mm": lambda: Band(3.8, 5.1),

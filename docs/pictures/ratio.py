@@ -12,9 +12,8 @@ import numpy as np
 import xarray as xr
 
 import chipglow
-from chipglow.analysis import ratio_errors, wavelengths_frame
+from chipglow.analysis import RatioPair, ratio_errors, wavelengths_frame
 from chipglow.analysis.wavelengths import band_name
-from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
 from chipglow.quantities import changed
@@ -44,7 +43,7 @@ def main() -> None:
     scene = chipglow.open_scene(chipglow.cut(quick))
     camera = quick.camera.build()
     first, second = (replace(camera.in_band(band), lower_limit=None) for band in (SHORT, LONG))
-    pair = RatioCamera(first, second, shift=(1e-6, 0.0))
+    pair = RatioPair(first, second, shift=(1e-6, 0.0))
     errors = ratio_errors(pair, scene, CHIP_1, 379e-6)
     draw_images(errors, pair.with_common_pixels(scene.raster)[0].pixels(scene.raster), scene.tool)
     grey, metal = (chipglow.wavelengths(study(quick, law)) for law in ("none", METAL))

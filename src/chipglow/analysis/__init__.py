@@ -1,10 +1,6 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
-from chipglow.analysis.attribution import (
-    EFFECTS as EFFECTS,
-    AttributionPlan as AttributionPlan,
-    attribute as attribute,
-)
+from chipglow.analysis.attribution import AttributionPlan as AttributionPlan, attribute as attribute
 from chipglow.analysis.cut import (
     Cut as Cut,
     CuttingForces as CuttingForces,
@@ -21,10 +17,8 @@ from chipglow.analysis.heated import HeatedObject as HeatedObject, HeatedRow as 
 from chipglow.analysis.images import (
     ALL as ALL,
     CASES as CASES,
-    ExposureImages as ExposureImages,
     error_images as error_images,
     error_parts as error_parts,
-    reference_temperature as reference_temperature,
 )
 from chipglow.analysis.outside import (
     outside_texts as outside_texts,
@@ -40,6 +34,11 @@ from chipglow.analysis.places import (
     RegionPlace as RegionPlace,
 )
 from chipglow.analysis.plan import Plan as Plan
+from chipglow.analysis.ratio import (
+    CAUSES as CAUSES,
+    RatioPair as RatioPair,
+    ratio_errors as ratio_errors,
+)
 from chipglow.analysis.reductions import (
     Headline as Headline,
     OneDraw as OneDraw,
@@ -59,12 +58,10 @@ from chipglow.analysis.reductions import (
 )
 from chipglow.analysis.single import SingleReadings as SingleReadings
 from chipglow.analysis.wavelengths import (
-    CAUSES as CAUSES,
     Spot as Spot,
     WavelengthPlan as WavelengthPlan,
     cut_spots as cut_spots,
     point_spots as point_spots,
-    ratio_errors as ratio_errors,
     wavelength_errors as wavelength_errors,
     wavelengths_frame as wavelengths_frame,
 )

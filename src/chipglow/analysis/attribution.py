@@ -1,6 +1,6 @@
 """Attribution: the error of each pixel divided among the effects that cause it (Shapley values)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
@@ -9,44 +9,29 @@ from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chipglow.analysis.cut import middle_start
-from chipglow.analysis.images import Array, ExposureImages, read_temperature, reference_temperature
+from chipglow.analysis.images import exposed_chain
 from chipglow.analysis.places import Place
-from chipglow.camera import UNUSABLE, Camera, Exposure, range_flags
-from chipglow.camera.exposure import View, expose
+from chipglow.camera import UNUSABLE, Camera
+from chipglow.camera.chain import Chain, ExposedChain, expose_apart
+from chipglow.camera.effect import Effect, joined
 from chipglow.camera.exposure_kernels import Check
-from chipglow.camera.optics.sampling import integrate, largest
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.scene import Raster, Scene
-from chipglow.surface import EmissivityField, ModifiedSurface, Surface, UniformSurface
-
-EFFECTS: Final = (
-    "emissivity",
-    "reflection",
-    "exposure",
-    "psf",
-    "optics",
-    "footprint",
-    "detector",
-    "digitiser",
-)
-"""Effects in the order of the light, from the surface to the counts.
-
-``detector`` is that of the detector's terms such as noise, ``digitiser`` that of full well,
-saturation and rounding to counts.
-"""
+from chipglow.surface import Surface
 
 REST: Final = "other effects"
-BLUR: Final = "psf and footprint"
-"""Group of a point spread function that includes the pixel's footprint."""
-
 MAX_EXACT: Final = 8
 """Number of effects up to which all combinations are computed."""
 
 AttributionReference: TypeAlias = Literal["true-maximum", "maximum"]
 _Coalition: TypeAlias = frozenset[str]
+_EFFECTS: Final = tuple(
+    one.value for one in Effect if one not in (Effect.MISREGISTRATION, Effect.DELAY)
+)
+"""Effects of a single camera."""
+
 _Value: TypeAlias = Callable[[_Coalition], Array]
 _KELVIN: Final = {"units": "K"}
 
@@ -64,7 +49,7 @@ class AttributionPlan(Part):
     effects: Annotated[
         tuple[str, ...],
         Parameter(
-            "Effects: any of " + ", ".join(EFFECTS) + ", or the kind of a term of the camera's "
+            "Effects: any of " + ", ".join(_EFFECTS) + ", or the kind of a term of the camera's "
             "optics or detector; the others form a group. Empty: all that the camera has."
         ),
     ] = ()
@@ -113,7 +98,7 @@ def attribute(
     start : float, optional
         Start of the exposure in s; by default in the middle of the scene's longest part.
     effects : sequence of str
-        Any of `EFFECTS`, or the ``kind`` of a term of the camera's optics or detector. The
+        Any of `Effect`, or the ``kind`` of a term of the camera's optics or detector. The
         effects that are not named form one group. By default all that the camera has.
     reference : {"true-maximum", "maximum"}
         The reading without any effect: the largest true temperature in the pixel's square during
@@ -156,15 +141,18 @@ def attribute(
     plan = AttributionPlan(tuple(effects), reference, permutations)
     if start is None:
         start = middle_start(scene, camera.frame_duration(scene.raster))
-    field = camera.prepare(surface, scene)
-    model = _Model(camera, _sources(scene, camera, surface, field, start, check), plan, check)
-    variables = _divided(model, plan.permutations, seed)
+    chain = Chain(camera, scene, surface)
+    exposed = expose_apart(chain, start, reference, check)
+    players = _players(exposed, plan.effects)
+    variables = _divided(exposed, players, plan.permutations, seed, check)
     half = replace(camera, integration_time=camera.integration_time / 2)
-    (shorter,) = half.expose_fields(scene, (field,), start + half.integration_time / 2, check)
-    gain = _size(camera, model.sources.exposures[0], reference) - _size(half, shorter, reference)
+    (shorter,) = half.expose_fields(
+        scene, (chain.emissivity,), start + half.integration_time / 2, check
+    )
+    gain = _size(exposed) - _size(exposed_chain(half, shorter, reference))
     variables["gain_half_exposure"] = ("y", "x"), gain, _KELVIN
     pixels = camera.pixels(scene.raster)
-    coordinates = {"effect": list(model.players), "other_effect": list(model.players)}
+    coordinates = {"effect": list(players), "other_effect": list(players)}
     return xr.Dataset(
         variables,
         coords=coordinates | {name: (name, getattr(pixels, name), {"units": "m"}) for name in "yx"},
@@ -238,179 +226,85 @@ def _walk(value: _Value, players: Sequence[_Coalition], order: list[int]) -> Arr
     return changes
 
 
-def _size(camera: Camera, exposure: Exposure, reference: AttributionReference) -> Array:
+def _size(chain: ExposedChain) -> Array:
     """Return the absolute error of each pixel in K."""
-    images = ExposureImages(exposure, reference)
-    return np.abs(images.measured(camera) - images.reference(camera))
+    return np.abs(chain.reading() - chain.reference())
 
 
-@dataclass(frozen=True, eq=False)
-class _Sources:
-    """Exposures of a scene with its surface, without reflection, and as a blackbody."""
+def _players(chain: ExposedChain, effects: Sequence[str]) -> dict[str, _Coalition]:
+    """Return the effects of each player, in the order of the light.
 
-    exposures: tuple[Exposure, ...]
-    reflects: bool
-
-    def of(self, on: _Coalition) -> Exposure:
-        seen, unreflecting, black = self.exposures
-        if "emissivity" not in on:
-            return black
-        return seen if "reflection" in on else unreflecting
-
-
-def _sources(
-    scene: Scene,
-    camera: Camera,
-    surface: Surface,
-    field: EmissivityField,
-    start: float,
-    check: Check | None,
-) -> _Sources:
-    band, plain = camera.band, _unreflecting(surface)
-    views = [
-        View(field, band, camera.reflected),
-        View(plain.prepare(scene, band), band),
-        View(UniformSurface(1.0).prepare(scene, band), band),
-    ]
-    delays = camera.row_delays(scene.raster)
-    exposures = expose(scene, views, start, camera.integration_time, delays, check)
-    return _Sources(exposures, plain is not surface or camera.reflected is not None)
-
-
-def _unreflecting(surface: Surface) -> Surface:
-    """Return the surface without reflections between tool and chip."""
-    if not isinstance(surface, ModifiedSurface):
-        return surface
-    kept = [one for one in surface.modifiers if one.effect != "reflections"]
-    return surface if len(kept) == len(surface.modifiers) else surface.bare.modified(*kept)
-
-
-class _Model:
-    """The reading of a camera with some of its effects switched on.
-
-    A coalition contains names of `EFFECTS`, and kinds of terms that the plan names.
+    Those that are not named form one group.
     """
-
-    def __init__(
-        self, camera: Camera, sources: _Sources, plan: AttributionPlan, check: Check | None = None
-    ) -> None:
-        self.check = check
-        seen = sources.exposures[0]
-        self.camera, self.sources, self.start = camera, sources, seen.start
-        self.reference = reference_temperature(camera, seen, plan.reference)
-        is_contained = plan.reference == "maximum"
-        self.contained = frozenset({"emissivity", "reflection"} if is_contained else ())
-        detector = camera.detector
-        self.noises = frozenset(one.kind for one in (detector.terms if detector else ()))
-        self.named = (self.noises | {one.kind for one in camera.optics}) & set(plan.effects)
-        self.players = self._players(plan.effects)
-        self._image = lru_cache(None)(self._formed)
-        self._read = lru_cache(None)(self._reading)
-
-    def temperature(self, on: _Coalition) -> Array:
-        """Return the measured temperature in K."""
-        kelvins, _ = self._read(on | self.contained)
-        return np.where(np.isnan(self.reference), np.nan, kelvins)
-
-    def lost(self, on: _Coalition) -> Array:
-        """Return 1 for the pixels below the range limit or unusable, and 0 elsewhere."""
-        _, flags = self._read(on | self.contained)
-        return np.where(np.isnan(self.reference), np.nan, flags & UNUSABLE != 0)
-
-    def _players(self, effects: Sequence[str]) -> dict[str, _Coalition]:
-        """Return the effects of each player, in the order of the light."""
-        groups = self._groups()
-        for name in effects:
-            if name not in {*EFFECTS, *groups, *self.named}:
-                known = ", ".join((*groups, *sorted(self.noises | self.named)))
-                raise ValueError(f"effects: {name!r} is unknown, expected any of {known}")
-        if not effects:
-            return groups
-        players = {name: one for name, one in groups.items() if name in effects}
-        players |= {name: frozenset({name}) for name in effects if name in self.named}
-        rest = frozenset().union(*groups.values()) - frozenset().union(*players.values())
-        return players | ({REST: rest} if rest else {})
-
-    def _groups(self) -> dict[str, _Coalition]:
-        """Return the effects that the camera has; those that cannot be separated form a group."""
-        camera, psf = self.camera, self.camera.psf
-        present = {
-            "reflection": self.sources.reflects,
-            "psf": psf is not None,
-            "optics": bool(camera.optics),
-            "detector": camera.detector is not None and bool(camera.detector.terms),
-            "digitiser": camera.detector is not None,
-        }
-        groups: dict[str, _Coalition] = {}
-        for name in EFFECTS:
-            if present.get(name, True) and name not in self.contained:
-                blurs = name in ("psf", "footprint") and psf and "footprint" in psf.includes
-                group = BLUR if blurs else name
-                groups[group] = groups.get(group, frozenset()) | {name}
+    groups = _groups(chain)
+    kinds = chain.terms_of(Effect.OPTICS) | chain.terms_of(Effect.DETECTOR)
+    for name in effects:
+        if name not in {*_EFFECTS, *groups, *kinds}:
+            known = ", ".join((*groups, *sorted(kinds)))
+            raise ValueError(f"effects: {name!r} is unknown, expected any of {known}")
+    if not effects:
         return groups
-
-    def _reading(self, on: _Coalition) -> tuple[Array, NDArray[np.uint8]]:
-        """Return temperatures and flags."""
-        if not on - self.contained:
-            return self.reference, range_flags(self.reference, self.camera.lower_limit)
-        image = self._image(on - {"detector", "digitiser"} - self.noises)
-        return read_temperature(self._switched(on), image, self.start)
-
-    def _formed(self, on: _Coalition) -> Array:
-        """Return the radiance of the pixels before the detector in W/(m² sr)."""
-        if self.check:
-            self.check()
-        exposure, camera = self.sources.of(on), self._switched(on)
-        hottest = exposure.peak_radiance.astype(np.float64)
-        radiance = exposure.mean_radiance if "exposure" in on else hottest
-        gather = integrate if "footprint" in on else largest
-        return camera.form_image(radiance, exposure.raster, gather)
-
-    def _switched(self, on: _Coalition) -> Camera:
-        """Return the camera with the parts and terms that are on."""
-        camera, detector = self.camera, self.camera.detector
-
-        def is_on(kind: str, effect: str) -> bool:
-            return (kind if kind in self.named else effect) in on
-
-        optics = tuple(one for one in camera.optics if is_on(one.kind, "optics"))
-        if detector is not None:
-            terms = tuple(one for one in detector.terms if is_on(one.kind, "detector"))
-            detector = replace(detector, terms=terms)
-            if "digitiser" not in on:
-                detector = detector.undigitised() if terms else None
-        psf = camera.psf if "psf" in on else None
-        order = camera.psf_order if psf else "optics"
-        return replace(camera, psf=psf, psf_order=order, optics=optics, detector=detector)
+    named = frozenset(effects) & kinds
+    players = {name: one - named for name, one in groups.items() if name in effects}
+    players |= {name: frozenset({name}) for name in effects if name in named}
+    rest = frozenset().union(*groups.values()) - frozenset().union(*players.values())
+    return players | ({REST: rest} if rest else {})
 
 
-def _divided(model: _Model, permutations: int, seed: int) -> dict[str, tuple[object, ...]]:
+def _groups(chain: ExposedChain) -> dict[str, _Coalition]:
+    """Return the effects that the camera has; those that cannot be separated form a group.
+
+    Terms stand in place of the effect that they are part of.
+    """
+    psf = chain.camera.psf
+    blur = frozenset({Effect.PSF, Effect.FOOTPRINT})
+    together = blur if psf is not None and "footprint" in psf.includes else frozenset()
+    groups: dict[str, _Coalition] = {}
+    for effect in chain.effects:
+        if effect in chain.contained:
+            continue
+        name = joined(together) if effect in together else effect.value
+        groups[name] = groups.get(name, frozenset()) | (chain.terms_of(effect) or {effect})
+    return groups
+
+
+def _divided(
+    chain: ExposedChain,
+    players: dict[str, _Coalition],
+    permutations: int,
+    seed: int,
+    check: Check | None,
+) -> dict[str, tuple[object, ...]]:
     """Return the variables of an attribution."""
-    players = list(model.players.values())
-    count, pixels = len(players), ("y", "x")
-    everything = frozenset().union(*players)
-    whole, lost = model.temperature(everything), model.lost(everything)
-    light = [frozenset().union(*players[:i]) for i in range(count + 1)]
-    removal = [whole - model.temperature(everything - one) for one in players]
+    coalitions, pixels = list(players.values()), ("y", "x")
+
+    @lru_cache(None)
+    def read(on: _Coalition) -> Array:
+        """Return the temperature in K, and 1 for each lost pixel, (2, y, x)."""
+        if check:
+            check()
+        kelvins, flags = chain.read(on | chain.contained)
+        values = np.stack([kelvins, flags & UNUSABLE != 0])
+        return np.where(np.isnan(chain.reference()), np.nan, values)
+
+    everything = frozenset().union(*coalitions)
+    whole, lost = read(everything)
+    light = [frozenset().union(*coalitions[:i]) for i in range(len(coalitions) + 1)]
+    removal = [whole - read(everything - one)[0] for one in coalitions]
     values = {
-        "reference": (pixels, model.reference),
+        "reference": (pixels, chain.reference()),
         "measured": (pixels, whole),
-        "waterfall": (("effect", *pixels), np.diff([*map(model.temperature, light)], axis=0)),
+        "waterfall": (("effect", *pixels), np.diff([read(on)[0] for on in light], axis=0)),
         "removal": (("effect", *pixels), np.stack(removal)),
     }
-    if count <= MAX_EXACT:
-        coalitions = [
-            frozenset().union(*(one for i, one in enumerate(players) if number >> i & 1))
-            for number in range(2**count)
-        ]
-        kelvins = np.stack([model.temperature(one) for one in coalitions])
-        shapley = np.tensordot(shapley_matrix(count), kelvins, 1)
-        lost_by = np.tensordot(shapley_matrix(count), [*map(model.lost, coalitions)], 1)
-        pairs = np.tensordot(interaction_matrix(count), kelvins, 1)
+    if len(coalitions) <= MAX_EXACT:
+        every = np.stack([read(on) for on in _subsets(coalitions)], axis=1)
+        shapley, lost_by = (np.tensordot(shapley_matrix(len(coalitions)), one, 1) for one in every)
+        pairs = np.tensordot(interaction_matrix(len(coalitions)), every[0], 1)
         values["interaction"] = ("effect", "other_effect", *pixels), pairs
     else:
-        shapley, error = sampled_shapley(model.temperature, players, permutations, seed)
-        lost_by, _ = sampled_shapley(model.lost, players, permutations, seed)
+        both, errors = sampled_shapley(read, coalitions, permutations, seed)
+        (shapley, lost_by), error = np.moveaxis(both, 1, 0), errors[:, 0]
         values["standard_error"] = ("effect", *pixels), error
     values["contribution"] = ("effect", *pixels), shapley
     variables: dict[str, tuple[object, ...]] = {
@@ -419,3 +313,9 @@ def _divided(model: _Model, permutations: int, seed: int) -> dict[str, tuple[obj
     variables["lost"] = pixels, lost, {"units": "1"}
     variables["lost_contribution"] = ("effect", *pixels), lost_by, {"units": "1"}
     return variables
+
+
+def _subsets(players: Sequence[_Coalition]) -> Iterator[_Coalition]:
+    """Yield all coalitions: bit i of the number of a coalition is set if player i is in it."""
+    for number in range(2 ** len(players)):
+        yield frozenset().union(*(one for i, one in enumerate(players) if number >> i & 1))

@@ -1,6 +1,6 @@
 """The analysis of a scene: the schedule of its images, the places that are read, the result."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
@@ -14,11 +14,11 @@ from chipglow.analysis.attribution import attribute, read_attribution
 from chipglow.analysis.cut import Cut, Progress, cutting_forces, find_cut, lacking, spread_starts
 from chipglow.analysis.distribution import PIXEL_PHASE
 from chipglow.analysis.heated import heated_objects
-from chipglow.analysis.images import CASES, Array, Effect
-from chipglow.analysis.looks import Looked, Schedule, Variables, View, look
+from chipglow.analysis.images import CASES
 from chipglow.analysis.outside import fractions_outside, outside_warnings
 from chipglow.analysis.places import TOUCHING, BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
+from chipglow.analysis.read import Readings, Schedule, SurfacePlaces, Variables, read
 from chipglow.analysis.reductions import (
     Headline,
     headline,
@@ -37,7 +37,7 @@ from chipglow.chip import (
     contact_length,
     resolution_warnings,
 )
-from chipglow.quantities import Brief
+from chipglow.quantities import Array, Brief
 from chipglow.scene import FIELD_UNITS, Frame, Material, Raster, Scene, Tool, sample
 from chipglow.scene.frame import FILLED, QUALITY
 from chipglow.scene.tool_outline import tool_attributes
@@ -215,7 +215,7 @@ class _Task:
     camera: Camera
     plan: Plan
     tell: Progress
-    effects: Mapping[str, Effect]
+    effects: Mapping[str, Collection[str]]
     failed: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -237,7 +237,7 @@ def analyse(
     camera: Camera,
     plan: Plan,
     progress: Progress | None = None,
-    effects: Mapping[str, Effect] = CASES,
+    effects: Mapping[str, Collection[str]] = CASES,
 ) -> Analysis:
     """Measure a scene with a virtual camera, and read the errors.
 
@@ -254,8 +254,8 @@ def analyse(
     progress : callable, optional
         Called with the current step and the fraction of it that is complete.
     effects : mapping
-        The axis ``effects`` of the result: by name a function that changes the camera and the
-        exposure. ``all`` comes first and changes nothing; ``without psf`` is required.
+        The axis ``effects`` of the result: by name the effects that are on, members of `Effect`.
+        ``all`` comes first and has all of them; ``without psf`` is required.
 
     Returns
     -------
@@ -274,46 +274,27 @@ def analyse(
     task = _Task(scene, surfaces, camera, plan, tell, effects)
     fields = {name: camera.prepare(surface, scene) for name, surface in surfaces.items()}
     schedule, cut, missing = _schedule(task)
-    looked = look(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
+    readings = read(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
         name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
-        for number, (name, images) in enumerate(looked.images.items())
+        for number, (name, images) in enumerate(readings.images.items())
     }
     middle = scene.frame_at(schedule.starts[schedule.shown] + task.duration / 2)
     frame = cut.segments[0].frame if cut else scene.frame(middle)
     variables = {
-        **_scene_variables(task, frame, fields, looked),
-        **_image_variables(measurements, looked, schedule.shown),
-        **looked.variables("segment" if cut else "exposure"),
+        **_scene_variables(task, frame, fields, readings),
+        **_image_variables(measurements, readings, schedule.shown),
+        **readings.variables("segment" if cut else "exposure"),
     }
-    variables |= _corrected(camera, variables)
-    variables |= task.attempt("attribution", lambda: _attribution(task, schedule, looked)) or {}
-    attributes: dict[str, Any] = {
-        "shown_instant": schedule.shown,
-        "error_reference": plan.reference,
-        **(tool_attributes(scene.tool) if scene.tool else {}),
-    }
-    origins = [surface.origin for surface in surfaces.values()]
-    doubts = dict.fromkeys(
-        text for one in origins for text in one.warnings(camera.band, scene.metal)
-    )
-    warnings = [*doubts, *_image_warnings(task, looked)]
-    if sparse := sparse_frames(scene, camera.integration_time):
-        warnings = [sparse, *warnings]
+    variables |= _corrected(camera, variables) | _outside(schedule, readings, measurements)
+    variables |= task.attempt("attribution", lambda: _attribution(task, readings)) or {}
     if cut is not None:
         cut = _completed(task, cut)
-        warnings = [*resolution_warnings(scene, cut.band_width), *warnings]
-        variables |= _ridge_variables(cut, measurements) | _history_variables(cut)
-        variables["psf_order"] = "psf_order", list(PSF_ORDERS)
-        variables["psf_width"] = "psf_width", np.asarray(plan.psf_widths), {"units": "m"}
-        attributes |= {"rake_surface": plan.rake_chip, "band_surface": plan.band_chip}
-    exposure = schedule.drawn.index(schedule.shown)
-    read = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
-    variables |= _outside(schedule, looked, measurements)
-    data = xr.Dataset(variables, attrs=attributes)
+        variables |= _cut_variables(task, cut, measurements)
+    data = xr.Dataset(variables, attrs=_attributes(task, schedule, cut))
     data = data.set_coords([name for name in _COORDINATES if name in data])
-    warnings += _range_warnings(data, measurements, schedule.shown)
-    warnings += _filled_warnings(scene, schedule.starts[schedule.shown], task.duration, read)
+    exposure = schedule.drawn.index(schedule.shown)
+    placed = [(view.surface, place) for view in schedule.views for place in view.places[exposure]]
     return Analysis(
         data=data,
         plan=plan,
@@ -321,10 +302,15 @@ def analyse(
         raster=scene.raster,
         frame=frame,
         tool=scene.tool,
-        places=tuple({place.name: place for _, place in read}.values()),
+        places=tuple({place.name: place for _, place in placed}.values()),
         measurements=measurements,
         cut=cut,
-        warnings=tuple(warnings),
+        warnings=(
+            *_scene_warnings(task, cut),
+            *_image_warnings(task, readings),
+            *_range_warnings(data, measurements, schedule.shown),
+            *_filled_warnings(scene, schedule.starts[schedule.shown], task.duration, placed),
+        ),
         missing=(*missing, *_unread(data)),
         failed=task.failed,
     )
@@ -378,7 +364,7 @@ def _cut_schedule(task: _Task, cut: Cut) -> Schedule:
         drawn=tuple(starts.index(segment.start) for segment in cut.segments),
         shown=cut.developed,
         views=tuple(
-            View(name, places, numbers[..., i], _undrawn(task, name))
+            SurfacePlaces(name, places, numbers[..., i], _undrawn(task, name))
             for i, (name, places) in enumerate(used)
         ),
         phases=plan.phases,
@@ -406,7 +392,7 @@ def _scene_schedule(task: _Task) -> Schedule:
         shape = _textures(task, name), plan.phases**2
         numbers = first + np.arange(np.prod(shape)).reshape(shape)
         numbered = np.stack([numbers] * len(starts))
-        views.append(View(name, [places] * len(starts), numbered, _undrawn(task, name)))
+        views.append(SurfacePlaces(name, [places] * len(starts), numbered, _undrawn(task, name)))
         first += numbers.size
     return Schedule(
         starts=starts,
@@ -466,11 +452,11 @@ def _completed(task: _Task, cut: Cut) -> Cut:
 
 
 def _scene_variables(
-    task: _Task, frame: Frame, fields: Mapping[str, EmissivityField], looked: Looked
+    task: _Task, frame: Frame, fields: Mapping[str, EmissivityField], readings: Readings
 ) -> Variables:
     """Return the scene at the shown exposure, its emissivity and radiance temperature."""
     raster, temperature = task.scene.raster, task.camera.band.temperature
-    radiant = [temperature(exposure.centre_radiance) for exposure, _ in looked.shown.values()]
+    radiant = [temperature(exposure.centre_radiance) for exposure, _ in readings.shown.values()]
     known = {name: getattr(frame, name) for name in _SHOWN_FIELDS}
     over = "surface", "y", "x"
     return {
@@ -492,7 +478,7 @@ def _scene_variables(
 
 
 def _image_variables(
-    measurements: Mapping[str, Measurement], looked: Looked, shown: int
+    measurements: Mapping[str, Measurement], readings: Readings, shown: int
 ) -> Variables:
     every = list(measurements.values())
     pixels, per_pixel = every[0].raster, ("pixel_y", "pixel_x")
@@ -502,11 +488,11 @@ def _image_variables(
         "pixel_y": ("pixel_y", pixels.y, {"units": "m"}),
         "pixel_x": ("pixel_x", pixels.x, {"units": "m"}),
         "radiance_temperature": (over, [one.radiance_temperature() for one in every], _KELVIN),
-        "reference_temperature": (over, list(looked.references.values()), _KELVIN),
+        "reference_temperature": (over, list(readings.references.values()), _KELVIN),
         "flags": (over, [one.flags for one in every], {"units": "1"}),
         "image_measured": (
             ("surface", "effects", *per_pixel),
-            np.stack([stack for _, stack in looked.shown.values()]),
+            np.stack([stack for _, stack in readings.shown.values()]),
             _KELVIN,
         ),
         # A detector may flag more than the pixels below the limit.
@@ -542,32 +528,35 @@ def _corrected(camera: Camera, variables: Variables) -> Variables:
 
 
 def _outside(
-    schedule: Schedule, looked: Looked, measurements: Mapping[str, Measurement]
+    schedule: Schedule, readings: Readings, measurements: Mapping[str, Measurement]
 ) -> Variables:
     """Return the fractions of each reading's place outside the range, means over the exposures."""
-    fractions = {}
+    fractions = np.full((2, len(readings.readings)), np.nan)
     for number, view in enumerate(schedule.views):
         one = measurements[view.surface]
         measured = one.radiance_temperature(flagged=True)
-        images = np.where(np.isnan(looked.references[view.surface]), np.nan, measured)
-        for i in range(len(view.places[0])):
+        images = np.where(np.isnan(readings.references[view.surface]), np.nan, measured)
+        for rows in readings.of(number):
             every = [
-                fractions_outside(places[i], one.flags[instant], images[instant], one.raster)
+                fractions_outside(
+                    places[rows.place], one.flags[instant], images[instant], one.raster
+                )
                 for instant, places in zip(schedule.drawn, view.places, strict=True)
             ]
-            fractions[number, i] = np.mean(every, axis=0)
-    below, saturated = np.transpose([fractions[key[:2]] for key in looked.readings])
+            fractions[:, rows.readings] = np.mean(every, axis=0)[:, None]
+    below, saturated = fractions
     return {
         "below_range": ("reading", below, {"units": "1"}),
         "saturated": ("reading", saturated, {"units": "1"}),
     }
 
 
-def _attribution(task: _Task, schedule: Schedule, looked: Looked) -> Variables:
+def _attribution(task: _Task, readings: Readings) -> Variables:
     """Return the contributions of the effects in the shown exposure, and at the readings."""
-    plan, shown = task.plan.attribution, schedule.shown
+    plan, schedule = task.plan.attribution, readings.schedule
     if plan is None:
         return {}
+    shown = schedule.shown
     every = []
     how = plan.effects, plan.reference, plan.permutations
     for number, surface in enumerate(task.surfaces.values()):
@@ -576,30 +565,54 @@ def _attribution(task: _Task, schedule: Schedule, looked: Looked) -> Variables:
         every.append(attribute(task.scene, camera, surface, start, *how))
     task.tell("attribution", 1.0)
     data = xr.concat(every, "surface", join="outer").rename(y="pixel_y", x="pixel_x")
-    readings = np.full((len(looked.readings), data.sizes["effect"] + 1), np.nan)
-    along = np.full((len(looked.lines), data.sizes["effect"], looked.along.shape[-1]), np.nan)
+    at_readings = np.full((len(readings.readings), data.sizes["effect"] + 1), np.nan)
+    points = readings.along.shape[-1]
+    along = np.full((len(readings.lines), data.sizes["effect"], points), np.nan)
     exposure, names = schedule.drawn.index(shown), list(task.surfaces)
     pixels = task.camera.pixels(task.scene.raster)
     for number, view in enumerate(schedule.views):
-        of_surface = names.index(view.surface)
-        images = looked.references[view.surface][shown], looked.shown[view.surface][1][0]
-        for i, place in enumerate(view.places[exposure]):
-            read, lines = read_attribution(every[of_surface], place, images, pixels)
-            readings[[one[:2] == (number, i) for one in looked.readings]] = read
-            for name, values in lines.items():
-                along[looked.lines.index((number, i, name)), :, : values.shape[1]] = values
+        of_surface = every[names.index(view.surface)]
+        images = readings.references[view.surface][shown], readings.shown[view.surface][1][0]
+        for rows in readings.of(number):
+            place = view.places[exposure][rows.place]
+            values, lines = read_attribution(of_surface, place, images, pixels)
+            at_readings[rows.readings] = values
+            for name, parts in lines.items():
+                along[rows.lines[name], :, : parts.shape[1]] = parts
     variables: Variables = {
         f"attribution_{name}": (one.dims, one.values, one.attrs)
         for name, one in data.data_vars.items()
     }
-    if looked.lines:
+    if readings.lines:
         variables["attribution_line"] = ("line", "effect", "point"), along, _KELVIN
     return {
         **variables,
         "effect": ("effect", data.effect.values),
-        "attribution_reading": (("reading", "effect"), readings[:, :-1], _KELVIN),
-        "attribution_reading_gain": ("reading", readings[:, -1], _KELVIN),
+        "attribution_reading": (("reading", "effect"), at_readings[:, :-1], _KELVIN),
+        "attribution_reading_gain": ("reading", at_readings[:, -1], _KELVIN),
     }
+
+
+def _cut_variables(task: _Task, cut: Cut, measurements: Mapping[str, Measurement]) -> Variables:
+    """Return the ridge, the histories of the cut, and the point spread functions that vary."""
+    return {
+        **_ridge_variables(cut, measurements),
+        **_history_variables(cut),
+        "psf_order": ("psf_order", list(PSF_ORDERS)),
+        "psf_width": ("psf_width", np.asarray(task.plan.psf_widths), {"units": "m"}),
+    }
+
+
+def _attributes(task: _Task, schedule: Schedule, cut: Cut | None) -> dict[str, Any]:
+    plan, tool = task.plan, task.scene.tool
+    attributes: dict[str, Any] = {
+        "shown_instant": schedule.shown,
+        "error_reference": plan.reference,
+        **(tool_attributes(tool) if tool else {}),
+    }
+    if cut is not None:
+        attributes |= {"rake_surface": plan.rake_chip, "band_surface": plan.band_chip}
+    return attributes
 
 
 def _ridge_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> Variables:
@@ -653,8 +666,21 @@ def _history_variables(cut: Cut) -> Variables:
     return variables
 
 
-def _image_warnings(task: _Task, looked: Looked) -> Iterator[str]:
-    for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
+def _scene_warnings(task: _Task, cut: Cut | None) -> Iterator[str]:
+    """Yield sentences on the scene and on the emissivity of the surfaces."""
+    scene, camera = task.scene, task.camera
+    if cut is not None:
+        yield from resolution_warnings(scene, cut.band_width)
+    if sparse := sparse_frames(scene, camera.integration_time):
+        yield sparse
+    origins = [surface.origin for surface in task.surfaces.values()]
+    yield from dict.fromkeys(
+        text for one in origins for text in one.warnings(camera.band, scene.metal)
+    )
+
+
+def _image_warnings(task: _Task, readings: Readings) -> Iterator[str]:
+    for number, (name, (exposure, _)) in enumerate(readings.shown.items()):
         for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"
 

@@ -9,8 +9,9 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.images import Array, Stack
+from chipglow.analysis.images import Stack
 from chipglow.chip import ShearBand
+from chipglow.quantities import Array
 from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from chipglow.analysis.attribution import AttributionPlan
-from chipglow.analysis.images import ReferenceKind
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
+from chipglow.camera import ReferenceKind
 from chipglow.laboratory.emissivity import RegionSection
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import Length, Position

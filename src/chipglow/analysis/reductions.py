@@ -9,8 +9,8 @@ import pandas as pd
 import xarray as xr
 
 from chipglow.analysis.distribution import PIXEL_PHASE, Distribution
-from chipglow.analysis.images import ALL, WITHOUT_PSF, Array
-from chipglow.quantities import Brief
+from chipglow.analysis.images import ALL, WITHOUT_PSF
+from chipglow.quantities import Array, Brief
 
 _DRAWS = ("exposure", "texture", "pixel_phase")
 

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.cut import Progress
 from chipglow.analysis.engine import schedule_of
-from chipglow.analysis.images import Array, ExposureImages, read_temperature
-from chipglow.analysis.looks import Schedule
 from chipglow.analysis.outside import fractions_outside
 from chipglow.analysis.places import Place
 from chipglow.analysis.plan import Plan
+from chipglow.analysis.read import Schedule, read_place
 from chipglow.camera import Camera
+from chipglow.camera.chain import Chain, expose_chains, read_temperature
+from chipglow.quantities import Array
 from chipglow.scene import Frame, Raster, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import FeatureTrends, ModifiedSurface, Surface
@@ -154,8 +155,7 @@ class SingleReadings:
             surface = surfaces[window.surface].redrawn(texture)
             moved = _on_grid(seen, self._raster, window)
             stack, flags, pixels = self._look(window, moved, surface)
-            lines = window.place.sampled(stack, pixels)
-            values[window.rows, :BELOW] = window.place.read(stack, pixels, lines)
+            values[window.rows, :BELOW] = read_place(window.place, stack, pixels).values
             outside = fractions_outside(window.place, flags, stack[MEASURED], pixels)
             values[window.rows, BELOW:] = outside
         return np.asarray(values[self._kept])
@@ -165,13 +165,13 @@ class SingleReadings:
     ) -> tuple[Array, NDArray[np.uint8], Raster]:
         """Return `REFERENCE` and `MEASURED` of a window, and the flags of its pixels."""
         start = self._start(camera, window.start, window.limits)
-        images = ExposureImages(camera.expose(window.scene, surface, start), self._reference)
-        pixels, radiance = camera.pixels(window.scene.raster), images.radiance(camera)
+        chain = Chain(camera, window.scene, surface).at(start, self._reference)
+        pixels, radiance = camera.pixels(window.scene.raster), chain.radiance()
         if window.beyond is not None and window.pixels is not None:
             light = sample(window.beyond, window.pixels, pixels.centres)
             radiance = np.maximum(radiance + np.nan_to_num(light), 0.0)
         kelvins, flags = read_temperature(camera, radiance, start)
-        reference = images.reference(camera)
+        reference = chain.reference()
         measured = np.where(np.isnan(reference), np.nan, kelvins)
         return np.stack([reference, measured]), flags, pixels
 
@@ -201,11 +201,12 @@ class SingleReadings:
         small = [name for name in used if _is_local(surfaces[name]) and camera.line_time is None]
         whole, frames = {}, []
         if small:
-            fields = [camera.prepare(surfaces[name], scene) for name in small]
-            exposed = camera.expose_fields(scene, fields, begin)
-            whole = dict(
-                zip(small, (ExposureImages(one).radiance(camera) for one in exposed), strict=True)
-            )
+            chains = [Chain(camera, scene, surfaces[name]) for name in small]
+            exposures = expose_chains(chains, begin)
+            whole = {
+                name: chain.exposed(exposure).radiance()
+                for name, chain, exposure in zip(small, chains, exposures, strict=True)
+            }
             reach = camera.integration_time / 2
             first, last = (scene.frame_at(begin + at * reach) for at in (-1.0, 3.0))
             frames = list(scene.frames(range(max(first, block[0]), min(last, block[-1]) + 1)))
@@ -218,9 +219,8 @@ class SingleReadings:
             if part is not None:
                 one = replace(one, scene=_cropped(frames, scene, part))
                 moved = _on_grid(camera, scene.raster, one)
-                alone = moved.expose(one.scene, surfaces[view.surface], begin)
+                image = Chain(moved, one.scene, surfaces[view.surface]).at(begin).radiance()
                 pixels = moved.pixels(one.scene.raster)
-                image = ExposureImages(alone).radiance(moved)
                 light = nearest(whole[view.surface], camera.pixels(scene.raster), pixels.centres)
                 one = replace(one, beyond=np.nan_to_num(light - image), pixels=pixels)
             windows.append(one)

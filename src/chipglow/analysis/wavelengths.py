@@ -14,23 +14,22 @@ import xarray as xr
 from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
 
 from chipglow.analysis.cut import Progress, find_cut, spread_starts
-from chipglow.analysis.images import Array, ExposureImages, around, pixel_phases
+from chipglow.analysis.images import around, pixel_phases
 from chipglow.analysis.plan import Plan
-from chipglow.camera import Camera, Exposure, RatioCamera, expose, frame_weights
+from chipglow.analysis.ratio import CAUSES, true_temperature
+from chipglow.camera import Camera, Exposure, frame_weights
+from chipglow.camera.chain import Chain, ExposedChain, chains_in_bands, expose_chains
+from chipglow.camera.effect import EVERY, Effect
 from chipglow.camera.exposure import surroundings_radiance
-from chipglow.camera.ratio_camera import views_of
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band, RatioThermometer
-from chipglow.scene import Material, Scene, sample
+from chipglow.scene import Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
 
-CAUSES: Final = ("emissivity", "motion", "footprint", "optics", "misregistration", "delay", "noise")
-"""Causes of the error in the order in which they are added."""
-
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
-"""Causes of the mean error of a band or ratio; the others scatter."""
+"""The `CAUSES` of the mean error of a band or ratio; the others scatter."""
 
 _IDEAL, _FORMED, _DELAYED, _SHIFTED = range(4)
 """Pixels read in every band; from the last on there is one for each of the directions."""
@@ -134,83 +133,6 @@ class Spot:
     surface: str
     start: float
     point: Array
-
-
-def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: float) -> xr.Dataset:
-    """Errors of the ratio temperature of one exposure, and their causes.
-
-    Parameters
-    ----------
-    camera : RatioCamera
-        The camera.
-    scene : Scene
-        The true fields.
-    surface : Surface
-        Its emissivity.
-    start : float
-        Start time of the first channel's integration in s.
-
-    Returns
-    -------
-    xarray.Dataset
-        In K over ``y`` and ``x`` of the pixels: ``truth``, the true temperature at every pixel's
-        centre, linear between the samples, in the middle of the first channel's exposure, NaN
-        where there is no material; ``measured``, the ratio temperature, whether a channel's lower
-        range limit flags it or not; ``step``, what each ``cause`` adds to the error:
-        ``emissivity`` where its ratio is another than it is taken to be, or something is
-        reflected; ``motion`` during the exposures; the pixels' ``footprint``; point spread
-        functions and the rest of the ``optics``; ``misregistration``; the ``delay``; and
-        ``noise`` with all that detectors do.
-
-    Raises
-    ------
-    ValueError
-        If an integration reaches beyond the scene, or the pixels do not fit it.
-
-    Notes
-    -----
-    Differences of ratio temperatures, each with one cause more than the one before: of the samples
-    at the pixel's centre in the middle of the exposure; of their means over the exposure; of ideal
-    pixels; with the optics; with the second channel's pixels where they truly are; with its
-    exposure when it truly is; and as the detectors read them.
-    """
-    first, second = camera.with_common_pixels(scene.raster)
-    aligned = replace(second, offset=first.offset)
-    duration, of_second = first.integration_time, second.integration_time
-    views = views_of(surface, scene, (first, second))
-    one, two = alike = expose(scene, views, start, duration)
-    if of_second != duration:
-        (two,) = expose(scene, views[1:], start, of_second)
-    late = two
-    if camera.delay:
-        (late,) = expose(scene, views[1:], start + camera.delay, of_second)
-    formed, delayed = _image(first, one), _image(second, late)
-    pixels = first.pixels(scene.raster)
-    temperature = camera.thermometer.temperature
-    chain = [
-        *(
-            sample(on_samples, scene.raster, pixels.centres)
-            for on_samples in (
-                true_temperature(scene, start + duration / 2),
-                temperature(*(exposure.centre_radiance for exposure in alike)),
-                temperature(one.mean_radiance, two.mean_radiance),
-            )
-        ),
-        temperature(_image(_ideal(first), one), _image(_ideal(aligned), two)),
-        temperature(formed, _image(aligned, two)),
-        temperature(formed, _image(second, two)),
-        temperature(formed, delayed),
-        temperature(_read(first, formed, one.start), _read(second, delayed, late.start)),
-    ]
-    over, kelvin = ("y", "x"), {"units": "K"}
-    return xr.Dataset(
-        {
-            "truth": (over, chain[0], kelvin),
-            "measured": (over, chain[-1], kelvin),
-            "step": (("cause", *over), np.diff(chain, axis=0), kelvin),
-        },
-        coords={"cause": list(CAUSES), "y": pixels.y, "x": pixels.x},
-    )
 
 
 def wavelength_errors(
@@ -324,12 +246,11 @@ def _draws(
 ) -> xr.Dataset:
     """Return every band and ratio at one spot with one texture, a draw for each phase."""
     duration = cameras[0].integration_time
-    views = views_of(surface, scene, cameras)
-    exposures = expose(scene, views, spot.start, duration)
-    images = late = [ExposureImages(one, shares_blur=True) for one in exposures]
+    chains = chains_in_bands(surface, scene, cameras)
+    exposures = expose_chains(chains, spot.start)
+    images = late = _exposed(chains, exposures)
     if plan.delay:
-        delayed = expose(scene, views, spot.start + plan.delay, duration)
-        late = [ExposureImages(one, shares_blur=True) for one in delayed]
+        late = _exposed(chains, expose_chains(chains, spot.start + plan.delay))
     centres = np.array([_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)])
     pixels = []
     for camera, seen, later in zip(cameras, images, late, strict=True):
@@ -346,6 +267,11 @@ def _draws(
     return xr.concat(compared, "ratio").assign(
         truth=("draw", at_centres(truth)), radiance=(("band", "draw"), np.stack(pixels)[:, _FORMED])
     )
+
+
+def _exposed(chains: Sequence[Chain], exposures: Sequence[Exposure]) -> list[ExposedChain]:
+    pairs = zip(chains, exposures, strict=True)
+    return [chain.exposed(exposure, shares_blur=True) for chain, exposure in pairs]
 
 
 def _compared(
@@ -429,43 +355,26 @@ def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
 
 
 def _of_pixel(
-    camera: Camera, images: ExposureImages, late: ExposureImages, centre: Array, distance: float
+    camera: Camera, images: ExposedChain, late: ExposedChain, centre: Array, distance: float
 ) -> list[float]:
     """Return the radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
 
-    def read(camera: Camera, of: ExposureImages, shift: tuple[float, float] = (0.0, 0.0)) -> float:
+    def read(
+        of: ExposedChain, on: frozenset[Effect] = EVERY, shift: tuple[float, float] = (0.0, 0.0)
+    ) -> float:
         # The pixel that looks elsewhere is one of a grid that begins within the first pixel.
         corner = np.mod(np.array(camera.offset) + np.multiply(shift, [1, -1]), camera.pitch)
         moved = replace(camera, offset=(float(corner[0]), float(corner[1])))
         pixels = moved.pixels(of.exposure.raster)
-        return float(nearest(of.radiance(moved), pixels, centre + shift))
+        return float(nearest(of.through(moved).radiance(on), pixels, centre + shift))
 
     shifts = [(distance * x, distance * y) for x, y in _DIRECTIONS]
     return [
-        read(_ideal(camera), images),
-        read(camera, images),
-        read(camera, late),
-        *(read(camera, images, shift) for shift in shifts),
+        read(images, EVERY - CAUSES["optics"]),
+        read(images),
+        read(late),
+        *(read(images, shift=shift) for shift in shifts),
     ]
-
-
-def _image(camera: Camera, exposure: Exposure) -> Array:
-    return camera.form_image(exposure.mean_radiance, exposure.raster)
-
-
-def _ideal(camera: Camera) -> Camera:
-    return replace(camera, psf=None, optics=())
-
-
-def _read(camera: Camera, image: Array, start: float) -> Array:
-    return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)
-
-
-def true_temperature(scene: Scene, time: float) -> Array:
-    """Return the true temperature of a scene's samples in K; NaN in the void."""
-    frame = scene.frame(scene.frame_at(time), ())
-    void = frame.material == Material.VOID
-    return np.where(void, np.nan, np.asarray(frame.temperature, np.float64))
 
 
 def _noise(camera: Camera, radiance: float) -> float:

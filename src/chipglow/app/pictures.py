@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.analysis import ALL, CASES, Distribution, ExposureImages, PointPlace, attribute
+from chipglow.analysis import ALL, CASES, Distribution, PointPlace, attribute
 from chipglow.analysis.attribution import AttributionReference
 from chipglow.analysis.distribution import PIXEL_PHASE
-from chipglow.analysis.images import TRUE
-from chipglow.analysis.looks import Schedule, View, look
+from chipglow.analysis.images import errors_of, exposed_chain, parts_of
+from chipglow.analysis.read import Schedule, SurfacePlaces, read
 from chipglow.app.controls import (
     CURSOR,
     ERROR_IMAGES,
@@ -25,7 +25,9 @@ from chipglow.app.controls import (
     State,
 )
 from chipglow.camera import Camera, Exposure, Measurement
+from chipglow.camera.chain import ExposedChain
 from chipglow.camera.exposure_kernels import Check
+from chipglow.camera.reference import TRUE
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
 from chipglow.quantities import Array, Brief
@@ -34,7 +36,7 @@ from chipglow.scene.lines import nearest
 from chipglow.study import fit
 from chipglow.surface import Surface
 
-_Exposed: TypeAlias = tuple[ExposureImages, Exposure | None]
+_Exposed: TypeAlias = tuple[ExposedChain, ExposedChain | None]
 _Result = TypeVar("_Result")
 
 REFERENCE: Final = "reference_temperature"
@@ -129,13 +131,15 @@ class SceneModel:
         quick = quick and self.coarse is not None
         scene, surface = self._on(state, quick)
         camera, shown = self._camera(state, scene, quick), state.study.error_image
-        images, untextured = self._exposed(scene, surface, camera, state, quick, check)
+        exposed = self._exposed(scene, surface, camera, state, quick, check)
+        images, untextured = (one and one.through(camera) for one in exposed)
+        assert images is not None
         key = self._exposure_key(state), camera, quick
-        data = self._kept(8, "errors", key, lambda: images.errors(camera))
+        data = self._kept(8, "errors", key, lambda: errors_of(images))
 
         def parts() -> xr.Dataset:
             of = *key, untextured is None
-            return self._kept(2, "parts", of, lambda: images.parts(camera, untextured))
+            return self._kept(2, "parts", of, lambda: parts_of(images, untextured))
 
         error = data["case_1"]
         if shown != "total":
@@ -173,6 +177,8 @@ class SceneModel:
         numbers = _at(picture.parts(), raster, at)
         if camera.detector is None:
             del numbers["detector"]
+        if not camera.optics:
+            del numbers["optics"]
         if "emissivity" in picture.absent:
             del numbers["emissivity"]
         calibration = camera.calibration(raster.shape)
@@ -219,17 +225,17 @@ class SceneModel:
             starts=np.array([study.start]),
             drawn=(0,),
             shown=0,
-            views=(View(CURSOR, [places], noise, ()),),
+            views=(SurfacePlaces(CURSOR, [places], noise, ()),),
             phases=phases,
             reference=study.analysis.reference,
             effects={ALL: CASES[ALL]},
         )
         laid = {CURSOR: camera.prepare(surface.redrawn(0), scene)}
-        looked = look(scene, {CURSOR: surface}, laid, camera, schedule, progress)
-        reference, measured, _ = np.moveaxis(looked.read[0, 0], -1, 0)
+        readings = read(scene, {CURSOR: surface}, laid, camera, schedule, progress)
+        reference, measured, _ = np.moveaxis(readings.values[0, 0], -1, 0)
         error = measured - reference
         lines = {
-            name: np.concatenate(looked.along[row, 0, :, :, 1]) - KELVIN
+            name: np.concatenate(readings.along[row, 0, :, :, 1]) - KELVIN
             for row, name in enumerate(LINES)
         }
         is_known = np.isfinite(error).all()
@@ -294,8 +300,9 @@ class SceneModel:
             )
             exposure, *others = camera.expose_fields(scene, laid, state.study.start, check)
             exposure = replace(exposure, effects=surface.effects)
-            images = ExposureImages(exposure, state.study.analysis.reference)
-            return images, others[0] if both else None
+            reference = state.study.analysis.reference
+            images = exposed_chain(camera, exposure, reference)
+            return images, exposed_chain(camera, others[0], reference) if both else None
 
         key = self._exposure_key(state)
         if quick:

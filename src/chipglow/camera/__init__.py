@@ -14,6 +14,12 @@ from chipglow.camera.camera import (
     Camera as Camera,
     ChipglowWarning as ChipglowWarning,
 )
+from chipglow.camera.chain import (
+    Chain as Chain,
+    ExposedChain as ExposedChain,
+    PixelReading as PixelReading,
+    read_temperature as read_temperature,
+)
 from chipglow.camera.detector.detector import Detector as Detector
 from chipglow.camera.detector.flat_field import (
     FlatFieldCalibration as FlatFieldCalibration,
@@ -52,6 +58,7 @@ from chipglow.camera.detector.terms import (
     ShotNoise as ShotNoise,
     Stage as Stage,
 )
+from chipglow.camera.effect import EVERY as EVERY, Effect as Effect
 from chipglow.camera.exposure import (
     Exposure as Exposure,
     View as View,
@@ -95,8 +102,8 @@ from chipglow.camera.optics.terms import (
     OpticsTerm as OpticsTerm,
     Veil as Veil,
 )
-from chipglow.camera.ratio_camera import (
-    RatioCamera as RatioCamera,
-    RatioMeasurement as RatioMeasurement,
-)
 from chipglow.camera.recording import PlanckConversion as PlanckConversion, Recording as Recording
+from chipglow.camera.reference import (
+    ReferenceKind as ReferenceKind,
+    reference_temperature as reference_temperature,
+)
