@@ -13,13 +13,13 @@ import xarray as xr
 
 import chipglow
 from chipglow.analysis import ratio_errors, wavelengths_frame
+from chipglow.analysis.wavelength_figure import draw_wavelengths
 from chipglow.analysis.wavelengths import band_name
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
 from chipglow.quantities import changed
 from chipglow.radiometry import Band, RatioThermometer
-from chipglow.report.wavelength_figure import draw_wavelengths
 from chipglow.scene import Raster
 from chipglow.scene.figures import image_figure, show_image
 from chipglow.surface import CHIP_1

@@ -37,7 +37,7 @@ from chipglow.camera import (
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.laboratory.recordings import calibrate_recording, fit_calibration
-from chipglow.laboratory.recordings.figures import draw_calibrations
+from chipglow.laboratory.recordings.figure import draw_calibrations
 from chipglow.radiometry import Band
 from chipglow.scene.figures import show_image
 

@@ -108,7 +108,7 @@ def cut(
     loaded = load_study(study)
     movie: Any = nullcontext()
     if preview is not None:
-        from chipglow.report import cut_movie
+        from chipglow.study.movie import cut_movie
 
         movie = cut_movie(preview, preview_raster(loaded), loaded.cutting.simulation())
     with atomic_path(out) as temporary, movie as on_preview:
@@ -174,9 +174,9 @@ def wavelengths(
 ) -> None:
     """Compare spectral bands and two-band ratios: the error against the true temperature."""
     from chipglow.analysis import wavelengths_frame
+    from chipglow.analysis.wavelength_figure import draw_wavelengths
     from chipglow.cli.progress import confirm_cost, progress_bars
     from chipglow.io.result_file import write_frame
-    from chipglow.report.wavelength_figure import draw_wavelengths
     from chipglow.study import load_study, wavelengths as compare
     from chipglow.text import Notes
 

@@ -111,7 +111,7 @@ class BandProfile(Brief):
 
         New axes are made by default.
         """
-        from chipglow.laboratory.chip.figures import plot_band_profile
+        from chipglow.laboratory.chip.figure import plot_band_profile
 
         return plot_band_profile(self, ax)
 

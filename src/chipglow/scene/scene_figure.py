@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID, shown_frame
-from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 from chipglow.scene.figures import ImagePanel, leave_out, show_image, veil
+from chipglow.scene.frame import FILLED, Frame, Material
+from chipglow.scene.raster import Raster
+from chipglow.scene.scene import Scene
+from chipglow.scene.tool import Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
 _SPEED: Final = "speed / (m/s)"
