@@ -17,11 +17,11 @@ from documented import ROOT
 
 import chipglow
 from chipglow.camera import AnnularAperturePSF, Camera, LinearCalibration
-from chipglow.laboratory.chip.figures import draw_rake_grid
+from chipglow.laboratory.chip.figure import draw_rake_grid
 from chipglow.laboratory.emissivity.figure import draw_emissivity
 from chipglow.laboratory.psf.figure import draw_knife_edge
-from chipglow.laboratory.recordings.figures import draw_calibrations
-from chipglow.report.scene_figure import draw_scene
+from chipglow.laboratory.recordings.figure import draw_calibrations
+from chipglow.scene.scene_figure import draw_scene
 
 sys.path.append(str(ROOT / "docs"))
 from samples import edges, heated_chip

@@ -19,9 +19,9 @@ from chipglow.cutting import (
 )
 from chipglow.drawing.scales import HEAT, VOID
 from chipglow.io import check_movie_path, movie_writer, open_scene
-from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.scene import Frame, Material, Raster
 from chipglow.study import Study, preview_raster
+from chipglow.study.movie import CutPicture, MovieScales, cut_movie
 
 SIMULATION = CuttingSimulation(
     CuttingConditions(cutting_length=0.05e-3),

@@ -15,8 +15,7 @@ from PIL import Image
 from chipglow.cli.screen import figure
 from chipglow.io import StoredScene, open_scene, write_scene
 from chipglow.quantities.format import rounded_text
-from chipglow.report import draw_scene, scene_summary
-from chipglow.scene import FILLED, Material, Raster, Scene
+from chipglow.scene import FILLED, Material, Raster, Scene, draw_scene, scene_summary
 
 RASTER = Raster(left=-100e-6, top=50e-6, spacing=2e-6, rows=30, columns=40)
 TIMES = np.arange(101) * 1e-6

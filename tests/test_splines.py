@@ -14,7 +14,7 @@ from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes,
 from chipglow.io.packing import read_chunk
 from chipglow.io.spline_file import STEPS
 from chipglow.radiometry import Band
-from chipglow.scene import Material, Raster, Scene, SceneError, ToolGeometry
+from chipglow.scene import Frame, Material, Raster, Scene, SceneError, ToolGeometry
 from chipglow.scene.splines import SPLINE_FIELDS, Lattice, SplineFrame
 from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface, UniformSurface
 
@@ -212,7 +212,7 @@ def test_a_frame_without_splines_and_one_that_is_not_finite_are_refused(tmp_path
         pytest.raises(SceneError, match=r"the frame at 0 s has no splines of shape \(9, "),
         SceneWriter(tmp_path / "scene.nc", RASTER, lattice=a_lattice()) as writer,
     ):
-        writer.append(replace(frame, splines=None))
+        writer.append(Frame(frame.time, frame.temperature, frame.material))
     frame.splines.nodes[7, 0, 0] = np.nan
     with (
         pytest.raises(SceneError, match="a spline at 0 s is not finite everywhere"),

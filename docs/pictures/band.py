@@ -11,7 +11,7 @@ import numpy as np
 
 import chipglow
 from chipglow.laboratory.chip import band_profile
-from chipglow.laboratory.chip.figures import draw_band_profile
+from chipglow.laboratory.chip.figure import draw_band_profile
 from chipglow.laboratory.comparison import Comparison, StatedUncertainties, compare
 
 HERE = Path(__file__).parent

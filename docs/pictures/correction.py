@@ -11,8 +11,8 @@ import numpy as np
 import chipglow
 from chipglow.correction import observed_scene
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.quantities import ZERO_CELSIUS
+from chipglow.scene.figures import ImagePanel
 
 FILE = Path(__file__).with_suffix(".png")
 START = 394e-6  # s

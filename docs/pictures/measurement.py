@@ -10,9 +10,9 @@ import numpy as np
 import chipglow
 from chipglow.analysis import error_images
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import KELVIN
 from chipglow.scene import Material
+from chipglow.scene.figures import ImagePanel, image_figure
 
 FILE = Path(__file__).with_suffix(".png")
 START = 394e-6  # s
@@ -51,7 +51,7 @@ def main() -> None:
         ),
     )
     with drawing.style():
-        figure = drawing.image_figure(scene.raster, 2.6, rows=1)
+        figure = image_figure(scene.raster, 2.6, rows=1)
         grid = figure.subplots(1, 3, sharex=True, sharey=True)
         for axes, (panel, raster) in zip(grid, panels, strict=True):
             panel.draw(figure, axes, raster, scene.tool, "bottom")

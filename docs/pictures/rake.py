@@ -8,7 +8,7 @@ import numpy as np
 from chipglow.camera import Measurement
 from chipglow.io import open_scene
 from chipglow.laboratory.chip import find_tool, rake_grid
-from chipglow.laboratory.chip.figures import draw_rake_grid
+from chipglow.laboratory.chip.figure import draw_rake_grid
 from chipglow.study import Study, cut
 
 HERE = Path(__file__).parent

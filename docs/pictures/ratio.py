@@ -13,13 +13,14 @@ import xarray as xr
 
 import chipglow
 from chipglow.analysis import RatioPair, ratio_errors, wavelengths_frame
+from chipglow.analysis.wavelength_figure import draw_wavelengths
 from chipglow.analysis.wavelengths import band_name
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
 from chipglow.quantities import changed
 from chipglow.radiometry import Band, RatioThermometer
-from chipglow.report.wavelength_figure import draw_wavelengths
 from chipglow.scene import Raster
+from chipglow.scene.figures import image_figure, show_image
 from chipglow.surface import CHIP_1
 
 matplotlib.use("Agg")
@@ -79,17 +80,17 @@ def print_thermometers() -> None:
 def draw_images(errors: xr.Dataset, raster: Raster, tool: Any) -> None:
     """Truth, ratio temperature, and the causes of its error."""
     with drawing.style():
-        figure = drawing.image_figure(raster, 2.6, 3)
+        figure = image_figure(raster, 2.6, 3)
         axes = figure.subplots(3, 2, sharex=True, sharey=True)
         shown = {"true temperature": errors.truth, "ratio temperature": errors.measured}
         for axis, (title, image) in zip(axes.flat, shown.items(), strict=False):
             celsius = image.values - KELVIN
-            heat = drawing.show_image(axis, celsius, raster, tool, HEAT, (20.0, 800.0))
+            heat = show_image(axis, celsius, raster, tool, HEAT, (20.0, 800.0))
             axis.set_title(title)
         drawing.colour_bar(figure, heat, axes[0], "°C")
         for axis, name in zip(axes.flat[2:], CAUSES, strict=True):
             image = errors.step.sel(cause=name).values
-            part = drawing.show_image(axis, image, raster, tool, SIGNED, (-20.0, 20.0))
+            part = show_image(axis, image, raster, tool, SIGNED, (-20.0, 20.0))
             axis.set_title(f"by {name}")
             hot = np.abs(image[errors.truth.values > HOT])
             print(f"{name}: over 400 °C {np.median(hot):.2f} K and less, {hot.max():.1f} K at most")

@@ -25,8 +25,9 @@ import numpy as np
 from samples.chip import closed_form_chip
 
 import chipglow
-from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import SIGNED
+from chipglow.scene.figures import show_image
 
 scene = closed_form_chip(40)
 camera = chipglow.Camera(integration_time=8e-6, lower_limit=573.15)

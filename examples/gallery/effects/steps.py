@@ -28,8 +28,9 @@ import numpy as np
 from samples.chip import closed_form_chip
 
 import chipglow
-from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, KELVIN
+from chipglow.scene.figures import show_image
 
 # %%
 # Frames 1 µs apart; the band is full grown after 28 µs.

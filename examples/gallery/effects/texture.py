@@ -23,8 +23,9 @@ More: :doc:`/understand/physics`.
 from samples.chip import closed_form_chip
 
 import chipglow
-from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, KELVIN, PLAIN
+from chipglow.scene.figures import show_image
 
 scene = closed_form_chip(40)
 camera = chipglow.Camera(

@@ -21,9 +21,10 @@ import numpy as np
 import sample_files
 
 import chipglow
-from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.scene import Material
+from chipglow.scene.figures import show_image
 
 PROGRAMS = {
     "AdvantEdge": "advantedge.yaml",

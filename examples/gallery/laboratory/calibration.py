@@ -34,11 +34,12 @@ from chipglow.camera import (
     SakumaHattori,
     find_bad_pixels,
 )
-from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.laboratory.recordings import calibrate_recording, fit_calibration
-from chipglow.laboratory.recordings.figures import draw_calibrations
+from chipglow.laboratory.recordings.figure import draw_calibrations
 from chipglow.radiometry import Band
+from chipglow.scene.figures import show_image
 
 BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.arange(300.0, 1001.0, 100.0) + KELVIN

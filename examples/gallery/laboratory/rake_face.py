@@ -23,7 +23,7 @@ from math import degrees
 import sample_files
 
 import chipglow
-from chipglow.laboratory.chip.figures import draw_rake_grid
+from chipglow.laboratory.chip.figure import draw_rake_grid
 
 measured = chipglow.read_measurement(sample_files.folder("rake-face") / "chip-2.nc")
 grid = chipglow.rake_grid(measured, measured.tool)

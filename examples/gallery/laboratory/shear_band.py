@@ -21,7 +21,7 @@ Source: Figure 9 of Heigel and Whitenton (2010). More: :doc:`/do/shear-band`.
 import sample_files
 
 import chipglow
-from chipglow.laboratory.chip.figures import draw_band_profile
+from chipglow.laboratory.chip.figure import draw_band_profile
 
 measured = chipglow.read_measurement(sample_files.folder("shear-band") / "measured.nc")
 profile = chipglow.band_profile(measured, measured.tool)

@@ -1,18 +1,20 @@
 """Figure of an analysis: the error of every pixel, and where errors are read."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
-from chipglow.analysis.engine import Analysis
 from chipglow.analysis.reductions import image_error
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
+from chipglow.scene.figures import ImagePanel, length_unit, veil
+
+if TYPE_CHECKING:
+    from chipglow.analysis.engine import Analysis
 
 
-def plot_error(analysis: Analysis, surface: str, ax: Axes | None) -> Axes:
+def plot_error(analysis: "Analysis", surface: str, ax: Axes | None) -> Axes:
     """Draw the error of every pixel of a surface."""
     error = image_error(analysis.data).sel(surface=surface)
     limit = error_limit(error, analysis.data.flagged.sel(surface=surface))
@@ -31,18 +33,18 @@ def error_limit(images: xr.DataArray, flagged: xr.DataArray) -> float:
 
 
 def draw_error(
-    figure: FigureBase, axes: Axes, analysis: Analysis, surface: str, panel: ImagePanel
+    figure: FigureBase, axes: Axes, analysis: "Analysis", surface: str, panel: ImagePanel
 ) -> None:
     """Draw an image of errors, pale where the camera shows no temperature, and what is read."""
     raster = analysis.measurements[surface].raster
     panel.draw(figure, axes, raster, analysis.tool)
-    drawing.veil(axes, analysis.data.flagged.sel(surface=surface).values, raster)
+    veil(axes, analysis.data.flagged.sel(surface=surface).values, raster)
     draw_marks(axes, analysis)
 
 
-def draw_marks(axes: Axes, analysis: Analysis) -> None:
+def draw_marks(axes: Axes, analysis: "Analysis") -> None:
     """Draw the points and lines at which errors are read, and the ridge of the shear band."""
-    factor, _ = drawing.length_unit(analysis.raster)
+    factor, _ = length_unit(analysis.raster)
     for points in analysis.read_curves():
         if len(points) == 1:
             look: Any = {"color": scales.GREEN, "markersize": 9, "markeredgewidth": 1.6}

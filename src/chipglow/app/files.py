@@ -10,10 +10,11 @@ from matplotlib import rc_context
 from chipglow.app.controls import State
 from chipglow.app.opening import SHOWN, SHOWN_LINE
 from chipglow.app.pictures import Picture, SceneModel
-from chipglow.drawing.drawing import data_url, draw_chip, style
+from chipglow.drawing.drawing import data_url, style
 from chipglow.io import write_dataset
 from chipglow.quantities import unchecked
 from chipglow.scene import Scene
+from chipglow.scene.figures import draw_chip
 from chipglow.study import Study, study_text
 
 _COLOURED: Final = (

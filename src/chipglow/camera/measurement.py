@@ -14,7 +14,7 @@ from chipglow.camera.calibration import CALIBRATION, CalibrationErrors
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
-from chipglow.scene.notebook import frames_text, plot_image
+from chipglow.scene.notebook import frames_text
 from chipglow.scene.scene import raster_coordinates, raster_of
 from chipglow.scene.tool_outline import stored_tool, tool_attributes
 from chipglow.text import Notes
@@ -221,6 +221,8 @@ class Measurement:
 
         Pixels without a radiance temperature are grey. New axes are made by default.
         """
+        from chipglow.scene.figures import plot_image
+
         time, label = float(self.times[frame]), "radiance temperature / °C"
         return plot_image(self.celsius(frame), self.raster, self.tool, label, time, ax)
 

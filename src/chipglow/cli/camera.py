@@ -71,7 +71,7 @@ def calibrate(
     from chipglow.camera import MODELS
     from chipglow.laboratory.recordings import calibrate_blackbodies, write_calibration
     from chipglow.laboratory.recordings.description import band_of
-    from chipglow.laboratory.recordings.figures import draw_calibrations
+    from chipglow.laboratory.recordings.figure import draw_calibrations
 
     try:
         camera_band = band_of(band)

@@ -36,7 +36,7 @@ def rake(
     from chipglow.cli.tool_choice import chosen_tool
     from chipglow.io.result_file import write_result
     from chipglow.laboratory.chip import ToolUncertainty, rake_grid
-    from chipglow.laboratory.chip.figures import draw_rake_grid
+    from chipglow.laboratory.chip.figure import draw_rake_grid
     from chipglow.laboratory.recordings import load_measurement
 
     measured = load_measurement(measurement, settings or ())
@@ -123,7 +123,7 @@ def shearband(
     from chipglow.io import read_curve
     from chipglow.io.result_file import write_result
     from chipglow.laboratory.chip import band_profile
-    from chipglow.laboratory.chip.figures import draw_band_profile
+    from chipglow.laboratory.chip.figure import draw_band_profile
     from chipglow.laboratory.recordings import load_measurement
 
     measured = load_measurement(measurement, settings or ())

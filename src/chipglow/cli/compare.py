@@ -61,7 +61,7 @@ def compare(
     from chipglow.drawing.scales import shown_frame
     from chipglow.io import read_curve
     from chipglow.laboratory import comparison as lab
-    from chipglow.laboratory.comparison.comparison import COVERAGE
+    from chipglow.laboratory.comparison.coverage import COVERAGE
     from chipglow.laboratory.recordings import load_measurement
 
     if not 0.0 <= emissivity_uncertainty < 1.0:

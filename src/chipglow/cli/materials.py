@@ -17,7 +17,7 @@ def materials(
     import pandas as pd
 
     from chipglow.cutting import material_file, material_names
-    from chipglow.report.materials import material_figure
+    from chipglow.cutting.material_figure import material_figure
     from chipglow.text import Notes
 
     screen = current()

@@ -1,14 +1,17 @@
-"""Where a run starts, its cost and its progress, on the terminal."""
+"""Where a run starts, its cost, its progress and the cut that it made, on the terminal."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from math import isfinite, nan
 from typing import Final
 
 import typer
 from rich.console import Console
 from rich.progress import Progress, TaskID, TimeElapsedColumn
 
+from chipglow.chip import Inertia
+from chipglow.cli.screen import current
 from chipglow.study import (
     Progress as Report,
     Study,
@@ -17,6 +20,7 @@ from chipglow.study import (
     is_damaged,
     kept_progress,
 )
+from chipglow.text import Notes
 
 _MARGIN: Final = 4
 """Columns that a bar leaves free."""
@@ -26,6 +30,11 @@ MUCH_TIME: Final = 300.0
 
 MUCH_DISK: Final = 2e9
 """Expected size of the cached scene in bytes above which the user is asked first."""
+
+_INERTIA: Final = {
+    "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
+    "force_fraction": "momentum flux {:.2%} of the mean cutting force",
+}
 
 
 def confirm_cost(study: Study, resume: bool, agreed: bool) -> None:
@@ -82,3 +91,14 @@ def progress_bars() -> Iterator[Report]:
             bars.update(tasks[step], completed=fraction)
 
         yield report
+
+
+def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
+    """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
+    fractions = {name: getattr(inertia, name, nan) for name in _INERTIA}
+    known = {name: fraction for name, fraction in fractions.items() if isfinite(fraction)}
+    if known:
+        texts = ", ".join(_INERTIA[name].format(fraction) for name, fraction in known.items())
+        current().say(f"Scaled mass after the build-up: {texts}.", known, sys.stderr)
+    own = [inertia.warning] if inertia and inertia.warning else []
+    current().notes(Notes(warnings=[*own, *warnings]))

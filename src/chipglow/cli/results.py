@@ -10,9 +10,8 @@ from pathlib import Path
 import pandas as pd
 
 from chipglow.analysis import Analysis
-from chipglow.cli.progress import confirm_cost, progress_bars
+from chipglow.cli.progress import confirm_cost, progress_bars, say_of_cut
 from chipglow.cli.screen import current
-from chipglow.cli.studies import say_of_cut
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
 from chipglow.quantities import changed

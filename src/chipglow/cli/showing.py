@@ -20,7 +20,7 @@ from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
 
 if TYPE_CHECKING:
-    from chipglow.report import SceneSummary
+    from chipglow.scene import SceneSummary
 
 _LONGEST: Final = 800
 _MOST: Final = 8
@@ -41,7 +41,7 @@ _Rows: TypeAlias = Iterator[tuple[str, str]]
 
 def show(path: Path, at: float | None, plot: Path | None) -> None:
     """Print the contents of a scene or a measurement and optionally draw it."""
-    from chipglow.report import draw_scene, scene_summary
+    from chipglow.scene import draw_scene, scene_summary
 
     if is_measurement(path):
         _show_measurement(path, at, plot)
@@ -74,7 +74,7 @@ def show(path: Path, at: float | None, plot: Path | None) -> None:
 
 
 def _show_measurement(path: Path, at: float | None, plot: Path | None) -> None:
-    from chipglow.laboratory.recordings.figures import draw_measurement
+    from chipglow.laboratory.recordings.figure import draw_measurement
 
     measurement = read_measurement(path)
     times = measurement.times

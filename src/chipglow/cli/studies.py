@@ -1,26 +1,16 @@
 """The commands of a study: complete run, error, cut, measurement and wavelengths."""
 
-import sys
-from collections.abc import Iterable
 from contextlib import nullcontext
 from functools import partial
-from math import floor, isfinite, nan
+from math import floor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Any, Final
 
 from chipglow.cli import options as opt
 from chipglow.cli.screen import current, figure, finish
 
-if TYPE_CHECKING:
-    from chipglow.chip import Inertia
-
 PAPER_FOLDER: Final = Path("chipglow-paper")
 ERROR_FOLDER: Final = Path("chipglow-error")
-_INERTIA: Final = {
-    "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
-    "force_fraction": "momentum flux {:.2%} of the mean cutting force",
-}
-
 ResultFolder = Annotated[Path, opt.folder("Results folder; earlier results are replaced.")]
 
 
@@ -111,14 +101,14 @@ def cut(
     from shutil import copyfile
 
     from chipglow.chip import inertia, resolution_warnings
-    from chipglow.cli.progress import confirm_cost, progress_bars
+    from chipglow.cli.progress import confirm_cost, progress_bars, say_of_cut
     from chipglow.io import atomic_path, open_scene
     from chipglow.study import cut as compute, load_study, preview_raster
 
     loaded = load_study(study)
     movie: Any = nullcontext()
     if preview is not None:
-        from chipglow.report import cut_movie
+        from chipglow.study.movie import cut_movie
 
         movie = cut_movie(preview, preview_raster(loaded), loaded.cutting.simulation())
     with atomic_path(out) as temporary, movie as on_preview:
@@ -130,19 +120,6 @@ def cut(
     scene.data.close()
     for path in filter(None, (out, preview)):
         current().file(path)
-
-
-def say_of_cut(inertia: "Inertia | None", warnings: Iterable[str] = ()) -> None:
-    """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
-    from chipglow.text import Notes
-
-    fractions = {name: getattr(inertia, name, nan) for name in _INERTIA}
-    known = {name: fraction for name, fraction in fractions.items() if isfinite(fraction)}
-    if known:
-        texts = ", ".join(_INERTIA[name].format(fraction) for name, fraction in known.items())
-        current().say(f"Scaled mass after the build-up: {texts}.", known, sys.stderr)
-    own = [inertia.warning] if inertia and inertia.warning else []
-    current().notes(Notes(warnings=[*own, *warnings]))
 
 
 def measure(
@@ -197,9 +174,9 @@ def wavelengths(
 ) -> None:
     """Compare spectral bands and two-band ratios: the error against the true temperature."""
     from chipglow.analysis import wavelengths_frame
+    from chipglow.analysis.wavelength_figure import draw_wavelengths
     from chipglow.cli.progress import confirm_cost, progress_bars
     from chipglow.io.result_file import write_frame
-    from chipglow.report.wavelength_figure import draw_wavelengths
     from chipglow.study import load_study, wavelengths as compare
     from chipglow.text import Notes
 

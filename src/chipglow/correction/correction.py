@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Region
-from chipglow.scene.notebook import plot_image
 from chipglow.scene.scene import raster_of
 from chipglow.text import Notes
 from chipglow.uncertainty import Cause, Component, Estimate
@@ -145,6 +144,8 @@ class Correction:
 
     def plot(self, frame: int = 0, ax: "Axes | None" = None) -> "Axes":
         """Plot the corrected temperature of one frame in °C over x and y in µm."""
+        from chipglow.scene.figures import plot_image
+
         celsius = self.data["temperature"][frame].values - ZERO_CELSIUS
         time = float(self.data["time"].values[frame])
         return plot_image(celsius, self.raster, None, "true temperature / °C", time, ax)

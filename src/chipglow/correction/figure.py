@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from chipglow.camera import Measurement
 from chipglow.correction.correction import Correction
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.quantities import ZERO_CELSIUS
+from chipglow.scene.figures import ImagePanel, image_figure
 
 _PANEL_WIDTH: Final = 1.6
 """Width of an image in inches, of which the page holds three with their colour bars."""
@@ -35,7 +35,7 @@ def draw_correction(correction: Correction, measurement: Measurement, frame: int
         ImagePanel("half-width (95 %)", "temperature / K", half_width, widths),
     )
     with drawing.style():
-        figure = drawing.image_figure(raster, _PANEL_WIDTH, rows=1)
+        figure = image_figure(raster, _PANEL_WIDTH, rows=1)
         for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
             panel.draw(figure, axes, raster)
             axes.label_outer()

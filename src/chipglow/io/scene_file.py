@@ -36,7 +36,7 @@ from chipglow.scene import (
     Tool,
 )
 from chipglow.scene.scene import FORCE_UNITS, OVERVIEW_FIELDS, check_frame, raster_coordinates
-from chipglow.scene.splines import Lattice, SplineFrame
+from chipglow.scene.splines import Lattice, SplineFrame, SplineSamples
 from chipglow.scene.tool_outline import tool_attributes
 
 SCENE_FORMAT: Final = 6
@@ -163,12 +163,13 @@ class SceneWriter:
         """Return what the file keeps of a frame, in the order of the variables."""
         if self.lattice is None:
             return [self._packed(name, frame) for name in self._units]
-        if frame.splines is None or frame.splines.nodes.shape != self.lattice.shape:
+        splines = frame.splines if isinstance(frame, SplineSamples) else None
+        if splines is None or splines.nodes.shape != self.lattice.shape:
             raise SceneError(
                 f"scene: the frame at {frame.time:.9g} s has no splines of shape "
                 f"{self.lattice.shape}, the shape of the lattice"
             )
-        kept = spline_file.rounded(frame.splines)
+        kept = spline_file.rounded(splines)
         return [np.asarray(kept[name], np.float32) for name in spline_file.CHUNKED]
 
     def _packed(self, name: str, frame: Frame) -> NDArray[Any]:

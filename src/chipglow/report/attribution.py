@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.quantities import Array
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts
 from chipglow.report.figures import line_title, of_surface
 from chipglow.report.rows import MAIN
+from chipglow.scene.figures import ImagePanel, image_panels, length_unit
 
 _LEAST: Final = 0.5
 """Contribution in K below which a sentence and the maps leave an effect out."""
@@ -93,7 +93,7 @@ def maps(facts: Facts) -> Figure | None:
         for name in names
     ]
     raster = facts.analysis.measurements[names[0]].raster
-    return drawing.image_panels(panels, raster, facts.analysis.tool)
+    return image_panels(panels, raster, facts.analysis.tool)
 
 
 def profiles(facts: Facts) -> Figure | None:
@@ -102,7 +102,7 @@ def profiles(facts: Facts) -> Figure | None:
     if "effect" not in data.dims or "line" not in data.dims:
         return None
     data = data.sel(exposure=data.instant.values[data.attrs["shown_instant"]], method="nearest")
-    factor, unit = drawing.length_unit(facts.analysis.raster)
+    factor, unit = length_unit(facts.analysis.raster)
     figure = drawing.new_figure(2.9 * ((data.sizes["line"] + 1) // 2) + 0.6)
     grid = figure.subplots((data.sizes["line"] + 1) // 2, 2, squeeze=False).flat
     for name, axes in zip(data.line.values, grid, strict=False):

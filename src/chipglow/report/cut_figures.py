@@ -14,6 +14,7 @@ from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
 from chipglow.report.facts import Facts
 from chipglow.scene import Frame, Material, Raster
+from chipglow.scene.figures import draw_chip, draw_tool, image_figure, show_image
 from chipglow.surface import Emissivity, Texture
 
 _COLOURS: Final = (BLUE, VERMILLION)
@@ -48,7 +49,7 @@ def heated_tool(facts: Facts) -> Figure | None:
     left, right = figure.subplots(1, 2)
     _draw_heated(figure, left, found)
     limits = left.get_xlim(), left.get_ylim()
-    drawing.draw_tool(left, tool)
+    draw_tool(left, tool)
     left.set(xlim=limits[0], ylim=limits[1])
     left.set_title(f"a) tool, at {found.map.heating.reference - KELVIN:.0f} °C")
     inside = tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
@@ -107,16 +108,16 @@ def dual_spectrum(facts: Facts) -> Figure:
     name, tool, rows = analysis.data.attrs["band_surface"], cut.segments[0].tool, len(cut.moments)
     images = analysis.data.radiance_temperature.sel(surface=name).values - KELVIN
     starts = analysis.data.instant.values[: facts.starts]
-    figure = drawing.image_figure(analysis.raster, 2.3, rows=rows)
+    figure = image_figure(analysis.raster, 2.3, rows=rows)
     grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
     low = (analysis.camera.lower_limit or KELVIN + 100.0) - KELVIN
     heat = (low, max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0))
     pixels = analysis.measurements[name].raster
     for (left, right), frame in zip(grid, cut.moments, strict=True):
         grey = _visible_picture(frame, analysis.raster)
-        drawing.show_image(left, grey, analysis.raster, None, "gray", (0.0, 1.0))
+        show_image(left, grey, analysis.raster, None, "gray", (0.0, 1.0))
         number = max(int(np.searchsorted(starts, frame.time)) - 1, 0)
-        picture = drawing.show_image(right, images[number], pixels, None, scales.HEAT, heat)
+        picture = show_image(right, images[number], pixels, None, scales.HEAT, heat)
         left.set_title(f"visible, {frame.time * 1e6:.0f} µs")
         right.set_title(f"infrared, {name}")
         for axes in (left, right):
@@ -156,7 +157,7 @@ def band_curves(facts: Facts) -> Figure:
 def chip(facts: Facts) -> Figure | None:
     """Draw the whole chip at the end of the cut, with the view of the scene."""
     overview, tool = facts.cut.overview, facts.analysis.tool
-    return None if overview is None else drawing.draw_chip(overview, facts.analysis.raster, tool)
+    return None if overview is None else draw_chip(overview, facts.analysis.raster, tool)
 
 
 def forces(facts: Facts) -> Figure | None:
@@ -196,7 +197,7 @@ def chip_thickness(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(3.6)
     left, right = figure.subplots(1, 2)
     strain = np.where(frame.material == Material.WORKPIECE, frame.needed("plastic_strain"), np.nan)
-    picture = drawing.show_image(left, strain, raster, tool, scales.PLAIN, (0.0, 4.0))
+    picture = show_image(left, strain, raster, tool, scales.PLAIN, (0.0, 4.0))
     drawing.colour_bar(figure, picture, left, "plastic strain")
     thickness = float(np.interp(frame.time, scan.time, scan.thickness))
     foot, normal = tool.rake_point(scan.height), np.array(tool.rake_normal)
@@ -223,7 +224,7 @@ def chip_thickness(facts: Facts) -> Figure | None:
 def _draw_heated(figure: Figure, axes: Axes, heated: HeatedObject) -> None:
     temperature, raster = heated.map.radiance_temperature - KELVIN, heated.map.raster
     low, high = scales.ends(temperature[heated.map.emissivity > 0.1], 1.0, 99.9)
-    picture = drawing.show_image(axes, temperature, raster, None, scales.HEAT, (low - 10.0, high))
+    picture = show_image(axes, temperature, raster, None, scales.HEAT, (low - 10.0, high))
     drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
     for colour, region in zip(_COLOURS, heated.regions, strict=False):
         outline = region.outline(raster)

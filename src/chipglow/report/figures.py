@@ -21,12 +21,12 @@ from chipglow.analysis import (
 )
 from chipglow.analysis.figure import draw_error, draw_marks, error_limit
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER
 from chipglow.report.rows import MAIN, main_readings
 from chipglow.scene import Material
+from chipglow.scene.figures import ImagePanel, image_figure, image_panels, length_unit, show_image
 
 Array = NDArray[Any]
 
@@ -101,13 +101,13 @@ def scene(facts: Facts) -> Figure:
         panels.append(
             ImagePanel(of_surface(facts, "emissivity", name), "emissivity", image, (0.0, 1.0))
         )
-    return drawing.image_panels(panels, facts.analysis.raster, facts.analysis.tool)
+    return image_panels(panels, facts.analysis.raster, facts.analysis.tool)
 
 
 def measurement(facts: Facts) -> Figure:
     """Draw the scene at one moment and as the camera measures it."""
     analysis, names = facts.analysis, facts.read_surfaces
-    figure = drawing.image_figure(analysis.raster, 2.8, rows=len(names))
+    figure = image_figure(analysis.raster, 2.8, rows=len(names))
     rows = figure.subplots(len(names), 2, sharex=True, sharey=True, squeeze=False)
     shown = facts.data.isel(instant=facts.data.attrs["shown_instant"])
     for axes, name in zip(rows, names, strict=True):
@@ -115,8 +115,8 @@ def measurement(facts: Facts) -> Figure:
         measured = shown.radiance_temperature.sel(surface=name).values - KELVIN
         limits = facts.heat_limits(truth)
         pixels = analysis.measurements[name].raster
-        drawing.show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
-        picture = drawing.show_image(axes[1], measured, pixels, analysis.tool, scales.HEAT, limits)
+        show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
+        picture = show_image(axes[1], measured, pixels, analysis.tool, scales.HEAT, limits)
         axes[0].set_title(of_surface(facts, "scene, one moment", name))
         axes[1].set_title("as measured")
         for one in axes:
@@ -134,7 +134,7 @@ def exposure(facts: Facts) -> Figure:
     error = measured - reference
     heat = facts.heat_limits(reference.values)
     largest = scales.round_limit(error.values, 99.0, 10.0)
-    figure = drawing.image_figure(analysis.raster, 2.2, rows=len(names))
+    figure = image_figure(analysis.raster, 2.2, rows=len(names))
     rows = figure.subplots(len(names), 3, sharex=True, sharey=True, squeeze=False)
     for row, name in zip(rows, names, strict=True):
         panels = (
@@ -155,7 +155,7 @@ def error_images(facts: Facts) -> Figure:
     """Draw the error and the contribution of the PSF to it, with the places of the readings."""
     analysis, names = facts.analysis, facts.read_surfaces
     flagged = facts.data.flagged.sel(surface=names)
-    figure = drawing.image_figure(analysis.raster, 2.5, rows=len(names))
+    figure = image_figure(analysis.raster, 2.5, rows=len(names))
     rows = figure.subplots(len(names), 2, sharex=True, sharey=True, squeeze=False)
     for column, (title, images) in enumerate(
         (("error", image_error(facts.data)), ("PSF contribution", image_psf_portion(facts.data)))
@@ -183,7 +183,7 @@ def error_lines(facts: Facts) -> Figure | None:
         return None
     number = int(facts.data.attrs["shown_instant"])
     shown = slice(None) if facts.analysis.cut else slice(number, number + 1)
-    factor, unit = drawing.length_unit(facts.analysis.raster)
+    factor, unit = length_unit(facts.analysis.raster)
     figure = drawing.new_figure(2.7 * len(names) + 0.8)
     rows = figure.subplots(len(names), 2, squeeze=False)
     for (left, right), name in zip(rows, names, strict=True):

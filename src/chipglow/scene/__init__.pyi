@@ -20,5 +20,11 @@ from .regions import (
     shared_pixels as shared_pixels,
 )
 from .scene import ENERGY_UNITS as ENERGY_UNITS, Scene as Scene, is_gap as is_gap
+from .scene_figure import draw_scene as draw_scene
+from .scene_summary import (
+    QualitySummary as QualitySummary,
+    SceneSummary as SceneSummary,
+    scene_summary as scene_summary,
+)
 from .tool import Chamfer as Chamfer, Hone as Hone, Tool as Tool, ToolGeometry as ToolGeometry
 from .tool_outline import ToolOutline as ToolOutline, ToolOutlineError as ToolOutlineError

@@ -1,17 +1,14 @@
 """One frame of a scene: its fields, their units and what a sample shows."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field as declared
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.quantities import Brief
-
-if TYPE_CHECKING:
-    from chipglow.scene.splines import SplineFrame
 
 FIELD_UNITS: Final[Mapping[str, str]] = {
     "temperature": "K",
@@ -54,7 +51,7 @@ class Frame(Brief):
     """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
 
     Fields that a scene lacks, or that were not requested, are None. A scene without material is
-    workpiece everywhere. `splines` is what the fields were sampled from, where they were.
+    workpiece everywhere.
     """
 
     time: float
@@ -67,7 +64,6 @@ class Frame(Brief):
     material_x: NDArray[np.float32] | None = None
     material_y: NDArray[np.float32] | None = None
     quality: NDArray[np.uint8] | None = None
-    splines: "SplineFrame | None" = declared(default=None, repr=False)
 
     def needed(self, name: str) -> NDArray[np.float32]:
         """Return a field of `FIELD_UNITS` or raise a SceneError."""

@@ -1,15 +1,11 @@
-"""Text and picture of frames on a grid in a notebook."""
+"""Text of frames on a grid in a notebook."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.scene.raster import Raster
-from chipglow.scene.tool import Tool
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def frames_text(
@@ -27,22 +23,3 @@ def frames_text(
         else f"no temperature{' in the first' if count > 1 else ''}",
     )
     return "; ".join(parts)
-
-
-def plot_image(
-    celsius: NDArray[Any],
-    raster: Raster,
-    tool: Tool | None,
-    label: str,
-    time: float,
-    ax: "Axes | None",
-) -> "Axes":
-    """Draw temperatures in °C with the tool's outline and a colour bar."""
-    from chipglow.drawing import drawing
-
-    axes = drawing.axes_or_new(ax, "compressed")
-    limits = (np.nanmin(celsius), np.nanmax(celsius)) if np.isfinite(celsius).any() else (0.0, 1.0)
-    picture = drawing.show_image(axes, celsius, raster, tool, "inferno", limits)
-    axes.set_title(f"{1e6 * time:.6g} µs", loc="left")
-    axes.figure.colorbar(picture, ax=axes, label=label)
-    return axes

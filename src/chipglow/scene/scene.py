@@ -22,7 +22,7 @@ from chipglow.scene.frame import (
     Material,
     SceneError,
 )
-from chipglow.scene.notebook import frames_text, plot_image
+from chipglow.scene.notebook import frames_text
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
 from chipglow.scene.tool_outline import stored_tool, tool_attributes
@@ -165,6 +165,8 @@ class Scene:
 
     def plot(self, frame: int = 0, ax: "Axes | None" = None) -> "Axes":
         """Draw the temperature of one frame in °C over x and y in µm, with the tool's outline."""
+        from chipglow.scene.figures import plot_image
+
         time = float(self.times[frame])
         shown = self._shown(frame)
         return plot_image(shown, self.raster, self.tool, "temperature / °C", time, ax)

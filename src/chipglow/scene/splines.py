@@ -1,7 +1,7 @@
 """Frames as quadratic B-splines on a grid coarser than the samples: a cut's, as it is stored."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -126,7 +126,7 @@ class SplineFrame:
     """Smallest and largest value of the fields before ``filled``, which splines can overshoot:
     float32 of shape (fields, 2)."""
 
-    def frame(self, names: Collection[str] | None = None) -> Frame:
+    def frame(self, names: Collection[str] | None = None) -> "SplineSamples":
         """Return the samples of temperature, material and the named fields, by default all."""
         material = self.material()
         fields: dict[str, Any] = {
@@ -134,7 +134,7 @@ class SplineFrame:
             for name in _SAMPLED
             if names is None or name in names or name == "temperature"
         }
-        return Frame(time=self.time, material=material, splines=self, **fields)
+        return SplineSamples(time=self.time, material=material, splines=self, **fields)
 
     def material(self) -> NDArray[np.uint8]:
         """Return what each sample shows, shape (y, x)."""
@@ -159,6 +159,13 @@ class SplineFrame:
 
     def _evaluate(self, number: int, result: NDArray[np.float32]) -> None:
         _evaluate(self.nodes[number], *self.lattice.down, *self.lattice.across, result)
+
+
+@dataclass(frozen=True, repr=False)
+class SplineSamples(Frame):
+    """The samples of splines, with the splines."""
+
+    splines: SplineFrame = field(kw_only=True, repr=False)
 
 
 def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

@@ -1,25 +1,26 @@
 """Figure of an uncertainty budget: the contributions of the inputs to each reading."""
 
 from itertools import cycle
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from chipglow.drawing import drawing, scales
-from chipglow.study.budgets import CAMERA, SCENE, SURFACE, StudyBudget
+
+if TYPE_CHECKING:
+    from chipglow.study.budgets import StudyBudget
 
 _LARGEST: Final = 6
 _HEIGHT: Final = 0.22
 """Height of a bar in inches."""
 
 
-def draw_budget(result: StudyBudget) -> Figure:
+def draw_budget(result: "StudyBudget") -> Figure:
     """Draw the largest contributions to each reading, coloured by group, and their total."""
     frame, summary = result.to_frame(), result.summary().set_index("reading")
-    every = dict.fromkeys([SCENE, SURFACE, CAMERA, *frame.group])
-    colour_of = dict(zip(every, cycle(scales.COLOURS)))
+    colour_of = dict(zip(result.group_names, cycle(scales.COLOURS)))
     groups = [one for one in colour_of if one in set(frame.group)]
     count = min(frame.input.nunique(), _LARGEST) + 1
     with drawing.style():

@@ -106,6 +106,11 @@ class StudyBudget:
         verdicts = np.where(trials.is_stable, np.where(agrees, "yes", "no"), "undecided")
         return [str(one) for one in verdicts]
 
+    @property
+    def group_names(self) -> list[str]:
+        """Groups of the inputs; those that every study has come first."""
+        return list(dict.fromkeys([SCENE, SURFACE, CAMERA, *self.to_frame().group]))
+
     def to_frame(self) -> pd.DataFrame:
         """Return the budget in the form of the GUM: a row for each reading and input."""
         inputs, estimate = self.budget.inputs, self.budget.estimate

@@ -1,7 +1,7 @@
 """Figure of a choice of settings: bias and uncertainty of each setting."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,10 +9,12 @@ from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing, scales
 from chipglow.quantities import Quantity, value_text
-from chipglow.study.design import Design
+
+if TYPE_CHECKING:
+    from chipglow.study.design import Design
 
 
-def draw_design(result: Design) -> Figure:
+def draw_design(result: "Design") -> Figure:
     """Draw every setting by bias and uncertainty, the Pareto front, and the best setting."""
     with drawing.style():
         figure = drawing.new_figure(4.2)
@@ -21,7 +23,7 @@ def draw_design(result: Design) -> Figure:
     return figure
 
 
-def plot_design(result: Design, ax: Axes | None) -> Axes:
+def plot_design(result: "Design", ax: Axes | None) -> Axes:
     """Draw the same on axes, with the legend in them."""
     with drawing.style():
         axes = drawing.axes_or_new(ax)
@@ -30,7 +32,7 @@ def plot_design(result: Design, ax: Axes | None) -> Axes:
     return axes
 
 
-def _draw_settings(axes: Axes, result: Design) -> None:
+def _draw_settings(axes: Axes, result: "Design") -> None:
     bias, uncertainty = result.objectives.T
     excluded = [number in result.reasons for number in range(len(bias))]
     front = sorted(result.is_pareto.nonzero()[0].tolist(), key=lambda number: bias[number])

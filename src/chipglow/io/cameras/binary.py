@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 from chipglow.camera import Recording
 from chipglow.camera.recording import Quantity
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.grids.arrays import check_samples
+from chipglow.io.sources.grids.file_array import check_samples
 from chipglow.quantities import Array
 from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes

@@ -15,7 +15,8 @@ from chipglow.camera.recording import QUANTITIES, Quantity
 from chipglow.io.cameras.binary import chosen_frames, evenly
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.conventions import note_other_unit
-from chipglow.io.sources.grids.arrays import ARRAY_READERS, FileArray, open_arrays
+from chipglow.io.sources.grids.arrays import ARRAY_READERS, open_arrays
+from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.grids.layout import (
     AXES,
     ROW_0,

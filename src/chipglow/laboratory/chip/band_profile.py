@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from functools import cache, partial
 from math import isfinite, nan, sqrt
 from typing import TYPE_CHECKING, Any, Final
@@ -18,6 +17,7 @@ from chipglow.camera.calibration import CALIBRATION
 from chipglow.chip.ridge import NoShearBandError, across_curve, arc_length, normals_of
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.frames import budget_table, frame_numbers, unit_table
+from chipglow.laboratory.chip.stage import Stage
 from chipglow.laboratory.chip.tool_position import (
     TOOL_BUDGET,
     ToolUncertainty,
@@ -60,19 +60,6 @@ _DEEP_FRACTION: Final = 1.0 / 3.0
 
 _STEP: Final = 0.5
 _FINE: Final = 4
-
-
-class Stage(StrEnum):
-    """Development of a shear band by its position (Heigel and Whitenton 2010, Figure 8)."""
-
-    DEVELOPING = "developing"
-    """It has not come to the reference."""
-    DEVELOPED = "fully developed"
-    """It is where the reference is."""
-    MOVED = "moved"
-    """The next segment has moved it on."""
-    NONE = "no band"
-    """No band is found in the frame."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,7 +111,7 @@ class BandProfile(Brief):
 
         New axes are made by default.
         """
-        from chipglow.laboratory.chip.figures import plot_band_profile
+        from chipglow.laboratory.chip.figure import plot_band_profile
 
         return plot_band_profile(self, ax)
 

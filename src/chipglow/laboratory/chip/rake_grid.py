@@ -123,7 +123,7 @@ class RakeGrid(Brief):
 
         New axes are made by default.
         """
-        from chipglow.laboratory.chip.figures import plot_rake_grid
+        from chipglow.laboratory.chip.figure import plot_rake_grid
 
         return plot_rake_grid(self, ax)
 

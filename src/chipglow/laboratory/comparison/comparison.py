@@ -23,6 +23,7 @@ from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
 from chipglow.laboratory.chip.frames import FRAMES, changed, frame_mean, frame_scatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
+from chipglow.laboratory.comparison.coverage import COVERAGE
 from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part, uncertainty_text
 from chipglow.quantities.units import LENGTH, TEMPERATURE_DIFFERENCE
 from chipglow.scene import Tool, sample
@@ -31,9 +32,6 @@ from chipglow.uncertainty import Component, Estimate, draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-COVERAGE: Final = 2.0
-"""Factor between standard and expanded uncertainty: about 95 %."""
 
 TIP_REACH: Final = 100e-6
 """Distance from the cutting edge in m within which the paper looks at the band by itself."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import cycle
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,15 +10,18 @@ from matplotlib.figure import Figure
 
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import COLOURS, GREY
-from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison
+from chipglow.laboratory.comparison.coverage import COVERAGE
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.uncertainty import Estimate
+
+if TYPE_CHECKING:
+    from chipglow.laboratory.comparison.comparison import Comparison
 
 _HEIGHT: Final = 5.2
 _ASIDE: Final = 0.2
 
 
-def draw_comparison(comparison: Comparison) -> Figure:
+def draw_comparison(comparison: "Comparison") -> Figure:
     """Draw what was measured and simulated, and the differences with expanded uncertainties."""
     columns = []
     grid = comparison.grid

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import cycle
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,12 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
-from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
-from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
-from chipglow.laboratory.emissivity.temperature import RegionTemperatures
 from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Raster, Region
+from chipglow.scene.figures import ImagePanel
+
+if TYPE_CHECKING:
+    from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
+    from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
+    from chipglow.laboratory.emissivity.temperature import RegionTemperatures
 
 _PANEL_WIDTH: Final = 2.7
 _AROUND: Final = 0.75
@@ -26,7 +28,7 @@ _BESIDE: Final = 0.2
 
 
 def draw_emissivity(
-    found: EmissivityMap, regions: Sequence[Region], lines: Sequence[EmissivityLine] = ()
+    found: "EmissivityMap", regions: Sequence[Region], lines: "Sequence[EmissivityLine]" = ()
 ) -> Figure:
     """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
@@ -50,7 +52,7 @@ def draw_emissivity(
     return figure
 
 
-def plot_emissivity_map(found: EmissivityMap, ax: Axes | None) -> Axes:
+def plot_emissivity_map(found: "EmissivityMap", ax: Axes | None) -> Axes:
     """Draw the emissivity of every pixel."""
     with drawing.style():
         axes = drawing.axes_or_new(ax, "compressed")
@@ -58,7 +60,7 @@ def plot_emissivity_map(found: EmissivityMap, ax: Axes | None) -> Axes:
     return axes
 
 
-def plot_region_emissivities(found: RegionEmissivities, ax: Axes | None) -> Axes:
+def plot_region_emissivities(found: "RegionEmissivities", ax: Axes | None) -> Axes:
     """Draw the emissivity of each region, over the temperature if there are several."""
     with drawing.style():
         axes = drawing.axes_or_new(ax)
@@ -76,7 +78,7 @@ def plot_region_emissivities(found: RegionEmissivities, ax: Axes | None) -> Axes
     return axes
 
 
-def plot_region_temperatures(found: RegionTemperatures, ax: Axes | None) -> Axes:
+def plot_region_temperatures(found: "RegionTemperatures", ax: Axes | None) -> Axes:
     """Draw the true temperature of each region with its interval, and what the camera shows."""
     rows = found.rows
     names = [row.name for row in rows]
@@ -102,7 +104,7 @@ def plot_region_temperatures(found: RegionTemperatures, ax: Axes | None) -> Axes
     return axes
 
 
-def _emissivity_panel(found: EmissivityMap) -> ImagePanel:
+def _emissivity_panel(found: "EmissivityMap") -> ImagePanel:
     title = f"emissivity, object at {found.heating.reference - ZERO_CELSIUS:.4g} °C"
     limits = scales.ends(found.emissivity, 0.5, 99.5)
     return ImagePanel(title, "emissivity", found.emissivity, limits)
@@ -131,7 +133,7 @@ def _colours(regions: Sequence[Region]) -> dict[str, str]:
     return dict(zip(features, cycle(scales.COLOURS), strict=False))
 
 
-def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Sequence[str]) -> None:
+def _draw_lines(axes: Axes, lines: "Sequence[EmissivityLine]", colours: Sequence[str]) -> None:
     for line, colour in zip(lines, cycle(colours), strict=False):
         celsius = np.array(line.temperatures) - ZERO_CELSIUS
         axes.errorbar(

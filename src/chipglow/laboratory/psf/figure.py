@@ -1,7 +1,7 @@
 """A point spread function by the knife edge, as a picture and in sentences."""
 
 from math import cos, hypot, sin, sqrt
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,20 +9,22 @@ from matplotlib.figure import Figure
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
-from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import FittedEdge, ModelFit
 from chipglow.laboratory.psf.psf_models import is_length
 from chipglow.quantities import uncertain_text
 from chipglow.scene import Raster
+from chipglow.scene.figures import ImagePanel, length_unit
+
+if TYPE_CHECKING:
+    from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 
 _HEIGHT: Final = 5.6
 _APERTURES: Final = 2.6
 _SHOWN_WIDTHS: Final = 5.0
 
 
-def draw_knife_edge(found: KnifeEdge) -> Figure:
+def draw_knife_edge(found: "KnifeEdge") -> Figure:
     """Draw each image, the edge-spread function with fit and residuals, and the MTF."""
     heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
     with drawing.style():
@@ -37,7 +39,7 @@ def draw_knife_edge(found: KnifeEdge) -> Figure:
     return figure
 
 
-def _draw_edge(figure: Any, found: KnifeEdge, k: int, edge: EdgeResult) -> None:
+def _draw_edge(figure: Any, found: "KnifeEdge", k: int, edge: "EdgeResult") -> None:
     grid = figure.add_gridspec(3, 2, height_ratios=(3.0, 1.1, 3.2))
     _draw_image(figure, figure.add_subplot(grid[0:2, 0]), edge, found.best.edges[k])
     spread = figure.add_subplot(grid[0, 1])
@@ -50,7 +52,7 @@ def _draw_edge(figure: Any, found: KnifeEdge, k: int, edge: EdgeResult) -> None:
     _draw_transfer(figure.add_subplot(grid[2, 1]), edge)
 
 
-def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -> None:
+def _draw_image(figure: Any, axes: Axes, edge: "EdgeResult", fitted: FittedEdge) -> None:
     image, pitch = edge.image, edge.image.pitch
     raster = Raster(
         float(image.x[0]) - pitch / 2, float(image.y[0]) + pitch / 2, pitch, *image.radiance.shape
@@ -62,12 +64,12 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     c, s = cos(fitted.line.normal), sin(fitted.line.normal)
     middle = np.array([image.x.mean(), image.y.mean()]) + fitted.line.position * np.array([c, s])
     along = image.pitch * hypot(*raster.shape) * np.array([-s, c])
-    shown, factor = axes.axis(), drawing.length_unit(raster)[0]
+    shown, factor = axes.axis(), length_unit(raster)[0]
     drawing.draw_line(axes, np.stack([middle - along, middle + along]), BLUE, factor=factor)
     axes.axis(shown)
 
 
-def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
+def _draw_spread(axes: Axes, below: Axes, edge: "EdgeResult", distance: Any, model: Any) -> None:
     spread = edge.curves[["distance", "esf", "esf_uncertainty", "esf_residual"]].where(
         np.abs(edge.curves["distance"]) <= distance[-1]
     )
@@ -84,7 +86,7 @@ def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model
     below.set(ylabel="residual / %", xlabel="distance from the edge / µm")
 
 
-def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
+def _draw_line(axes: Axes, edge: "EdgeResult", distance: Any, model: Any) -> None:
     line = edge.curves[["line_distance", "lsf", "lsf_uncertainty"]].where(
         np.abs(edge.curves["line_distance"]) <= distance[-1]
     )
@@ -96,7 +98,7 @@ def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
     axes.set(title="line-spread function", xlabel="distance from the edge / µm", ylabel="1/µm")
 
 
-def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
+def _draw_transfer(axes: Axes, edge: "EdgeResult") -> None:
     frequency, mtf, spread, model, optics = (
         edge.curves[name].values
         for name in ("frequency", "mtf", "mtf_uncertainty", "mtf_model", "mtf_optics")
@@ -113,7 +115,7 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
 
 
-def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
+def _draw_apertures(axes: Axes, found: "KnifeEdge") -> None:
     signals, best = found.apertures, found.best
     assert signals is not None
     fraction = (signals.radiance - best.aperture_background) / best.source
@@ -132,7 +134,7 @@ def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
     axes.legend(loc="lower right")
 
 
-def sentences(found: KnifeEdge) -> list[str]:
+def sentences(found: "KnifeEdge") -> list[str]:
     """Return the result, and how to use it."""
     width = uncertain_text(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
     lines = [
@@ -147,7 +149,7 @@ def sentences(found: KnifeEdge) -> list[str]:
     return lines
 
 
-def _study_section(found: KnifeEdge) -> str | None:
+def _study_section(found: "KnifeEdge") -> str | None:
     """Return the best model as a study's camera section; None if only a file can hold it."""
     psf = found.psf()
     if isinstance(psf, GaussianPSF):
@@ -173,7 +175,7 @@ def _parameters(fit: ModelFit) -> str:
     return ", ".join(texts)
 
 
-def _directions(found: KnifeEdge) -> list[str]:
+def _directions(found: "KnifeEdge") -> list[str]:
     """Return whether edges of several orientations agree."""
     if len(found.edges) < 2:
         return []

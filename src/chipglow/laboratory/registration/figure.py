@@ -13,6 +13,7 @@ from chipglow.drawing.scales import HEAT, VERMILLION, VOID
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Raster, Tool
+from chipglow.scene.figures import show_image
 
 _FACE: Final = 3e-3
 _OPACITY: Final = 0.55
@@ -34,7 +35,7 @@ def draw_registration(
     with drawing.style():
         figure = drawing.new_figure(3.0)
         left, right = figure.subplots(1, 2)
-        picture = drawing.show_image(left, celsius, raster, tool, HEAT, limits)
+        picture = show_image(left, celsius, raster, tool, HEAT, limits)
         left.set_title("infrared")
         warped = registration.warp(celsius, raster, (visible.shape[0], visible.shape[1]))
         _show(right, visible, "gray", scales.ends(visible, 0.5, 99.5))

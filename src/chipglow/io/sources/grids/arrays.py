@@ -4,7 +4,7 @@ import mmap
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import datetime, timedelta
 from functools import cache, partial
 from math import prod
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import FRAME_NAMES, OTHER_NAMES, simple
 from chipglow.io.sources.file_names import files_of, missing_number
+from chipglow.io.sources.grids.file_array import FileArray, Key, Read, check_samples, list_array
+from chipglow.io.sources.grids.images import png_arrays, tiff_arrays
 from chipglow.io.sources.grids.unpacking import PACKING, unpack
 from chipglow.io.sources.source import (
     SourceError,
@@ -27,9 +29,6 @@ from chipglow.io.sources.source import (
     table_errors,
 )
 from chipglow.text import Notes, read_matrix
-
-MOST_SAMPLES: Final = 100_000_000
-"""Maximum number of samples that are read at once."""
 
 _MOST_NOTES: Final = 10
 _MORE_NOTES: Final = "There are more notes on further files."
@@ -45,70 +44,8 @@ _CODECS: Final = (
     "packbits", "quantize", "sharding_indexed", "shuffle", "transpose", "zlib", "zstd",
 )  # fmt: skip
 
-Key = tuple[slice, ...]
-Read: TypeAlias = Callable[[Key], NDArray[Any]]
-"""Returns the part of an array given by a slice for every axis."""
-
-
-@dataclass(frozen=True)
-class FileArray:
-    """Numeric array in a file, or in a series of files."""
-
-    name: str
-    """Its name in the file; empty where the format has none."""
-    shape: tuple[int, ...]
-    read: Read
-    dims: tuple[str, ...] = ()
-    """Names of its axes, if the file states them."""
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    """``units``, ``scale_factor``, ``_FillValue`` and others: text, a number or an array."""
-    chunks: tuple[int, ...] | None = None
-    """Shape of the parts that the file keeps together."""
-    path: str = ""
-    """The file or pattern."""
-    notes: Notes = field(default_factory=Notes)
-    """Assumptions, warnings and corrections of the reader, of the parts read so far."""
-
-    def __str__(self) -> str:
-        return f"{self.path}: {self.name}"
-
-    @property
-    def short(self) -> str:
-        """Last part of the name."""
-        return self.name.rsplit("/", 1)[-1]
-
-    @property
-    def unit(self) -> str | None:
-        unit = self.attributes.get("units")
-        return unit if isinstance(unit, str) else None
-
-    @property
-    def size(self) -> int:
-        return prod(self.shape)
-
-    def part(self, key: Key = ()) -> NDArray[Any]:
-        """Read the part given by a slice for every axis, or all of it."""
-        key = key or (slice(None),) * len(self.shape)
-        lengths = [len(range(length)[along]) for length, along in zip(self.shape, key, strict=True)]
-        check_samples(str(self), prod(lengths))
-        check_samples(f"{self}: a chunk", prod(self.chunks or ()))
-        with reading(self):
-            return self.read(key)
-
-
-def list_array(name: str, values: NDArray[np.float64], unit: str) -> FileArray:
-    """Return values of a coordinate as an array of a file."""
-    return FileArray(name, values.shape, lambda key: values[key], attributes={"units": unit})
-
-
 ArrayReader: TypeAlias = Callable[[Path, ExitStack], Iterator[FileArray]]
 """Opens a file, which the stack closes, and yields its arrays."""
-
-
-def check_samples(name: str, count: int) -> None:
-    """Refuse to read more at once than `MOST_SAMPLES`."""
-    if count > MOST_SAMPLES:
-        raise SourceError(f"{name}: {count:.3g} samples at once, expected up to {MOST_SAMPLES:.3g}")
 
 
 def open_arrays(
@@ -482,18 +419,6 @@ def _load_matlab(path: Path, name: str) -> NDArray[Any]:
 # TIFF, PNG
 
 
-def _tiff(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    from chipglow.io.sources.grids.images import tiff_arrays  # which needs FileArray
-
-    yield from tiff_arrays(path, stack)
-
-
-def _png(path: Path, stack: ExitStack) -> Iterator[FileArray]:
-    from chipglow.io.sources.grids.images import png_arrays  # which needs FileArray
-
-    yield from png_arrays(path, stack)
-
-
 # Zarr
 
 
@@ -567,8 +492,8 @@ ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     **dict.fromkeys((".h5", ".hdf5", ".hdf", ".he5"), _hdf5),
     **dict.fromkeys((".nc", ".nc4", ".cdf"), _netcdf),
     ".mat": _matlab,
-    **dict.fromkeys((".tif", ".tiff"), _tiff),
-    ".png": _png,
+    **dict.fromkeys((".tif", ".tiff"), tiff_arrays),
+    ".png": png_arrays,
     ".zarr": _zarr,
     **dict.fromkeys((".csv", ".txt", ".dat"), _text),
 }

@@ -17,7 +17,8 @@ from chipglow.io.sources.conventions import (
     unit_in_name,
     unit_of,
 )
-from chipglow.io.sources.grids.arrays import ARRAY_READERS, FileArray, open_arrays
+from chipglow.io.sources.grids.arrays import ARRAY_READERS, open_arrays
+from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.grids.layout import (
     AXES,
     COORDINATES,

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.grids.arrays import FileArray, Key, Read, check_samples, list_array
+from chipglow.io.sources.grids.file_array import FileArray, Key, Read, check_samples, list_array
 from chipglow.io.sources.source import SourceError, head_of, required
 from chipglow.text import Notes
 

@@ -16,7 +16,7 @@ from chipglow.io.sources.conventions import (
     simple,
     unit_of,
 )
-from chipglow.io.sources.grids.arrays import FileArray
+from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.grids.unpacking import PACKING, unpack
 from chipglow.io.sources.plausible import LARGEST_WITHOUT_UNIT
 from chipglow.io.sources.source import SourceError, naming

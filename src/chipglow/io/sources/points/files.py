@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.conventions import COMMON_NAMES, OTHER_NAMES, simple, unit_in_name
 from chipglow.io.sources.file_names import files_of
-from chipglow.io.sources.grids.arrays import FileArray, open_arrays
+from chipglow.io.sources.grids.arrays import open_arrays
+from chipglow.io.sources.grids.file_array import FileArray
 from chipglow.io.sources.meshes import vtk
 from chipglow.io.sources.source import SourceError, required, table_errors
 from chipglow.text import NamedTable, Notes, read_named_table

@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from chipglow.analysis import wavelengths_frame
+from chipglow.analysis.wavelengths import wavelengths_frame
 from chipglow.drawing import drawing, scales
 
 _BEST: Final = 3

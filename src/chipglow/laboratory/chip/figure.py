@@ -1,6 +1,6 @@
 """Analysis grid and shear band on the image, and their profiles (the paper's Figures 7 and 9)."""
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib
 import numpy as np
@@ -9,11 +9,14 @@ from matplotlib.figure import Figure, FigureBase
 
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
-from chipglow.laboratory.chip.band_profile import BandProfile, Stage
-from chipglow.laboratory.chip.rake_grid import RakeGrid
+from chipglow.laboratory.chip.stage import Stage
 from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.scene import Tool
+from chipglow.scene.figures import ImagePanel, crop
+
+if TYPE_CHECKING:
+    from chipglow.laboratory.chip.band_profile import BandProfile
+    from chipglow.laboratory.chip.rake_grid import RakeGrid
 
 _HEIGHT: Final = 3.8
 _BAND_HEIGHT: Final = 4.2
@@ -33,7 +36,7 @@ _LINES: Final = {
 }
 
 
-def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
+def draw_rake_grid(measurement: Measurement, grid: "RakeGrid") -> Figure:
     """Draw a grid on the image that it was read from, and its profiles along the rake face."""
     with drawing.style():
         figure = drawing.new_figure(_HEIGHT)
@@ -45,7 +48,7 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
     return figure
 
 
-def plot_rake_grid(grid: RakeGrid, ax: Axes | None) -> Axes:
+def plot_rake_grid(grid: "RakeGrid", ax: Axes | None) -> Axes:
     """Draw the profiles of a grid along the rake face."""
     with drawing.style():
         axes = drawing.axes_or_new(ax)
@@ -55,7 +58,7 @@ def plot_rake_grid(grid: RakeGrid, ax: Axes | None) -> Axes:
     return axes
 
 
-def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeGrid) -> None:
+def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: "RakeGrid") -> None:
     frames = np.isin(measurement.times, grid.times)
     known = np.ma.masked_invalid(measurement.radiance_temperature()[frames])
     image = known.mean(axis=0).filled(np.nan) - ZERO_CELSIUS
@@ -64,10 +67,10 @@ def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: RakeG
     for line in (*corners, *corners.transpose(1, 0, 2)):
         axes.plot(*line.T, color="black", linewidth=1.1, alpha=0.6)
         axes.plot(*line.T, color="white", linewidth=0.6)
-    drawing.crop(axes, grid.corners(), measurement.raster, _AROUND)
+    crop(axes, grid.corners(), measurement.raster, _AROUND)
 
 
-def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
+def _draw_profiles(axes: Axes, grid: "RakeGrid") -> None:
     mean, bars = grid.frame_mean - ZERO_CELSIUS, grid.bars
     uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
@@ -97,20 +100,20 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     axes.set(xlabel="distance along the rake face / µm", ylabel="radiance temperature / °C")
 
 
-def _bars(grid: RakeGrid) -> str:
+def _bars(grid: "RakeGrid") -> str:
     """Return what the bars and bands of the profiles show."""
     over = f"between {grid.times.size} frames" if grid.times.size > 1 else "in a square"
     bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
     return f"bars: standard deviation {over}{bands}"
 
 
-def _depths(grid: RakeGrid) -> str:
+def _depths(grid: "RakeGrid") -> str:
     """Return the title of the legend of the profiles."""
     partly = ((grid.frame_count > 0) & (grid.frame_count < grid.times.size)).any()
     return "depth into the chip" + "; hollow: usable in some frames only" * bool(partly)
 
 
-def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile) -> Figure:
+def draw_band_profile(measurement: Measurement, tool: Tool, profile: "BandProfile") -> Figure:
     """Draw the curves on the image of the reference, and the temperature along them."""
     with drawing.style():
         figure = drawing.new_figure(_BAND_HEIGHT)
@@ -122,7 +125,7 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
     return figure
 
 
-def plot_band_profile(profile: BandProfile, ax: Axes | None) -> Axes:
+def plot_band_profile(profile: "BandProfile", ax: Axes | None) -> Axes:
     """Draw the temperature along the band in each frame."""
     with drawing.style():
         axes = drawing.axes_or_new(ax)
@@ -132,13 +135,13 @@ def plot_band_profile(profile: BandProfile, ax: Axes | None) -> Axes:
     return axes
 
 
-def _colours(profile: BandProfile) -> Array:
+def _colours(profile: "BandProfile") -> Array:
     """Return the colour of each frame by its time, shape (frames, 4)."""
     first, last = profile.times[[0, -1]]
     return np.asarray(_COLOURS((profile.times - first) / max(last - first, 1e-12)))
 
 
-def _draw_along(figure: FigureBase, axes: Axes, profile: BandProfile) -> list[Any]:
+def _draw_along(figure: FigureBase, axes: Axes, profile: "BandProfile") -> list[Any]:
     """Draw the temperature along the band in each frame; return what the legend names."""
     for frame, colour in enumerate(_colours(profile)):
         _draw_profile(axes, profile, frame, colour)
@@ -158,7 +161,7 @@ def _draw_along(figure: FigureBase, axes: Axes, profile: BandProfile) -> list[An
 
 
 def _draw_curves(
-    figure: Figure, axes: Axes, measurement: Measurement, tool: Tool, profile: BandProfile
+    figure: Figure, axes: Axes, measurement: Measurement, tool: Tool, profile: "BandProfile"
 ) -> None:
     away = np.abs(profile.offset)
     frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
@@ -169,10 +172,10 @@ def _draw_curves(
     for points, colour in zip(profile.points, _colours(profile), strict=True):
         axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
     drawing.draw_line(axes, profile.reference.points, scales.BLUE)
-    drawing.crop(axes, profile.points, measurement.raster, _AROUND)
+    crop(axes, profile.points, measurement.raster, _AROUND)
 
 
-def _draw_profile(axes: Axes, profile: BandProfile, frame: int, colour: Array) -> None:
+def _draw_profile(axes: Axes, profile: "BandProfile", frame: int, colour: Array) -> None:
     values = profile.temperature[frame] - ZERO_CELSIUS
     if not np.isfinite(values).any():
         return

@@ -10,9 +10,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID, shown_frame
-from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
+from chipglow.scene.figures import ImagePanel, leave_out, show_image, veil
+from chipglow.scene.frame import FILLED, Frame, Material
+from chipglow.scene.raster import Raster
+from chipglow.scene.scene import Scene
+from chipglow.scene.tool import Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
 _SPEED: Final = "speed / (m/s)"
@@ -58,7 +61,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         if has_quality and frame.quality is not None:
             _draw_quality(top, next(places), frame, frame.quality, raster, tool)
         for empty in places:
-            drawing.leave_out(empty, grid[-2, 1] if rows > 1 else None, raster)
+            leave_out(empty, grid[-2, 1] if rows > 1 else None, raster)
         solid = frame.material == Material.WORKPIECE
         below = bottom.subplots(histogram_rows, 2, squeeze=False)
         for axes, panel in zip(below.flat, panels, strict=False):
@@ -131,7 +134,7 @@ def _draw_material(
 ) -> None:
     colours = ListedColormap([_COLOURS[kind] for kind in Material])
     ends = (-0.5, len(Material) - 0.5)
-    picture = drawing.show_image(axes, frame.material, raster, tool, colours, ends)
+    picture = show_image(axes, frame.material, raster, tool, colours, ends)
     bar = figure.colorbar(picture, ax=axes, aspect=25, ticks=list(Material))
     bar.ax.set_yticklabels([kind.name.lower() for kind in Material], rotation=90, va="center")
     axes.set_title("material")
@@ -153,7 +156,7 @@ def _draw_quality(
     title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
     ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
     axes.label_outer()
-    drawing.veil(axes, filled, raster, VERMILLION, 1.0)
+    veil(axes, filled, raster, VERMILLION, 1.0)
 
 
 def _draw_histogram(axes: Axes, panel: ImagePanel, values: NDArray[Any]) -> None:

@@ -19,6 +19,7 @@ from chipglow.drawing import drawing, scales
 from chipglow.io import movie_writer
 from chipglow.io.movie_file import PALETTE_SIZE
 from chipglow.scene import Frame, Material, Raster
+from chipglow.scene.figures import show_image
 
 _DPI: Final = 100
 _WIDTH: Final = 1320
@@ -107,9 +108,7 @@ class CutPicture:
         self._images = []
         for axes, (title, label, colours, limits, extend) in zip(panels, looks, strict=True):
             log = extend == "both"
-            image = drawing.show_image(
-                axes, empty, self._raster, self._tool, colours, limits, log=log
-            )
+            image = show_image(axes, empty, self._raster, self._tool, colours, limits, log=log)
             self._figure.colorbar(image, ax=axes, label=label, extend=extend, aspect=25)
             axes.set_title(title)
             axes.label_outer()

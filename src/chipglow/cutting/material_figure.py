@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.cutting import MaterialFile, WorkpieceMaterial
+from chipglow.cutting.library import MaterialFile
+from chipglow.cutting.material import WorkpieceMaterial
 from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
 

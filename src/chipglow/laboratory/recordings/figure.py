@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from chipglow.camera import FittedCalibration, Flag, Measurement
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, COLOURS, GREEN, GREY, VERMILLION, VOID, shown_frame
 from chipglow.laboratory.recordings.calibration_fit import CalibrationFit
 from chipglow.quantities import ZERO_CELSIUS, Array
+from chipglow.scene.figures import ImagePanel, veil
 
 _FLAGS: Final = {
     Flag.UNDER_RANGE: ("below the lower range limit", VOID),
@@ -52,7 +52,7 @@ def _draw_flags(axes: Axes, flags: NDArray[np.uint8], measurement: Measurement) 
     for flag, (name, colour) in _FLAGS.items():
         where = flags & flag != 0
         if where.any():
-            drawing.veil(axes, where, measurement.raster, colour, 1.0)
+            veil(axes, where, measurement.raster, colour, 1.0)
             label = f"{name}, {100 * np.mean(where):.2g} %"
             shown.append(Patch(facecolor=colour, edgecolor=GREY, label=label))
     if shown:

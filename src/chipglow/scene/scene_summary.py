@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from chipglow.drawing.scales import KELVIN, shown_frame
 from chipglow.quantities import Brief
-from chipglow.scene import FILLED, Frame, Material, Scene
+from chipglow.scene.frame import FILLED, Frame, Material
+from chipglow.scene.scene import Scene
 
 _SAMPLED: Final = 5
 """Frames whose smallest and largest values a summary includes, besides the one shown."""
