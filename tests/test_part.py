@@ -9,7 +9,7 @@ from typing import Annotated
 import jsonschema
 import pytest
 import yaml
-from pydantic import ValidationError
+from pydantic import AfterValidator, ValidationError
 
 from chipglow import quantities
 from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
@@ -90,6 +90,35 @@ def test_si_numbers_pass_from_python_only():
     with pytest.raises(ValidationError, match="has no unit"):
         read_from_file({"width": 1.5})
     assert read_from_file({"width": "1.5 m"}) == Shelf(1.5)
+
+
+def test_a_field_is_validated_once():
+    seen = []
+
+    def noted(width):
+        seen.append(width)
+        return width
+
+    @dataclass(frozen=True)
+    class Board(Part):
+        """A board."""
+
+        width: Annotated[float, Parameter("Of it.", LENGTH), AfterValidator(noted)] = 1.0
+
+    @dataclass(frozen=True)
+    class Case(Part):
+        """A case."""
+
+        board: Annotated[Board, Parameter("In it.")]
+
+    for make in (
+        lambda: Board(2.0),
+        lambda: Case({"width": "2 m"}),
+        lambda: adapter(Case).validate_python({"board": {"width": "2 m"}}, context={"folder": "."}),
+    ):
+        seen.clear()
+        make()
+        assert seen == [2.0]
 
 
 def test_help_shows_plain_types():

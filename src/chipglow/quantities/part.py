@@ -108,19 +108,25 @@ class Part:
         return part
 
     def __post_init__(self) -> None:
-        values = {
+        """Check the given fields, and hold their values in SI."""
+        reading = vars(self).pop("_reading", None)
+        stated = {
             name: value.item() if isinstance(value := getattr(self, name), np.generic) else value
             for name in self._annotations
+            if name in self.given
         }
-        given = {name: value for name, value in values.items() if name in self.given}
+        if reading is None:
+            stated |= self.completed(stated, False)
+        context = None if reading is None else reading.context
         try:
-            completed = self.completed(given, False)
-            read = _section(type(self)).validate_python({**values, **completed})
+            values = _section(type(self)).validate_python(stated, context=context)
         except ValidationError as error:
+            if reading is not None:
+                raise
             raise ValueError(f"{type(self).__name__}.{problem(error)}") from None
-        for name in read.keys() & self._annotations.keys():
-            object.__setattr__(self, name, read[name])
-        object.__setattr__(self, "given", self.given | completed.keys())
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "given", self.given | values.keys())
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
@@ -165,15 +171,19 @@ class Part:
             from_file = bool(info.context)
             data = _known_keys(cls.completed({} if data is None else data, from_file), cls)
             _check_complete(data, cls)
-            values = _section(cls).validate_python(data, context=info.context)
-            if cls.kind:
-                values.pop("kind", None)
+            values = dict(data)
+            if cls.kind and (kind := values.pop("kind", cls.kind)) != cls.kind:
+                raise ValueError(f"kind: {kind!r}, expected {cls.kind!r}")
+            part = cls.__new__(cls, **values)
+            # The constructor checks the fields: by the rules of a description, and only once.
+            object.__setattr__(part, "_reading", info)
             try:
-                return cls(**values)
+                part.__init__(**values)  # type: ignore[misc]
             except OSError as error:  # name the field of a file that cannot be read
-                named = [key for key, one in values.items() if str(one) == str(error.filename)]
+                named = [key for key in values if str(getattr(part, key)) == str(error.filename)]
                 place = ": ".join([*named, str(error.filename)])
                 raise ValueError(f"{place}: {error.strerror}, expected a file") from None
+            return part
 
         def written(part: Part, info: SerializationInfo) -> Any:
             values = {name: getattr(part, name) for name in _keys(cls)}
