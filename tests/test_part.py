@@ -15,7 +15,7 @@ from chipglow import quantities
 from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
 from chipglow.io import ImportDescription, import_text
 from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
-from chipglow.quantities import Family, Parameter, Part, adapter, problem
+from chipglow.quantities import Family, Parameter, Part, adapter, made_from, problem
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.study import Study, study_text
 from chipglow.text import commented_yaml, json_schema
@@ -111,14 +111,24 @@ def test_a_field_is_validated_once():
 
         board: Annotated[Board, Parameter("In it.")]
 
+    @dataclass(frozen=True)
+    class Plank(Board):
+        """A board with a length."""
+
+        length: Annotated[float, Parameter("Of it.", LENGTH, most=9.0)] = 1.0
+
     for make in (
         lambda: Board(2.0),
         lambda: Case({"width": "2 m"}),
         lambda: adapter(Case).validate_python({"board": {"width": "2 m"}}, context={"folder": "."}),
+        lambda: made_from(Plank, Board(2.0), length="3 m"),
     ):
         seen.clear()
-        make()
+        made = make()
         assert seen == [2.0]
+    assert (made, made.given) == (Plank(2.0, 3.0), {"width", "length"})
+    with pytest.raises(ValueError, match=r"Plank.length: 30 m, expected .* up to 9 m"):
+        made_from(Plank, Board(2.0), length=30.0)
 
 
 def test_help_shows_plain_types():

@@ -17,6 +17,7 @@ from chipglow.camera.calibration.fit import (
 from chipglow.camera.camera import (
     PAPER_LIMIT as PAPER_LIMIT,
     Camera as Camera,
+    CameraSettings as CameraSettings,
     ChipglowWarning as ChipglowWarning,
 )
 from chipglow.camera.detector.detector import Detector as Detector

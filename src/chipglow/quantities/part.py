@@ -4,7 +4,6 @@ import inspect
 import re
 import reprlib
 from collections.abc import Callable, Iterator, Mapping
-from copy import copy
 from dataclasses import MISSING, fields as dataclass_fields
 from difflib import get_close_matches
 from functools import cache, reduce
@@ -103,17 +102,18 @@ class Part:
     def __new__(cls, *args: Any, **values: Any) -> Self:
         """Note which fields are given."""
         part = super().__new__(cls)
-        names = [name for name, one in getattr(cls, "__dataclass_fields__", {}).items() if one.init]
+        fields = getattr(cls, "__dataclass_fields__", {}).items()
+        names = [name for name, one in fields if one.init and not one.kw_only]
         object.__setattr__(part, "given", frozenset([*names[: len(args)], *values]))
         return part
 
     def __post_init__(self) -> None:
         """Check the given fields, and hold their values in SI."""
-        reading = vars(self).pop("_reading", None)
+        reading, checked = (vars(self).pop(name, None) for name in ("_reading", "_checked"))
         stated = {
             name: value.item() if isinstance(value := getattr(self, name), np.generic) else value
             for name in self._annotations
-            if name in self.given
+            if name in self.given and name not in (checked or ())
         }
         if reading is None:
             stated |= self.completed(stated, False)
@@ -203,10 +203,21 @@ class Part:
         return json | {"title": cls.__name__, "description": first_sentence(cls)}
 
 
+def made_from(kind: type[PartType], checked: "Part", **values: Any) -> PartType:
+    """Return a part with the fields that another part has too and has checked, and with values."""
+    names = kind.declared().keys() & checked.declared().keys() - values.keys()
+    shared = {name: getattr(checked, name) for name in names}
+    part = kind.__new__(kind, **shared, **values)
+    object.__setattr__(part, "_checked", names)
+    part.__init__(**shared, **values)  # type: ignore[misc]
+    return part
+
+
 def unchecked(part: PartType, **values: Any) -> PartType:
     """Return a copy of a part with other values, which nothing checks."""
-    made = copy(part)
-    for name, value in (values | {"given": part.given | values.keys()}).items():
+    made = object.__new__(type(part))
+    kept = {one.name: getattr(part, one.name) for one in dataclass_fields(part)}
+    for name, value in {**kept, **values, "given": part.given | values.keys()}.items():
         object.__setattr__(made, name, value)
     return made
 

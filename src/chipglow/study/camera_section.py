@@ -2,27 +2,26 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from chipglow.camera import (
     BLURS,
-    OPTICS_TERMS,
     PAPER_LIMIT,
     PSFS,
     AnnularAperturePSF,
     BlurredPSF,
     BlurTerm,
     Camera,
-    Detector,
+    CameraSettings,
     OperationPoint,
-    OpticsTerm,
     PointSpreadFunction,
     PSFChoice,
     lower_range_limit,
 )
 from chipglow.io.column_file import read_response
-from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, Part, made_from, unchecked
 from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
@@ -40,8 +39,8 @@ FROM_DETECTOR: Final = "detector"
 
 
 @dataclass(frozen=True)
-class CameraSection(Part):
-    """The infrared camera."""
+class CameraModel(Part):
+    """Which camera it is."""
 
     preset: Annotated[
         str | None,
@@ -60,7 +59,13 @@ class CameraSection(Part):
             allowed="none, or a file such as response.csv",
         ),
     ] = None
-    pitch: Annotated[float, Camera.parameter("pitch")] = Camera.pitch
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraSection(CameraSettings, CameraModel):
+    """The infrared camera."""
+
+    psf_order: Annotated[Literal["optics", "detector"], Camera.parameter("psf_order")] = "detector"
     detector_pitch: Annotated[
         float | None,
         Parameter(
@@ -84,7 +89,6 @@ class CameraSection(Part):
             allowed="none, or such as [640, 512]",
         ),
     ] = None
-    fill_factor: Annotated[float, Camera.parameter("fill_factor")] = Camera.fill_factor
     offset_right: Annotated[
         float | None,
         Parameter(
@@ -108,16 +112,6 @@ class CameraSection(Part):
         tuple[Annotated[BlurTerm, BLURS], ...],
         Parameter("Other blurs, a list: they are part of the point spread function."),
     ] = ()
-    optics: Annotated[
-        tuple[Annotated[OpticsTerm, OPTICS_TERMS], ...], Camera.parameter("optics")
-    ] = ()
-    psf_order: Annotated[Literal["optics", "detector"], Camera.parameter("psf_order")] = "detector"
-    integration_time: Annotated[float, Camera.parameter("integration_time")] = (
-        Camera.integration_time
-    )
-    frame_rate: Annotated[float, Camera.parameter("frame_rate")] = Camera.frame_rate
-    line_time: Annotated[float | None, Camera.parameter("line_time")] = None
-    time_constant: Annotated[float | None, Camera.parameter("time_constant")] = None
     lower_limit: Annotated[
         float | Literal["detector"] | None,
         replace(
@@ -127,12 +121,10 @@ class CameraSection(Part):
             allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
     ] = PAPER_LIMIT
-    reflected: Annotated[float | None, Camera.parameter("reflected")] = None
-    detector: Annotated[Detector | None, Camera.parameter("detector")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.build()
+        _ = self._camera  # refuses settings that contradict each other
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
@@ -164,21 +156,11 @@ class CameraSection(Part):
 
         `on` also places the array on a scene.
         """
-        band = Band(*self.band, None if self.response is None else read_response(self.response))
-        shared = Camera.declared().keys() & self.declared().keys()
-        made = {
-            **{name: getattr(self, name) for name in shared},
-            "band": band,
-            "offset": (self.offset_right or 0.0, self.offset_down or 0.0),
-            "shape": None if self.array is None else self.array[::-1],
-            "psf": self._psf(band),
-            "lower_limit": self._lower_limit(band),
-        }
-        return Camera(**made, seed=seed)
+        return unchecked(self._camera, seed=seed)
 
     def on(self, scene: Raster, seed: int = 2010) -> Camera:
         """Return the camera on a scene, with the pixels of its array that see it, centred."""
-        camera = replace(self.build(seed), shape=None)
+        camera = unchecked(self._camera, seed=seed, shape=None)
         if self.array is None:
             return camera
         whole = camera.pixels(scene)
@@ -188,7 +170,21 @@ class CameraSection(Part):
             right = (scene.columns * scene.spacing - columns * camera.pitch) / 2
         if self.offset_down is None and rows < whole.rows:
             down = (scene.rows * scene.spacing - rows * camera.pitch) / 2
-        return replace(camera, shape=(rows, columns), offset=(right, down))
+        return unchecked(camera, shape=(rows, columns), offset=(right, down))
+
+    @cached_property
+    def _camera(self) -> Camera:
+        """The camera with its whole array."""
+        band = Band(*self.band, None if self.response is None else read_response(self.response))
+        return made_from(
+            Camera,
+            self,
+            band=band,
+            offset=(self.offset_right or 0.0, self.offset_down or 0.0),
+            shape=None if self.array is None else self.array[::-1],
+            psf=self._psf(band),
+            lower_limit=self._lower_limit(band),
+        )
 
     def _lower_limit(self, band: Band) -> float | None:
         if self.lower_limit != FROM_DETECTOR:
