@@ -163,6 +163,10 @@ def test_a_response_file_weighs_the_band(tmp_path):
         ({"pitch": "15 um", "magnification": 4}, "cannot be combined with pitch"),
         ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, must be positive"),
         ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "magnification, 6 um"),
+        (
+            {"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 s"},
+            "camera: pitch: '5 s' is not a length",
+        ),
         ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
         ({"preset": {}}, "{} is unknown, expected one of flir-lepton-3"),
         ({"preset": "alpha-nir"}, "magnification: must be given"),

@@ -53,7 +53,8 @@ class Part:
 
     From this one declaration come the check of the values, the section of descriptions with its
     comments, errors and JSON schema, and the parameters in the documentation. Fields without a
-    `Parameter` are not for descriptions. The constructor takes SI numbers, and what a description
+    `Parameter` are not for descriptions; one that a base class declares can have another default,
+    as ``pitch: float = 5e-6``. The constructor takes SI numbers, and what a description
     would give: text with units, and mappings for parts.
 
     Attributes
@@ -88,8 +89,7 @@ class Part:
         for base in reversed(cls.__mro__[1:]):
             annotations |= vars(base).get("_annotations", {})
         for name, annotation in own.items():
-            if _parameter(annotation) is None:
-                annotations.pop(name, None)
+            if _parameter(annotation) is None:  # an inherited field keeps its declaration
                 continue
             annotations[name] = annotation
             # The dataclass, `help` and signatures see the plain type.
@@ -132,6 +132,20 @@ class Part:
     def completed(cls, data: Any, from_file: bool) -> Any:
         """Return the section's data with what follows from them; numbers from a file need units."""
         return data
+
+    @classmethod
+    def number(
+        cls, data: Mapping[str, Any], name: str, from_file: bool, default: float | None = None
+    ) -> float:
+        """Return the SI number of a field in a section's data, by default the field's default."""
+        if name not in data:
+            return getattr(cls, name) if default is None else default
+        quantity = cls.parameter(name).quantity
+        assert quantity is not None
+        try:
+            return quantity.parse(data[name], si=not from_file)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
     def stated(self) -> dict[str, Any]:
         """Return the fields that were given, by name, with the kind."""
@@ -200,6 +214,8 @@ class Part:
         plain = _section(cls).dump_python(cls.defaults(), mode="json", warnings=False)
         for name, default in plain.items():
             json["properties"][name]["default"] = default
+        if required := [name for name in cls.declared() if name not in plain]:
+            json["required"] = required
         return json | {"title": cls.__name__, "description": first_sentence(cls)}
 
 
@@ -384,11 +400,11 @@ def first_sentence(part: type) -> str:
 
 
 def _fields_of(part: Any) -> TypeAdapter[Any]:
-    defaults = part.defaults()
+    # Which fields must be given is checked where a part is made.
     fields: dict[str, Any] = {"kind": NotRequired[Literal[part.kind]]} if part.kind else {}
     for name in _keys(part):
         if annotation := part._annotations.get(name):
-            fields[name] = NotRequired[annotation] if name in defaults else annotation
+            fields[name] = NotRequired[annotation]
     typed_dict: Any = TypedDict
     section = typed_dict(part.__name__, fields)
     section.__pydantic_config__ = _CONFIG

@@ -20,5 +20,11 @@ from .regions import (
     shared_pixels as shared_pixels,
 )
 from .scene import ENERGY_UNITS as ENERGY_UNITS, Scene as Scene, is_gap as is_gap
-from .tool import Chamfer as Chamfer, Hone as Hone, Tool as Tool, ToolGeometry as ToolGeometry
+from .tool import (
+    Chamfer as Chamfer,
+    Hone as Hone,
+    Tool as Tool,
+    ToolGeometry as ToolGeometry,
+    Wedge as Wedge,
+)
 from .tool_outline import ToolOutline as ToolOutline, ToolOutlineError as ToolOutlineError

@@ -22,10 +22,9 @@ from chipglow.camera import (
 )
 from chipglow.io.column_file import read_response
 from chipglow.quantities import FileBeside, Parameter, Part, made_from, unchecked
-from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS
+from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS, InSI, is_number
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
-from chipglow.study.scaling import with_pitch
 from chipglow.text import read_yaml
 
 PAPER_BAND: Final = 3.8e-6, 5.1e-6
@@ -33,6 +32,9 @@ PAPER_BAND: Final = 3.8e-6, 5.1e-6
 _FILE: Final = Path(__file__).with_name("cameras.yaml")
 CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)
 """Fields of the section by the names of cameras, each with its source."""
+
+_SAME_PITCH: Final = 1e-6
+"""Largest relative difference of two pitches that are the same but for rounding."""
 
 FROM_DETECTOR: Final = "detector"
 """A lower range limit that follows from the detector."""
@@ -65,7 +67,7 @@ class CameraModel(Part):
 class CameraSection(CameraSettings, CameraModel):
     """The infrared camera."""
 
-    psf_order: Annotated[Literal["optics", "detector"], Camera.parameter("psf_order")] = "detector"
+    psf_order: Literal["optics", "detector"] = "detector"
     detector_pitch: Annotated[
         float | None,
         Parameter(
@@ -146,10 +148,29 @@ class CameraSection(CameraSettings, CameraModel):
                 "magnification: cannot be combined with pitch, which is the distance on the scene; "
                 "give the distance on the detector as detector_pitch"
             )
-        camera = _of_its_band(with_pitch(data, from_file), from_file)
+        camera = _of_its_band(cls.with_pitch(data, from_file), from_file)
         if camera.get("detector") not in (None, "none") and "lower_limit" not in data:
             return {**camera, "lower_limit": "detector"}
         return camera
+
+    @classmethod
+    def with_pitch(cls, data: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
+        """Return the data with the pitch on the scene that follows from the data sheet."""
+        magnification = data.get("magnification")
+        if data.get("detector_pitch") in (None, "none"):
+            return dict(data)
+        if not is_number(magnification):
+            raise ValueError("magnification: must be given with detector_pitch")
+        if not magnification > 0:
+            raise ValueError(f"magnification: {magnification:g}, must be positive")
+        pitch = cls.number(data, "detector_pitch", from_file) / magnification
+        given = cls.number(data, "pitch", from_file, pitch)
+        if abs(given - pitch) > _SAME_PITCH * pitch:
+            raise ValueError(
+                f"pitch: {data['pitch']} contradicts detector_pitch / magnification, "
+                f"{LENGTH.text(pitch)}; state only one of them"
+            )
+        return {**data, "magnification": float(magnification), "pitch": InSI(pitch)}
 
     def build(self, seed: int = 2010) -> Camera:
         """Return the camera with its array, or with as many pixels as see a scene.
@@ -212,5 +233,4 @@ def _of_its_band(camera: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
         band = PAPER_BAND
     if band == PAPER_BAND:
         return dict(camera)
-    psf = {"kind": AnnularAperturePSF.kind, "wavelength": "none"}
-    return {"psf": psf, "lower_limit": "none", **camera}
+    return {"psf": AnnularAperturePSF(wavelength=None), "lower_limit": None, **camera}
