@@ -251,7 +251,7 @@ class Laboratory:
         own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
         radiance = self.emissivity * own + (1 - self.emissivity) * reflected
         raster = Raster(0.0, 0.0, PITCH / SAMPLES, *radiance.shape)
-        return camera.Camera(BAND, PITCH, psf=self.optics.psf).form_image(radiance, raster)
+        return camera.Camera(BAND, pitch=PITCH, psf=self.optics.psf).form_image(radiance, raster)
 
     def _edge(self, normal):
         """Return each pixel's radiance of a hot plate half behind a warm blade."""

@@ -112,7 +112,7 @@ REFUSED = {
     "and working_f_number can be combined": lambda: Pupil(numerical_aperture=0.3, f_number=2.0),
     "bands: .* the band of the shorter wavelengths": lambda: RatioThermometer(LONG, SHORT),
     "the band of the shorter wavelengths first": lambda: RatioPair(*TWO[::-1]),
-    "pitch is .* both must be the same": lambda: RatioPair(TWO[0], Camera(LONG, 5e-6)),
+    "pitch is .* both must be the same": lambda: RatioPair(TWO[0], Camera(LONG, pitch=5e-6)),
     "shape is .* both must be the same": lambda: RatioPair(TWO[0], replace(TWO[1], shape=(3, 3))),
     "shift": lambda: RatioPair(*TWO, shift=(np.nan, 0.0)),
     "delay": lambda: RatioPair(*TWO, delay=np.inf),

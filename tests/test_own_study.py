@@ -9,7 +9,14 @@ import typer
 from analytic_chip import AnalyticChip
 
 from chipglow.analysis import Plan, analyse
-from chipglow.camera import AnnularAperturePSF, Camera
+from chipglow.camera import (
+    AnnularAperturePSF,
+    Camera,
+    CameraSettings,
+    Detector,
+    RangeResponse,
+    Veil,
+)
 from chipglow.cli import progress
 from chipglow.quantities import adapter, changed, value_at
 from chipglow.radiometry import Band
@@ -156,6 +163,10 @@ def test_a_response_file_weighs_the_band(tmp_path):
         ({"pitch": "15 um", "magnification": 4}, "cannot be combined with pitch"),
         ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, must be positive"),
         ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "magnification, 6 um"),
+        (
+            {"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 s"},
+            "camera: pitch: '5 s' is not a length",
+        ),
         ({"preset": "lepton"}, "'lepton' is unknown, expected one of flir-lepton-3"),
         ({"preset": {}}, "{} is unknown, expected one of flir-lepton-3"),
         ({"preset": "alpha-nir"}, "magnification: must be given"),
@@ -372,3 +383,24 @@ def test_what_is_stated_stays_when_another_setting_changes():
     study = Study(cutting={"feed": "0.1 mm", "field_of_view": view})
     other = changed(study, {"cutting.feed": "0.2 mm"})
     assert (other.cutting.field_of_view.rows, other.cutting.field_of_view.columns) == (300, 300)
+
+
+def test_the_camera_of_a_study_has_its_settings_and_checks_them_with_each_other():
+    settings = {
+        "pitch": 7e-6,
+        "fill_factor": 0.8,
+        "psf_order": "optics",
+        "integration_time": 9e-6,
+        "frame_rate": 500.0,
+        "line_time": 1e-6,
+        "time_constant": 1e-3,
+        "reflected": 300.0,
+        "optics": (Veil(0.02, 1e-4),),
+        "detector": Detector(response=RangeResponse(900.0)),
+    }
+    assert settings.keys() == CameraSettings.declared().keys()
+    section = Study(camera={**settings, "lower_limit": "none"}).camera
+    psf = AnnularAperturePSF()
+    assert section.build(seed=3) == Camera(psf=psf, seed=3, **settings)
+    with pytest.raises(ValueError, match=r"camera: Camera.line_time: 1 s is longer than the frame"):
+        Study(camera={"line_time": 1.0})

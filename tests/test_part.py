@@ -9,14 +9,14 @@ from typing import Annotated
 import jsonschema
 import pytest
 import yaml
-from pydantic import ValidationError
+from pydantic import AfterValidator, ValidationError
 
 from chipglow import quantities
 from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
 from chipglow.io import ImportDescription, import_text
 from chipglow.laboratory.recordings import MeasurementDescription, measurement_text
-from chipglow.quantities import Family, Parameter, Part, adapter, problem
-from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.quantities import Family, Parameter, Part, adapter, made_from, problem
+from chipglow.quantities.units import LENGTH, TEMPERATURE, InSI
 from chipglow.study import Study, study_text
 from chipglow.text import commented_yaml, json_schema
 
@@ -90,6 +90,67 @@ def test_si_numbers_pass_from_python_only():
     with pytest.raises(ValidationError, match="has no unit"):
         read_from_file({"width": 1.5})
     assert read_from_file({"width": "1.5 m"}) == Shelf(1.5)
+
+
+def test_a_field_is_validated_once():
+    seen = []
+
+    def noted(width):
+        seen.append(width)
+        return width
+
+    @dataclass(frozen=True)
+    class Board(Part):
+        """A board."""
+
+        width: Annotated[float, Parameter("Of it.", LENGTH), AfterValidator(noted)] = 1.0
+
+    @dataclass(frozen=True)
+    class Case(Part):
+        """A case."""
+
+        board: Annotated[Board, Parameter("In it.")]
+
+    @dataclass(frozen=True)
+    class Plank(Board):
+        """A board with a length."""
+
+        length: Annotated[float, Parameter("Of it.", LENGTH, most=9.0)] = 1.0
+
+    for make in (
+        lambda: Board(2.0),
+        lambda: Case({"width": "2 m"}),
+        lambda: adapter(Case).validate_python({"board": {"width": "2 m"}}, context={"folder": "."}),
+        lambda: made_from(Plank, Board(2.0), length="3 m"),
+    ):
+        seen.clear()
+        made = make()
+        assert seen == [2.0]
+    assert (made, made.given) == (Plank(2.0, 3.0), {"width", "length"})
+    with pytest.raises(ValueError, match=r"Plank.length: 30 m, expected .* up to 9 m"):
+        made_from(Plank, Board(2.0), length=30.0)
+
+
+def test_a_field_with_another_default_keeps_its_declaration():
+    @dataclass(frozen=True)
+    class Wide(Shelf):
+        """A wide shelf."""
+
+        width: float = 1.8
+
+    assert (Wide().width, Wide("50 cm").width) == (1.8, 0.5)
+    assert Wide.parameter("width") == Shelf.parameter("width")
+    assert list(Wide.declared()) == ["width", "boards", "warmth"]
+    with pytest.raises(ValueError, match=r"Wide.width: 3 m, expected more than 0 m, up to 2 m"):
+        Wide(3.0)
+
+
+def test_a_number_that_follows_from_others_needs_no_unit_but_is_checked():
+    assert read_from_file({"width": InSI(1.5)}) == read({"width": InSI(1.5)}) == Shelf(1.5)
+    assert type(read_from_file({"width": InSI(1.5)}).width) is float
+    for reader, message in ((read_from_file, "up to 2000000 um"), (read, "up to 2 m")):
+        with pytest.raises(ValidationError, match=message):
+            reader({"width": InSI(3.0)})
 
 
 def test_help_shows_plain_types():

@@ -12,6 +12,7 @@ from chipglow.camera.calibration import (
 from chipglow.camera.camera import (
     PAPER_LIMIT as PAPER_LIMIT,
     Camera as Camera,
+    CameraSettings as CameraSettings,
     ChipglowWarning as ChipglowWarning,
 )
 from chipglow.camera.chain import (

@@ -1,7 +1,7 @@
 """The virtual infrared camera."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache, partial
 from math import exp
 from typing import Annotated, Final, Literal
@@ -22,7 +22,7 @@ from chipglow.camera.optics.convolution import Beyond, images, without_rounding
 from chipglow.camera.optics.image_formation import Gather, ImageFormation, sensitive_fraction
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
-from chipglow.camera.optics.terms import OpticsTerm
+from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
 from chipglow.quantities import Array, Parameter, Part
 from chipglow.quantities.units import FREQUENCY, LENGTH, TIME, Position
 from chipglow.radiometry import Band
@@ -48,54 +48,17 @@ class ChipglowWarning(UserWarning):
     """A valid setting that is probably a mistake, such as °C instead of K."""
 
 
-@dataclass(frozen=True)
-class Camera(Part):
-    """An infrared camera (Figure 6 of Heigel and Whitenton, 2010).
+@dataclass(frozen=True, kw_only=True)
+class CameraSettings(Part):
+    """Settings of a camera that a study states as `Camera` takes them."""
 
-    The default camera has no lower range limit. Its point spread function is the diffraction of a
-    reflecting objective in the camera's band. `paper` returns the paper's camera.
-
-    Raises
-    ------
-    ValueError
-        If a value is out of its limits; the message names field, value and limits.
-
-    Warns
-    -----
-    ChipglowWarning
-        If the lower range limit is probably in °C instead of K.
-    """
-
-    band: Annotated[Band, Parameter("Spectral band; the paper's by default.")] = field(
-        default_factory=lambda: Band(3.8e-6, 5.1e-6)
-    )
     pitch: Annotated[
         float, Parameter("Distance between pixels on the scene.", LENGTH, most=1e-2)
     ] = 6e-6
-    shape: Annotated[
-        tuple[int, int] | None,
-        Parameter(
-            "Rows and columns of pixels; None: all whole pixels that fit the scene.", least=1
-        ),
-    ] = None
-    offset: Annotated[
-        tuple[Position, Position],
-        Parameter(
-            "Corner of the first pixel in m, right and down from the scene's upper left corner.",
-            least=0.0,
-        ),
-    ] = (0.0, 0.0)
     fill_factor: Annotated[
         float,
         Parameter("Sensitive fraction of the pixel area, a centred square.", over=0.0, most=1.0),
     ] = 1.0
-    psf: Annotated[
-        PointSpreadFunction | None,
-        Parameter(
-            "Point spread function; None: an ideal camera. If it includes the footprint, a pixel "
-            "samples the blurred image at its centre instead of integrating it."
-        ),
-    ] = field(default_factory=partial(AnnularAperturePSF, None))
     psf_order: Annotated[
         Literal["optics", "detector"],
         Parameter(
@@ -121,17 +84,11 @@ class Camera(Part):
             TIME,
         ),
     ] = None
-    lower_limit: Annotated[
-        float | None,
-        in_tables(
-            "Lower range limit: lower radiance temperatures are flagged, not returned; or none."
-        ),
-    ] = None
     reflected: Annotated[
         float | None, in_tables("Reflected apparent temperature; none: dark surroundings.")
     ] = None
     optics: Annotated[
-        tuple[OpticsTerm, ...],
+        tuple[Annotated[OpticsTerm, OPTICS_TERMS], ...],
         Parameter("Other effects of the optics, in the order in which light meets them."),
     ] = ()
     detector: Annotated[
@@ -141,6 +98,56 @@ class Camera(Part):
             allowed="none, or such as\n"
             "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
             "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True)
+class Camera(CameraSettings):
+    """An infrared camera (Figure 6 of Heigel and Whitenton, 2010).
+
+    The default camera has no lower range limit. Its point spread function is the diffraction of a
+    reflecting objective in the camera's band. `paper` returns the paper's camera.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its limits; the message names field, value and limits.
+
+    Warns
+    -----
+    ChipglowWarning
+        If the lower range limit is probably in °C instead of K.
+    """
+
+    band: Annotated[Band, Parameter("Spectral band; the paper's by default.")] = field(
+        default_factory=lambda: Band(3.8e-6, 5.1e-6)
+    )
+    _: KW_ONLY
+    shape: Annotated[
+        tuple[int, int] | None,
+        Parameter(
+            "Rows and columns of pixels; None: all whole pixels that fit the scene.", least=1
+        ),
+    ] = None
+    offset: Annotated[
+        tuple[Position, Position],
+        Parameter(
+            "Corner of the first pixel in m, right and down from the scene's upper left corner.",
+            least=0.0,
+        ),
+    ] = (0.0, 0.0)
+    psf: Annotated[
+        PointSpreadFunction | None,
+        Parameter(
+            "Point spread function; None: an ideal camera. If it includes the footprint, a pixel "
+            "samples the blurred image at its centre instead of integrating it."
+        ),
+    ] = field(default_factory=partial(AnnularAperturePSF, None))
+    lower_limit: Annotated[
+        float | None,
+        in_tables(
+            "Lower range limit: lower radiance temperatures are flagged, not returned; or none."
         ),
     ] = None
     seed: Annotated[

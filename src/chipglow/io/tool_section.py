@@ -9,9 +9,9 @@ from pydantic import AfterValidator
 
 from chipglow.cutting import material_names, tool_material
 from chipglow.io.column_file import read_polyline
-from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, made_from
 from chipglow.quantities.units import Position
-from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline, ToolOutlineError
+from chipglow.scene import Tool, ToolGeometry, ToolOutline, ToolOutlineError, Wedge
 from chipglow.text import load_described
 
 
@@ -21,16 +21,9 @@ def _known(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class ToolSection(Part):
+class ToolSection(Wedge):
     """The cutting tool."""
 
-    rake_angle: Annotated[float, ToolGeometry.parameter("rake_angle")] = ToolGeometry.rake_angle
-    clearance_angle: Annotated[float, ToolGeometry.parameter("clearance_angle")] = (
-        ToolGeometry.clearance_angle
-    )
-    edge_radius: Annotated[float, ToolGeometry.parameter("edge_radius")] = ToolGeometry.edge_radius
-    chamfer: Annotated[Chamfer | None, ToolGeometry.parameter("chamfer")] = None
-    hone: Annotated[Hone | None, ToolGeometry.parameter("hone")] = None
     outline: Annotated[
         FileBeside | None,
         Parameter(
@@ -48,9 +41,9 @@ class ToolSection(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         given = "outline" if self.outline else "hone" if self.hone else ""
-        unused = {"outline": ToolGeometry.declared(), "hone": ["edge_radius"]}.get(given, [])
+        unused = {"outline": Wedge.declared(), "hone": ["edge_radius"]}.get(given, [])
         for name in unused:
-            if getattr(self, name) != getattr(ToolGeometry, name):
+            if getattr(self, name) != getattr(Wedge, name):
                 raise ValueError(f"{name}: cannot be combined with {given}, give only one of them")
         self.build()
 
@@ -61,7 +54,7 @@ class ToolSection(Part):
                 return read_tool_outline(self.outline)
             except ValueError as error:
                 raise ValueError(f"outline: {error}") from None
-        return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.declared()})
+        return made_from(ToolGeometry, self)
 
 
 @dataclass(frozen=True)

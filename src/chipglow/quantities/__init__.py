@@ -15,6 +15,7 @@ from chipglow.quantities.part import (
     Typed as Typed,
     adapter as adapter,
     beside_the_study as beside_the_study,
+    made_from as made_from,
     of_other_packages as of_other_packages,
     problem as problem,
     unchecked as unchecked,

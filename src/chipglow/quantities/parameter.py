@@ -19,7 +19,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from chipglow.quantities.units import Quantity, is_bare_number
+from chipglow.quantities.units import Quantity, is_bare_number, is_number
 
 NONE: Final = "none"
 """How descriptions write None."""
@@ -157,7 +157,7 @@ class Parameter:
         if isinstance(value, tuple):
             for one in value:
                 self._check(one, text)
-        elif type(value) in (int, float) and not self._holds(value):
+        elif is_number(value) and not self._holds(value):
             if self.allowed:
                 raise ValueError(f"{self._text(value)}, expected {self.allowed}")
             raise ValueError(f"{text(value)}, expected {self._limits(text)}")

@@ -4,7 +4,6 @@ import inspect
 import re
 import reprlib
 from collections.abc import Callable, Iterator, Mapping
-from copy import copy
 from dataclasses import MISSING, fields as dataclass_fields
 from difflib import get_close_matches
 from functools import cache, reduce
@@ -54,7 +53,8 @@ class Part:
 
     From this one declaration come the check of the values, the section of descriptions with its
     comments, errors and JSON schema, and the parameters in the documentation. Fields without a
-    `Parameter` are not for descriptions. The constructor takes SI numbers, and what a description
+    `Parameter` are not for descriptions; one that a base class declares can have another default,
+    as ``pitch: float = 5e-6``. The constructor takes SI numbers, and what a description
     would give: text with units, and mappings for parts.
 
     Attributes
@@ -89,8 +89,7 @@ class Part:
         for base in reversed(cls.__mro__[1:]):
             annotations |= vars(base).get("_annotations", {})
         for name, annotation in own.items():
-            if _parameter(annotation) is None:
-                annotations.pop(name, None)
+            if _parameter(annotation) is None:  # an inherited field keeps its declaration
                 continue
             annotations[name] = annotation
             # The dataclass, `help` and signatures see the plain type.
@@ -103,29 +102,50 @@ class Part:
     def __new__(cls, *args: Any, **values: Any) -> Self:
         """Note which fields are given."""
         part = super().__new__(cls)
-        names = [name for name, one in getattr(cls, "__dataclass_fields__", {}).items() if one.init]
+        fields = getattr(cls, "__dataclass_fields__", {}).items()
+        names = [name for name, one in fields if one.init and not one.kw_only]
         object.__setattr__(part, "given", frozenset([*names[: len(args)], *values]))
         return part
 
     def __post_init__(self) -> None:
-        values = {
+        """Check the given fields, and hold their values in SI."""
+        reading, checked = (vars(self).pop(name, None) for name in ("_reading", "_checked"))
+        stated = {
             name: value.item() if isinstance(value := getattr(self, name), np.generic) else value
             for name in self._annotations
+            if name in self.given and name not in (checked or ())
         }
-        given = {name: value for name, value in values.items() if name in self.given}
+        if reading is None:
+            stated |= self.completed(stated, False)
+        context = None if reading is None else reading.context
         try:
-            completed = self.completed(given, False)
-            read = _section(type(self)).validate_python({**values, **completed})
+            values = _section(type(self)).validate_python(stated, context=context)
         except ValidationError as error:
+            if reading is not None:
+                raise
             raise ValueError(f"{type(self).__name__}.{problem(error)}") from None
-        for name in read.keys() & self._annotations.keys():
-            object.__setattr__(self, name, read[name])
-        object.__setattr__(self, "given", self.given | completed.keys())
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "given", self.given | values.keys())
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
         """Return the section's data with what follows from them; numbers from a file need units."""
         return data
+
+    @classmethod
+    def number(
+        cls, data: Mapping[str, Any], name: str, from_file: bool, default: float | None = None
+    ) -> float:
+        """Return the SI number of a field in a section's data, by default the field's default."""
+        if name not in data:
+            return getattr(cls, name) if default is None else default
+        quantity = cls.parameter(name).quantity
+        assert quantity is not None
+        try:
+            return quantity.parse(data[name], si=not from_file)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
     def stated(self) -> dict[str, Any]:
         """Return the fields that were given, by name, with the kind."""
@@ -165,15 +185,19 @@ class Part:
             from_file = bool(info.context)
             data = _known_keys(cls.completed({} if data is None else data, from_file), cls)
             _check_complete(data, cls)
-            values = _section(cls).validate_python(data, context=info.context)
-            if cls.kind:
-                values.pop("kind", None)
+            values = dict(data)
+            if cls.kind and (kind := values.pop("kind", cls.kind)) != cls.kind:
+                raise ValueError(f"kind: {kind!r}, expected {cls.kind!r}")
+            part = cls.__new__(cls, **values)
+            # The constructor checks the fields: by the rules of a description, and only once.
+            object.__setattr__(part, "_reading", info)
             try:
-                return cls(**values)
+                part.__init__(**values)  # type: ignore[misc]
             except OSError as error:  # name the field of a file that cannot be read
-                named = [key for key, one in values.items() if str(one) == str(error.filename)]
+                named = [key for key in values if str(getattr(part, key)) == str(error.filename)]
                 place = ": ".join([*named, str(error.filename)])
                 raise ValueError(f"{place}: {error.strerror}, expected a file") from None
+            return part
 
         def written(part: Part, info: SerializationInfo) -> Any:
             values = {name: getattr(part, name) for name in _keys(cls)}
@@ -190,13 +214,26 @@ class Part:
         plain = _section(cls).dump_python(cls.defaults(), mode="json", warnings=False)
         for name, default in plain.items():
             json["properties"][name]["default"] = default
+        if required := [name for name in cls.declared() if name not in plain]:
+            json["required"] = required
         return json | {"title": cls.__name__, "description": first_sentence(cls)}
+
+
+def made_from(kind: type[PartType], checked: "Part", **values: Any) -> PartType:
+    """Return a part with the fields that another part has too and has checked, and with values."""
+    names = kind.declared().keys() & checked.declared().keys() - values.keys()
+    shared = {name: getattr(checked, name) for name in names}
+    part = kind.__new__(kind, **shared, **values)
+    object.__setattr__(part, "_checked", names)
+    part.__init__(**shared, **values)  # type: ignore[misc]
+    return part
 
 
 def unchecked(part: PartType, **values: Any) -> PartType:
     """Return a copy of a part with other values, which nothing checks."""
-    made = copy(part)
-    for name, value in (values | {"given": part.given | values.keys()}).items():
+    made = object.__new__(type(part))
+    kept = {one.name: getattr(part, one.name) for one in dataclass_fields(part)}
+    for name, value in {**kept, **values, "given": part.given | values.keys()}.items():
         object.__setattr__(made, name, value)
     return made
 
@@ -363,11 +400,11 @@ def first_sentence(part: type) -> str:
 
 
 def _fields_of(part: Any) -> TypeAdapter[Any]:
-    defaults = part.defaults()
+    # Which fields must be given is checked where a part is made.
     fields: dict[str, Any] = {"kind": NotRequired[Literal[part.kind]]} if part.kind else {}
     for name in _keys(part):
         if annotation := part._annotations.get(name):
-            fields[name] = NotRequired[annotation] if name in defaults else annotation
+            fields[name] = NotRequired[annotation]
     typed_dict: Any = TypedDict
     section = typed_dict(part.__name__, fields)
     section.__pydantic_config__ = _CONFIG

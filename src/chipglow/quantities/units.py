@@ -6,7 +6,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias, TypeGuard, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,6 +95,12 @@ def parse_unit(text: str, base: str, name: str) -> Unit:
         raise ValueError(f"unknown unit {text[:60]!r} of {name}, {expected}") from None
 
 
+class InSI(float):
+    """A number in SI units that follows from other settings, where a file must state a unit."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Kind and unit of a setting: an annotation of fields that read text and hold SI floats.
@@ -124,7 +130,7 @@ class Quantity:
 
     def parse(self, value: object, si: bool = False) -> float:
         """Return the SI number of a text such as ``10 us``; if `si`, also of an SI number."""
-        if si and isinstance(value, int | float) and not isinstance(value, bool):
+        if isinstance(value, InSI) or (si and is_number(value)):
             return self._checked(f"{value} {self.base}", float(value))
         if is_bare_number(value):
             raise ValueError(f"{value} has no unit, {self.expected}")
@@ -228,6 +234,11 @@ def is_bare_number(value: object) -> bool:
     """Return whether a value from a YAML file is a number without a unit."""
     if isinstance(value, str):
         return _BARE.fullmatch(value) is not None
+    return is_number(value)
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a number; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

@@ -26,5 +26,11 @@ from .scene_summary import (
     SceneSummary as SceneSummary,
     scene_summary as scene_summary,
 )
-from .tool import Chamfer as Chamfer, Hone as Hone, Tool as Tool, ToolGeometry as ToolGeometry
+from .tool import (
+    Chamfer as Chamfer,
+    Hone as Hone,
+    Tool as Tool,
+    ToolGeometry as ToolGeometry,
+    Wedge as Wedge,
+)
 from .tool_outline import ToolOutline as ToolOutline, ToolOutlineError as ToolOutlineError

@@ -1,10 +1,13 @@
 """The regular grid of a scene's samples (the paper's sub-pixels)."""
 
 from dataclasses import dataclass
-from math import isfinite
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import LENGTH, POSITION
 
 
 def check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) -> None:
@@ -14,17 +17,8 @@ def check_shape(name: str, found: tuple[int, ...], expected: tuple[int, ...]) ->
 
 
 @dataclass(frozen=True)
-class Raster:
+class Raster(Part):
     """A regular grid of square samples, row 0 at the top.
-
-    Parameters
-    ----------
-    left, top : float
-        Outer corner of the first sample in m.
-    spacing : float
-        Side of a sample in m.
-    rows, columns : int
-        Number of samples down and across.
 
     Raises
     ------
@@ -32,19 +26,11 @@ class Raster:
         If a number is not finite, or spacing or a count is not positive.
     """
 
-    left: float
-    top: float
-    spacing: float
-    rows: int
-    columns: int
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.left) and isfinite(self.top)):
-            raise ValueError(f"raster: corner must be finite, got {self.left!r}, {self.top!r}")
-        if not (isfinite(self.spacing) and self.spacing > 0):
-            raise ValueError(f"raster: spacing must be positive, got {self.spacing!r}")
-        if self.rows < 1 or self.columns < 1:
-            raise ValueError(f"raster: expected 1 sample or more, got {self.rows} x {self.columns}")
+    left: Annotated[float, Parameter("Left edge of the scene.", POSITION)]
+    top: Annotated[float, Parameter("Upper edge of the scene.", POSITION)]
+    spacing: Annotated[float, Parameter("Side of a sample.", LENGTH)]
+    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)]
+    columns: Annotated[int, Parameter("Samples from left to right.", least=1)]
 
     @property
     def x(self) -> NDArray[np.float64]:

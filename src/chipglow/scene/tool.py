@@ -182,18 +182,8 @@ class Hone(Part):
 
 
 @dataclass(frozen=True)
-class ToolGeometry(Tool, Part):
-    """A wedge with a prepared edge: rounded, chamfered or honed.
-
-    The circle of the rounded edge touches the lines x = 0 and y = 0; so do the circle of a
-    chamfer's lower corner and the ellipse of a hone.
-
-    Raises
-    ------
-    ValueError
-        If an angle or a length is impossible, if no land is left between the rounded corners of
-        the chamfer, or if there are both a chamfer and a hone.
-    """
+class Wedge(Part):
+    """Angles and edge of a tool."""
 
     rake_angle: Annotated[
         float,
@@ -232,6 +222,22 @@ class ToolGeometry(Tool, Part):
             allowed="none, or {rake: 40 um, clearance: 20 um}",
         ),
     ] = None
+
+
+@dataclass(frozen=True)
+class ToolGeometry(Wedge, Tool):
+    """A wedge with a prepared edge: rounded, chamfered or honed.
+
+    The circle of the rounded edge touches the lines x = 0 and y = 0; so do the circle of a
+    chamfer's lower corner and the ellipse of a hone.
+
+    Raises
+    ------
+    ValueError
+        If an angle or a length is impossible, if no land is left between the rounded corners of
+        the chamfer, or if there are both a chamfer and a hone.
+    """
+
     tip: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:

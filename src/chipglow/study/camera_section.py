@@ -2,31 +2,29 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from chipglow.camera import (
     BLURS,
-    OPTICS_TERMS,
     PAPER_LIMIT,
     PSFS,
     AnnularAperturePSF,
     BlurredPSF,
     BlurTerm,
     Camera,
-    Detector,
+    CameraSettings,
     OperationPoint,
-    OpticsTerm,
     PointSpreadFunction,
     PSFChoice,
     lower_range_limit,
 )
 from chipglow.io.column_file import read_response
-from chipglow.quantities import FileBeside, Parameter, Part
-from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS
+from chipglow.quantities import FileBeside, Parameter, Part, made_from, unchecked
+from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS, InSI, is_number
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
-from chipglow.study.scaling import with_pitch
 from chipglow.text import read_yaml
 
 PAPER_BAND: Final = 3.8e-6, 5.1e-6
@@ -35,13 +33,16 @@ _FILE: Final = Path(__file__).with_name("cameras.yaml")
 CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)
 """Fields of the section by the names of cameras, each with its source."""
 
+_SAME_PITCH: Final = 1e-6
+"""Largest relative difference of two pitches that are the same but for rounding."""
+
 FROM_DETECTOR: Final = "detector"
 """A lower range limit that follows from the detector."""
 
 
 @dataclass(frozen=True)
-class CameraSection(Part):
-    """The infrared camera."""
+class CameraModel(Part):
+    """Which camera it is."""
 
     preset: Annotated[
         str | None,
@@ -60,7 +61,13 @@ class CameraSection(Part):
             allowed="none, or a file such as response.csv",
         ),
     ] = None
-    pitch: Annotated[float, Camera.parameter("pitch")] = Camera.pitch
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraSection(CameraSettings, CameraModel):
+    """The infrared camera."""
+
+    psf_order: Literal["optics", "detector"] = "detector"
     detector_pitch: Annotated[
         float | None,
         Parameter(
@@ -84,7 +91,6 @@ class CameraSection(Part):
             allowed="none, or such as [640, 512]",
         ),
     ] = None
-    fill_factor: Annotated[float, Camera.parameter("fill_factor")] = Camera.fill_factor
     offset_right: Annotated[
         float | None,
         Parameter(
@@ -108,16 +114,6 @@ class CameraSection(Part):
         tuple[Annotated[BlurTerm, BLURS], ...],
         Parameter("Other blurs, a list: they are part of the point spread function."),
     ] = ()
-    optics: Annotated[
-        tuple[Annotated[OpticsTerm, OPTICS_TERMS], ...], Camera.parameter("optics")
-    ] = ()
-    psf_order: Annotated[Literal["optics", "detector"], Camera.parameter("psf_order")] = "detector"
-    integration_time: Annotated[float, Camera.parameter("integration_time")] = (
-        Camera.integration_time
-    )
-    frame_rate: Annotated[float, Camera.parameter("frame_rate")] = Camera.frame_rate
-    line_time: Annotated[float | None, Camera.parameter("line_time")] = None
-    time_constant: Annotated[float | None, Camera.parameter("time_constant")] = None
     lower_limit: Annotated[
         float | Literal["detector"] | None,
         replace(
@@ -127,12 +123,10 @@ class CameraSection(Part):
             allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
     ] = PAPER_LIMIT
-    reflected: Annotated[float | None, Camera.parameter("reflected")] = None
-    detector: Annotated[Detector | None, Camera.parameter("detector")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.build()
+        _ = self._camera  # refuses settings that contradict each other
 
     @classmethod
     def completed(cls, data: Any, from_file: bool) -> Any:
@@ -154,31 +148,40 @@ class CameraSection(Part):
                 "magnification: cannot be combined with pitch, which is the distance on the scene; "
                 "give the distance on the detector as detector_pitch"
             )
-        camera = _of_its_band(with_pitch(data, from_file), from_file)
+        camera = _of_its_band(cls.with_pitch(data, from_file), from_file)
         if camera.get("detector") not in (None, "none") and "lower_limit" not in data:
             return {**camera, "lower_limit": "detector"}
         return camera
+
+    @classmethod
+    def with_pitch(cls, data: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
+        """Return the data with the pitch on the scene that follows from the data sheet."""
+        magnification = data.get("magnification")
+        if data.get("detector_pitch") in (None, "none"):
+            return dict(data)
+        if not is_number(magnification):
+            raise ValueError("magnification: must be given with detector_pitch")
+        if not magnification > 0:
+            raise ValueError(f"magnification: {magnification:g}, must be positive")
+        pitch = cls.number(data, "detector_pitch", from_file) / magnification
+        given = cls.number(data, "pitch", from_file, pitch)
+        if abs(given - pitch) > _SAME_PITCH * pitch:
+            raise ValueError(
+                f"pitch: {data['pitch']} contradicts detector_pitch / magnification, "
+                f"{LENGTH.text(pitch)}; state only one of them"
+            )
+        return {**data, "magnification": float(magnification), "pitch": InSI(pitch)}
 
     def build(self, seed: int = 2010) -> Camera:
         """Return the camera with its array, or with as many pixels as see a scene.
 
         `on` also places the array on a scene.
         """
-        band = Band(*self.band, None if self.response is None else read_response(self.response))
-        shared = Camera.declared().keys() & self.declared().keys()
-        made = {
-            **{name: getattr(self, name) for name in shared},
-            "band": band,
-            "offset": (self.offset_right or 0.0, self.offset_down or 0.0),
-            "shape": None if self.array is None else self.array[::-1],
-            "psf": self._psf(band),
-            "lower_limit": self._lower_limit(band),
-        }
-        return Camera(**made, seed=seed)
+        return unchecked(self._camera, seed=seed)
 
     def on(self, scene: Raster, seed: int = 2010) -> Camera:
         """Return the camera on a scene, with the pixels of its array that see it, centred."""
-        camera = replace(self.build(seed), shape=None)
+        camera = unchecked(self._camera, seed=seed, shape=None)
         if self.array is None:
             return camera
         whole = camera.pixels(scene)
@@ -188,7 +191,21 @@ class CameraSection(Part):
             right = (scene.columns * scene.spacing - columns * camera.pitch) / 2
         if self.offset_down is None and rows < whole.rows:
             down = (scene.rows * scene.spacing - rows * camera.pitch) / 2
-        return replace(camera, shape=(rows, columns), offset=(right, down))
+        return unchecked(camera, shape=(rows, columns), offset=(right, down))
+
+    @cached_property
+    def _camera(self) -> Camera:
+        """The camera with its whole array."""
+        band = Band(*self.band, None if self.response is None else read_response(self.response))
+        return made_from(
+            Camera,
+            self,
+            band=band,
+            offset=(self.offset_right or 0.0, self.offset_down or 0.0),
+            shape=None if self.array is None else self.array[::-1],
+            psf=self._psf(band),
+            lower_limit=self._lower_limit(band),
+        )
 
     def _lower_limit(self, band: Band) -> float | None:
         if self.lower_limit != FROM_DETECTOR:
@@ -216,5 +233,4 @@ def _of_its_band(camera: Mapping[str, Any], from_file: bool) -> dict[str, Any]:
         band = PAPER_BAND
     if band == PAPER_BAND:
         return dict(camera)
-    psf = {"kind": AnnularAperturePSF.kind, "wavelength": "none"}
-    return {"psf": psf, "lower_limit": "none", **camera}
+    return {"psf": AnnularAperturePSF(wavelength=None), "lower_limit": None, **camera}

@@ -21,8 +21,8 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
-from chipglow.quantities import Parameter, Part, beside_the_study
-from chipglow.quantities.units import LENGTH, POSITION, TEMPERATURE
+from chipglow.quantities import Parameter, beside_the_study, made_from
+from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.scene import Raster
 
 STEADY: Final = "steady"
@@ -30,28 +30,23 @@ STEADY: Final = "steady"
 
 
 @dataclass(frozen=True)
-class FieldOfViewSection(Part):
+class FieldOfViewSection(Raster):
     """Samples of the scene. The tip of the tool is near the origin, y points up."""
 
-    left: Annotated[float, Parameter("Left edge of the scene.", POSITION)] = -650e-6
-    top: Annotated[float, Parameter("Upper edge of the scene.", POSITION)] = 700e-6
+    left: float = -650e-6
+    top: float = 700e-6
     spacing: Annotated[
         float,
         Parameter(
             "Side of a sample. camera.pitch should be a whole multiple of it; the paper has 9.",
             LENGTH,
-            over=0.0,
         ),
     ] = 2 / 3e6
-    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)] = 1170
-    columns: Annotated[int, Parameter("Samples from left to right.", least=1)] = 1035
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.build()
+    rows: int = 1170
+    columns: int = 1035
 
     def build(self) -> Raster:
-        return Raster(self.left, self.top, self.spacing, self.rows, self.columns)
+        return made_from(Raster, self)
 
 
 @dataclass(frozen=True)

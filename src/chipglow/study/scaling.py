@@ -1,19 +1,21 @@
 """Defaults that follow from feed, rake angle, speed and exposure: view, window, cutting length."""
 
 from collections.abc import Iterable, Mapping
-from math import ceil, degrees, radians, tan
+from dataclasses import dataclass
+from math import ceil, degrees, tan
 from typing import Any, Final
 
-from chipglow.quantities.units import ANGLE, CUT_LENGTH, LENGTH, POSITION, SPEED, TIME, Quantity
+from chipglow.cutting import OutputWindow
+from chipglow.quantities.units import InSI
+from chipglow.study.camera_section import CameraSection
+from chipglow.study.cutting_section import CuttingSection, CutToolSection, FieldOfViewSection
 
-_FEED, _SPEED, _PITCH, _EXPOSURE = 0.3e-3, 250 / 60, 6e-6, 10e-6
-_RAKE: Final = radians(-7.0)
-_START, _END, _LENGTH = 1.579e-3, 1.958e-3, 2.6e-3
-_LEFT, _RIGHT, _BOTTOM, _TOP = -650e-6, 40e-6, -80e-6, 700e-6
+_RIGHT, _BOTTOM = 40e-6, -80e-6
+"""Right and lower edge of the paper's view in m."""
+
 _LEFT_A_DEGREE, _TOP_A_DEGREE = 6e-6, 15e-6
 """The chip is thicker and its contact longer by so much for each degree below the paper's rake."""
 
-_INTERVAL, _BAND = 0.2e-6, 10e-6
 _ACROSS: Final = 9
 """Samples along a pixel, as in the paper."""
 
@@ -22,6 +24,12 @@ _EXPOSURES: Final = 3.0
 
 _SUB_FRAMES: Final = 10
 """Frames that an exposure has at least."""
+
+_AFTER_WINDOW: Final = 1.05
+"""Cutting length relative to the end of the window, at least."""
+
+_ROUNDING: Final = 1e-6
+"""Part of a sample by which a view may exceed a whole number of them."""
 
 
 VIEWS: Final = ("window", "field_of_view")
@@ -59,67 +67,99 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
     window, view, tool = (cutting.get(name) or {} for name in ("window", "field_of_view", "tool"))
     if not all(isinstance(one, Mapping) for one in (camera, window, view, tool)):
         return dict(study)
-
-    def value(section: Mapping[str, Any], name: str, quantity: Quantity, default: float) -> float:
-        return quantity.parse(section[name], si=not from_file) if name in section else default
-
     try:
-        camera = with_pitch(camera, from_file)
-        exposure = value(camera, "integration_time", TIME, _EXPOSURE)
-        speed = value(cutting, "speed", SPEED, _SPEED)
-        ratio = value(cutting, "feed", CUT_LENGTH, _FEED) / _FEED
-        start = value(window, "start", CUT_LENGTH, ratio * _START)
-        travel = max(ratio * (_END - _START), _EXPOSURES * exposure * speed)
-        end = value(window, "end", CUT_LENGTH, start + travel)
-        pitch = value(camera, "pitch", LENGTH, _PITCH)
-        spacing = value(view, "spacing", LENGTH, pitch / _ACROSS)
-        rake = value(tool, "rake_angle", ANGLE, _RAKE)
-    except ValueError:
+        numbers = _Numbers.read(cutting, window, view, tool, camera, from_file)
+    except ValueError:  # which reading the field reports
         return dict(study)
-    slower = _SPEED / speed
-    length: dict[str, Any] = {}
-    times: dict[str, Any] = {}
-    grid: dict[str, Any] = {}
-    if ratio != 1.0 or exposure * speed > _END - _START:
-        times |= {"start": CUT_LENGTH.text(start), "end": CUT_LENGTH.text(end)}
-        length = {"cutting_length": CUT_LENGTH.text(max(ratio * _LENGTH, 1.05 * end))}
-    if ratio != 1.0 or slower != 1.0:
-        times["interval"] = TIME.text(min(ratio * slower * _INTERVAL, exposure / _SUB_FRAMES))
-    if exposure > _BAND:
-        times["band_duration"] = TIME.text(exposure)
-    if ratio != 1.0 or rake != _RAKE:
-        below = max(degrees(_RAKE - rake), 0.0)
-        left, top = _LEFT - below * _LEFT_A_DEGREE, _TOP + below * _TOP_A_DEGREE
-        width = max(_RIGHT, top * tan(rake) + _RIGHT) - left
-        grid = {
-            "left": POSITION.text(ratio * left),
-            "top": POSITION.text(ratio * top),
-            "spacing": LENGTH.text(spacing),
-            "rows": ceil(ratio * (top - _BOTTOM) / spacing - 1e-6),
-            "columns": ceil(ratio * width / spacing - 1e-6),
-        }
-    inner = {"window": {**times, **window}, "field_of_view": {**grid, **view}}
+    inner = {
+        "window": {**numbers.window(), **window},
+        "field_of_view": {**numbers.field_of_view(), **view},
+    }
     filled = {name: section for name, section in inner.items() if section}
-    return {**study, "cutting": {**length, **cutting, **filled}}
+    return {**study, "cutting": {**numbers.cutting(), **cutting, **filled}}
 
 
-def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """Return a camera's data with the pitch on the scene that follows from its data sheet."""
-    detector, magnification = (camera.get(name) for name in ("detector_pitch", "magnification"))
-    if detector in (None, "none"):
-        return dict(camera)
-    if isinstance(magnification, bool) or not isinstance(magnification, int | float):
-        raise ValueError("magnification: must be given with detector_pitch")
-    if not magnification > 0:
-        raise ValueError(f"magnification: {magnification:g}, must be positive")
-    try:
-        pitch = LENGTH.parse(detector, si=not from_file) / magnification
-    except ValueError as error:
-        raise ValueError(f"detector_pitch: {error}") from None
-    given = LENGTH.parse(camera["pitch"], si=not from_file) if "pitch" in camera else pitch
-    if abs(given - pitch) > 1e-6 * pitch:
-        raise ValueError(
-            f"pitch: {camera['pitch']} contradicts detector_pitch / magnification, "
-            f"{LENGTH.text(pitch)}; state only one of them"
+@dataclass(frozen=True)
+class _Numbers:
+    """Numbers of a study in SI units from which others follow."""
+
+    ratio: float
+    """Feed relative to the paper's."""
+    speed: float
+    exposure: float
+    rake: float
+    start: float
+    end: float
+    spacing: float
+
+    @classmethod
+    def read(
+        cls,
+        cutting: Mapping[str, Any],
+        window: Mapping[str, Any],
+        view: Mapping[str, Any],
+        tool: Mapping[str, Any],
+        camera: Mapping[str, Any],
+        from_file: bool,
+    ) -> "_Numbers":
+        """Read them from a study's data; a ValueError if a number is impossible."""
+        camera = CameraSection.with_pitch(camera, from_file)
+        exposure = CameraSection.number(camera, "integration_time", from_file)
+        speed = CuttingSection.number(cutting, "speed", from_file)
+        ratio = CuttingSection.number(cutting, "feed", from_file) / CuttingSection.feed
+        start = OutputWindow.number(window, "start", from_file, ratio * OutputWindow.start)
+        travel = max(ratio * _TRAVEL, _EXPOSURES * exposure * speed)
+        pitch = CameraSection.number(camera, "pitch", from_file)
+        return cls(
+            ratio=ratio,
+            speed=speed,
+            exposure=exposure,
+            rake=CutToolSection.number(tool, "rake_angle", from_file),
+            start=start,
+            end=OutputWindow.number(window, "end", from_file, start + travel),
+            spacing=FieldOfViewSection.number(view, "spacing", from_file, pitch / _ACROSS),
         )
-    return {**camera, "magnification": float(magnification), "pitch": LENGTH.text(pitch)}
+
+    @property
+    def _moves_window(self) -> bool:
+        return self.ratio != 1.0 or self.exposure * self.speed > _TRAVEL
+
+    def cutting(self) -> dict[str, Any]:
+        """Return the cutting length, if it is not the paper's."""
+        if not self._moves_window:
+            return {}
+        length = max(self.ratio * CuttingSection.cutting_length, _AFTER_WINDOW * self.end)
+        return {"cutting_length": InSI(length)}
+
+    def window(self) -> dict[str, Any]:
+        """Return the settings of the window that are not the paper's."""
+        derived: dict[str, Any] = {}
+        if self._moves_window:
+            derived |= {"start": InSI(self.start), "end": InSI(self.end)}
+        slower = CuttingSection.speed / self.speed
+        if self.ratio != 1.0 or slower != 1.0:
+            interval = self.ratio * slower * OutputWindow.interval
+            derived["interval"] = InSI(min(interval, self.exposure / _SUB_FRAMES))
+        if self.exposure > OutputWindow.band_duration:
+            derived["band_duration"] = InSI(self.exposure)
+        return derived
+
+    def field_of_view(self) -> dict[str, Any]:
+        """Return the view, if it is not the paper's."""
+        if self.ratio == 1.0 and self.rake == CutToolSection.rake_angle:
+            return {}
+        below = max(degrees(CutToolSection.rake_angle - self.rake), 0.0)
+        left = FieldOfViewSection.left - below * _LEFT_A_DEGREE
+        top = FieldOfViewSection.top + below * _TOP_A_DEGREE
+        width = max(_RIGHT, top * tan(self.rake) + _RIGHT) - left
+        return {
+            "left": InSI(self.ratio * left),
+            "top": InSI(self.ratio * top),
+            "spacing": InSI(self.spacing),
+            "rows": ceil(self.ratio * (top - _BOTTOM) / self.spacing - _ROUNDING),
+            "columns": ceil(self.ratio * width / self.spacing - _ROUNDING),
+        }
+
+
+_TRAVEL: Final = OutputWindow.end - OutputWindow.start
+"""Cutting length in m in the paper's window."""
