@@ -58,23 +58,31 @@ STATED = {"surface": {"kind": "uniform", "emissivity": 0.42}}
 @pytest.mark.parametrize(
     ("camera", "attributes", "message"),
     [
-        ({"band": "3.8-4.9 um"}, {}, "upper limit of the band: 5.1 um in the image, 4.9 um in the"),
-        ({"pitch": "5 um"}, {}, "pitch: 6 um in the image, 5 um in the study"),
+        (
+            {"band": "3.8-4.9 um"},
+            {},
+            "upper limit of the band: 5.1 um in the measurement, 4.9 um in the",
+        ),
+        ({"pitch": "5 um"}, {}, "pitch: 6 um in the measurement, 5 um in the camera"),
         (
             {"integration_time": "20 us"},
             {"integration_time": 1e-5},
-            "integration_time: 10 us in the image, 20 us in the study",
+            "integration_time: 10 us in the measurement, 20 us in the camera",
         ),
-        ({"fill_factor": 0.5}, {"fill_factor": 0.8}, "fill_factor: 0.8 in the image, 0.5 in the"),
+        (
+            {"fill_factor": 0.5},
+            {"fill_factor": 0.8},
+            "fill_factor: 0.8 in the measurement, 0.5 in the",
+        ),
         (
             {"time_constant": "2 us"},
             {"time_constant": 1e-6},
-            "time_constant: 1 us in the image, 2 us in the study",
+            "time_constant: 1 us in the measurement, 2 us in the camera",
         ),
         (
             {"optics": [{"kind": "element", "transmittance": 0.9}]},
             {"object_parameters": "emissivity 1, transmittance 0.8: taken back"},
-            "transmittance: 0.8 in the image, 0.9 in the study",
+            "transmittance: 0.8 in the measurement, 0.9 in the camera",
         ),
         (
             {"reflected": "800 K"},
