@@ -582,8 +582,8 @@ def test_a_study_of_another_measurement_is_refused(strip):
     text = (strip / "study.yaml").read_text(encoding="utf-8")
     for old, new, message in (
         ("strip: {polygon", "edge: {polygon", "strip: no such place or reading"),
-        ("psf_order: optics", "band: 3.8-4.9 um", "5.1 um in the image, 4.9 um in the study"),
-        ("psf_order: optics", "pitch: 5 um", "pitch: 6 um in the image, 5 um in the study"),
+        ("psf_order: optics", "band: 3.8-4.9 um", "5.1 um in the measurement, 4.9 um"),
+        ("psf_order: optics", "pitch: 5 um", "pitch: 6 um in the measurement, 5"),
     ):
         (strip / "other.yaml").write_text(text.replace(old, new), encoding="utf-8")
         refused(list(map(str, arguments)), message)

@@ -4,9 +4,19 @@ import numpy as np
 import pytest
 from heated_chip import BAND, RASTER, measured
 
+from chipglow.camera import Measurement
+from chipglow.io import open_scene, write_scene
 from chipglow.laboratory import emissivity as em
-from chipglow.scene import Area
-from chipglow.study import CorrectedTemperature, Study, corrected_temperatures
+from chipglow.quantities.units import COLDEST
+from chipglow.scene import Area, Polygon, Raster, Region, Scene
+from chipglow.study import (
+    CorrectedTemperature,
+    Study,
+    correct_study,
+    corrected_temperatures,
+    load_study,
+)
+from chipglow.surface import UniformSurface
 from chipglow.uncertainty import Estimate
 
 HOT = 1000.0
@@ -58,23 +68,31 @@ STATED = {"surface": {"kind": "uniform", "emissivity": 0.42}}
 @pytest.mark.parametrize(
     ("camera", "attributes", "message"),
     [
-        ({"band": "3.8-4.9 um"}, {}, "upper limit of the band: 5.1 um in the image, 4.9 um in the"),
-        ({"pitch": "5 um"}, {}, "pitch: 6 um in the image, 5 um in the study"),
+        (
+            {"band": "3.8-4.9 um"},
+            {},
+            "upper limit of the band: 5.1 um in the measurement, 4.9 um in the",
+        ),
+        ({"pitch": "5 um"}, {}, "pitch: 6 um in the measurement, 5 um in the camera"),
         (
             {"integration_time": "20 us"},
             {"integration_time": 1e-5},
-            "integration_time: 10 us in the image, 20 us in the study",
+            "integration_time: 10 us in the measurement, 20 us in the camera",
         ),
-        ({"fill_factor": 0.5}, {"fill_factor": 0.8}, "fill_factor: 0.8 in the image, 0.5 in the"),
+        (
+            {"fill_factor": 0.5},
+            {"fill_factor": 0.8},
+            "fill_factor: 0.8 in the measurement, 0.5 in the",
+        ),
         (
             {"time_constant": "2 us"},
             {"time_constant": 1e-6},
-            "time_constant: 1 us in the image, 2 us in the study",
+            "time_constant: 1 us in the measurement, 2 us in the camera",
         ),
         (
             {"optics": [{"kind": "element", "transmittance": 0.9}]},
             {"object_parameters": "emissivity 1, transmittance 0.8: taken back"},
-            "transmittance: 0.8 in the image, 0.9 in the study",
+            "transmittance: 0.8 in the measurement, 0.9 in the camera",
         ),
         (
             {"reflected": "800 K"},
@@ -118,3 +136,52 @@ def test_frame_rate_and_lower_limit_that_differ_are_told():
     study = Study(**STATED, camera={"frame_rate": "100 Hz", "lower_limit": "300 degC"})
     notes = _compared(rows, image, study)
     assert [text.split(":")[0] for text in notes.warnings] == ["frame_rate", "lower_limit"]
+
+
+PLATE, COLD = 1000.0, 750.0
+PLATE_STUDY = """
+scene: plate.nc
+surface: {kind: uniform, emissivity: 0.6}
+camera: {psf: {kind: gaussian, fwhm: 12 um}, psf_order: optics, lower_limit: none}
+analysis:
+  regions:
+    plate: {polygon: [[-45 um, -45 um], [45 um, -45 um], [45 um, 45 um], [-45 um, 45 um]]}
+uncertainty: {inputs: {camera.psf.fwhm: {standard: 5 %}}}
+"""
+
+
+@pytest.mark.parametrize(("noise", "most"), [(0.0, 0.1), (1.0, None)])
+def test_region_and_pixels_agree_where_both_apply(tmp_path, monkeypatch, noise, most):
+    """A plate of 168 um on a colder ground, of which a region in the middle is known."""
+    monkeypatch.chdir(tmp_path)
+    raster = Raster(left=-120e-6, top=120e-6, spacing=1e-6, rows=240, columns=240)
+    inside = np.maximum(*np.abs(np.meshgrid(raster.x, raster.y))) < 84e-6
+    kelvins = np.where(inside, PLATE, COLD)[None]
+    write_scene(Scene.from_fields(raster, [0.0], {"temperature": kelvins}), "plate.nc")
+    (tmp_path / "study.yaml").write_text(PLATE_STUDY, encoding="utf-8")
+    study = load_study(tmp_path / "study.yaml")
+    camera = study.camera.on(raster, study.seed)
+    seen = camera.measure(open_scene("plate.nc"), UniformSurface(0.6), 0.0)
+    spread = noise * float(camera.band.slope(600.0))
+    light = seen.radiance + np.random.default_rng(8).normal(0.0, spread, seen.radiance.shape)
+    image = Measurement.from_radiance(light, camera.band, seen.times, seen.raster)
+    corners = ((-45e-6, -45e-6), (45e-6, -45e-6), (45e-6, 45e-6), (-45e-6, 45e-6))
+    region = Region("plate", Polygon(corners), unit="m")
+    line = em.EmissivityLine.constant(0.6, 0.012)
+    dark = em.reflected_temperature(COLDEST)
+    rows = em.true_temperatures([image], [region], line, dark)
+    by_region = corrected_temperatures(rows, image, study)[0]["plate"].estimate
+    pixels = correct_study(study, image, emissivity_uncertainty=0.012, noise=max(noise, 0.05))
+    by_pixels = pixels.at(region)
+    one, other = float(by_region.values), float(by_pixels.values)
+    if most is not None:
+        # Beyond the region the plate is three widths of the blur wide; the rest is solving.
+        assert abs(one - other) < most and abs(one - PLATE) < most
+    # The emissivity is common to both; of the noise, each takes the mean over 225 pixels.
+    own = [by_region.without("emissivity"), by_pixels.without("emissivity")]
+    combined = np.hypot(*(float(part.standard_uncertainty) for part in own))
+    assert abs(one - other) < 2 * combined + 0.1
+    both = [float(found.standard_uncertainty) for found in (by_region, by_pixels)]
+    # An emissivity of 2 % is the same change of the radiance for both.
+    stated = 0.02 * float(camera.band.radiance(PLATE)) / float(camera.band.slope(PLATE))
+    assert both == pytest.approx([stated, stated], rel=0.03)

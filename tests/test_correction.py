@@ -13,7 +13,7 @@ from chipglow.correction import (
     CorrectionFlag,
     Zone,
     correct,
-    known_zones,
+    known_parts,
     read_correction,
     write_correction,
 )
@@ -271,20 +271,20 @@ def test_the_same_seed_gives_the_same_result(chip_and_tool):
     assert again.data.equals(result.data)
 
 
-def test_zones_of_the_laboratory():
+def test_parts_of_the_laboratory():
     pixels = Raster(0.0, 24 * PITCH, PITCH, 24, 24)
     part = half_plane(pixels, EDGE)
     lines = {
         "tool": EmissivityLine.constant(0.58, 0.02),
         "chip": EmissivityLine.constant(0.42, 0.03),
     }
-    chip, tool = known_zones(lines, [part], elsewhere="chip")
+    chip, tool = (one.zone(700.0) for one in known_parts(lines, [part], elsewhere="chip"))
     assert (chip.emissivity, chip.uncertainty, chip.shape) == (0.42, pytest.approx(0.03), None)
     assert (tool.emissivity, tool.uncertainty, tool.shape) == (0.58, pytest.approx(0.02), part)
-    outside, _ = known_zones(lines, [part])
-    assert outside.emissivity is None
+    outside, _ = known_parts(lines, [part])
+    assert outside.zone(700.0).emissivity is None
     with pytest.raises(ValueError, match="'band' has no emissivity"):
-        known_zones(lines, [part], elsewhere="band")
+        known_parts(lines, [part], elsewhere="band")
 
 
 def test_outside_the_known_zones_nothing_is_determined():
@@ -316,8 +316,8 @@ def test_a_moved_object_is_looked_up_where_it_came_from():
     ("change", "message"),
     [
         ({"camera": replace(CAMERA, psf=None)}, "no point spread function"),
-        ({"camera": CAMERA.in_band(Band(8e-6, 12e-6))}, "band is 8 um to 12 um, but"),
-        ({"camera": replace(CAMERA, pitch=5e-6)}, "pitch is 5 um, but"),
+        ({"camera": CAMERA.in_band(Band(8e-6, 12e-6))}, "3.8 um in the measurement, 8 um in"),
+        ({"camera": replace(CAMERA, pitch=5e-6)}, "pitch: 6 um in the measurement, 5"),
         ({"zones": [Zone("plate", None)]}, "no zone has a known emissivity"),
         ({"psf_uncertainty": -1.0}, "psf_uncertainty is -1.0"),
         ({"outline_uncertainty": np.nan}, "outline_uncertainty is nan"),
@@ -355,7 +355,7 @@ def folder(tmp_path, monkeypatch):
     """A folder with a measurement and its point spread function."""
     kelvins, emissivity, samples, pixels = scene(12)
     write_measurement(measured(kelvins, emissivity, samples, pixels), tmp_path / "chip.nc")
-    kernel = xr.Dataset({"weights": (("y", "x"), np.ones((3, 3)))}, attrs={"spacing": PITCH})
+    kernel = xr.Dataset({"kernel": (("y", "x"), np.ones((3, 3)) / 9, {"spacing": PITCH})})
     kernel.to_netcdf(tmp_path / "psf.nc", engine="h5netcdf")
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -366,7 +366,7 @@ def folder(tmp_path, monkeypatch):
     [
         ("", "--psf: is missing; give --psf with --emissivity, or --study"),
         ("--psf psf.nc --study s.yaml", "--study: cannot be combined with --psf"),
-        ("--psf psf.nc", "--emissivity: give a file of chipglow emissivity, or a number"),
+        ("--psf psf.nc", "--emissivity: give a file of chipglow emissivity, or a number; or --map"),
         ("--psf psf.nc --emissivity 1.7", "emissivity: is 1.7, expected more than 0 to 1"),
         ("--psf psf.nc --emissivity e.nc", "e.nc: there is no such file"),
         ("--psf none.nc --emissivity 0.7", "none.nc: there is no such file"),

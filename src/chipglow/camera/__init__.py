@@ -1,5 +1,11 @@
 """Virtual and real cameras: optics, exposure, detector, calibration and measurement."""
 
+from chipglow.camera.agreement import (
+    alike as alike,
+    check_camera as check_camera,
+    check_value as check_value,
+    difference_text as difference_text,
+)
 from chipglow.camera.calibration import (
     MODELS as MODELS,
     Calibration as Calibration,

@@ -40,7 +40,7 @@ def rake(
     from chipglow.laboratory.recordings import load_measurement
 
     measured = load_measurement(measurement, settings or ())
-    frames = _frames(measured, frame, at)
+    frames = chosen_frames(measured, frame, at)
     chosen, known, notes = chosen_tool(measured, tool, position)
     given = known if position is None else ToolUncertainty(position, position)
     grid = rake_grid(measured, chosen, pixels, depth, frames, given)
@@ -55,7 +55,8 @@ def rake(
     )
 
 
-def _frames(measurement: "Measurement", frame: str, at: float | None) -> list[int] | None:
+def chosen_frames(measurement: "Measurement", frame: str, at: float | None) -> list[int] | None:
+    """Return the frames of the options --frame and --at; None for all."""
     from chipglow.drawing.scales import shown_frame
 
     times = measurement.times

@@ -2,16 +2,23 @@
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from chipglow.cli import options as opt
+from chipglow.cli.chip import chosen_frames
+from chipglow.cli.emissivity import doubts, emissivities_of
 from chipglow.cli.screen import current, figure, finish
+
+_LARGEST_MISFIT: Final = 4.0
+"""Misfit above which the residuals are more than twice the noise: not by chance."""
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from chipglow.camera import Measurement
-    from chipglow.correction import Correction, Zone
+    from chipglow.camera import Camera, Measurement
+    from chipglow.correction import Correction
+    from chipglow.scene import Region
+    from chipglow.text import Notes
 
 
 def correct(
@@ -35,8 +42,21 @@ def correct(
             "(NetCDF), or one emissivity for all, e.g. 0.42.",
         ),
     ] = None,
+    emissivity_map: Annotated[
+        Path | None,
+        opt.value(
+            "FILE",
+            "Emissivity of every pixel, instead of --emissivity: output of chipglow emissivity for "
+            "images of the same camera at the same place (NetCDF).",
+            "--map",
+        ),
+    ] = None,
     regions: Annotated[
-        Path | None, opt.value("FILE", "Regions of the image with their own emissivity, YAML.")
+        Path | None,
+        opt.value(
+            "FILE",
+            "Regions of the image with their own emissivity, YAML; with --study only places.",
+        ),
     ] = None,
     elsewhere: Annotated[
         str | None,
@@ -44,8 +64,8 @@ def correct(
     ] = None,
     tool: opt.ToolChoice = None,
     emissivity_uncertainty: Annotated[
-        float, opt.value("NUMBER", "Standard uncertainty of an emissivity that states none.")
-    ] = 0.0,
+        float | None, opt.value("NUMBER", "Standard uncertainty of an emissivity that states none.")
+    ] = None,
     psf_uncertainty: Annotated[
         float,
         opt.value(
@@ -54,12 +74,12 @@ def correct(
         ),
     ] = 0.0,
     outline_uncertainty: Annotated[
-        float,
+        float | None,
         opt.length(
             "Standard uncertainty of the position of the outlines, e.g. '3 um'. If given, the "
-            "position is estimated from the image."
+            "position is estimated from the image. Default: that of a found tool, otherwise none."
         ),
-    ] = 0.0,
+    ] = None,
     reflected: Annotated[
         float | None, opt.temperature("Temperature of the reflected surroundings. Default: 293 K.")
     ] = None,
@@ -71,6 +91,7 @@ def correct(
             "states, or estimated from the image."
         ),
     ] = None,
+    frame: Annotated[str, opt.value("N|all", "Index of the frame, or all.")] = "all",
     out: Annotated[
         Path | None, opt.file("Write temperatures and intervals, NetCDF.", ".nc")
     ] = None,
@@ -83,14 +104,20 @@ def correct(
     from chipglow.correction import place_frame, places_of, write_correction
     from chipglow.correction.figure import draw_correction
     from chipglow.io.result_file import write_frame
-    from chipglow.laboratory.emissivity import load_regions, reflected_temperature
+    from chipglow.laboratory.emissivity import load_regions
     from chipglow.laboratory.recordings import load_measurement
 
-    if study is None and psf is None:
-        raise ValueError("--psf: is missing; give --psf with --emissivity, or --study")
-    if study is not None and psf is not None:
-        raise ValueError("--study: cannot be combined with --psf, as the study states the camera")
-    measurement = load_measurement(image, settings or ())
+    known = {
+        "--emissivity": emissivity,
+        "--map": emissivity_map,
+        "--elsewhere": elsewhere,
+        "--tool": tool,
+        "--reflected": reflected,
+        "--reflected-uncertainty": reflected_uncertainty,
+    }
+    _check_options(study, psf, known)
+    measurement = _frames(load_measurement(image, settings or ()), frame)
+    named = () if regions is None else load_regions(regions)
     with progress_bars() as progress:
         progress("correction", 0.0)
         if study is not None:
@@ -99,75 +126,128 @@ def correct(
             result = correct_study(
                 load_study(study),
                 measurement,
-                emissivity_uncertainty=emissivity_uncertainty,
+                emissivity_uncertainty=emissivity_uncertainty or 0.0,
                 psf_uncertainty=psf_uncertainty,
-                outline_uncertainty=outline_uncertainty,
+                outline_uncertainty=outline_uncertainty or 0.0,
                 noise=noise,
                 progress=progress,
             )
         else:
+            measurement, notes, found = _with_tool(measurement, tool)
             result = _corrected(
                 measurement,
-                Path(str(psf)),
-                _zones(measurement, emissivity, emissivity_uncertainty, regions, elsewhere, tool),
+                _camera(measurement, Path(str(psf))),
+                named,
+                known,
+                emissivity_uncertainty,
                 psf_uncertainty=psf_uncertainty,
-                outline_uncertainty=outline_uncertainty,
-                surroundings=reflected_temperature(
-                    293.0 if reflected is None else reflected, reflected_uncertainty or 0.0
-                ),
+                outline_uncertainty=found if outline_uncertainty is None else outline_uncertainty,
                 noise=noise,
                 progress=partial(progress, "correction"),
-            )
-    named = () if regions is None else load_regions(regions)
-    frame = place_frame(result, places_of(result, measurement, named))
-    _print(result, frame)
+            ).with_notes(notes)
+    table_of_places = place_frame(result, places_of(result, measurement, named))
+    _print(result, table_of_places)
     finish(
-        measurement.notes + result.notes,
+        measurement.notes + result.notes + _doubts(result),
         (out, partial(write_correction, result)),
-        (table, partial(write_frame, frame)),
+        (table, partial(write_frame, table_of_places)),
         (plot, figure(draw_correction, result, measurement)),
     )
 
 
-def _zones(
-    measurement: "Measurement",
-    emissivity: str | None,
-    uncertainty: float,
-    regions: Path | None,
-    elsewhere: str | None,
-    tool: str | None,
-) -> "tuple[Zone, ...]":
-    """Return the zones that the options describe."""
-    from chipglow.cli.tool_choice import chosen_tool
-    from chipglow.correction import known_zones
-    from chipglow.laboratory import emissivity as lab
+def _check_options(study: Path | None, psf: Path | None, known: "dict[str, Any]") -> None:
+    """Raise a ValueError if options lack each other or exclude each other."""
+    if study is None and psf is None:
+        raise ValueError("--psf: is missing; give --psf with --emissivity, or --study")
+    given = [name for name, value in known.items() if value is not None]
+    if study is not None:
+        for name in ["--psf"] if psf is not None else given:
+            raise ValueError(
+                f"--study: cannot be combined with {name}, as the study states camera and surface"
+            )
+        return
+    if known["--emissivity"] is None and known["--map"] is None:
+        raise ValueError("--emissivity: give a file of chipglow emissivity, or a number; or --map")
+    if known["--map"] is not None:
+        for name in [one for one in ("--emissivity", "--elsewhere") if one in given]:
+            raise ValueError(f"--map: cannot be combined with {name}, as it states each pixel's")
 
-    if emissivity is None:
-        raise ValueError("--emissivity: give a file of chipglow emissivity, or a number")
-    lines: Any
-    if emissivity.replace(".", "", 1).isdigit():
-        lines = lab.EmissivityLine.constant(float(emissivity), uncertainty)
-    else:
-        lines = lab.read_emissivity_lines(Path(emissivity))
-    named = () if regions is None else lab.load_regions(regions)
-    cutter = measurement.tool if tool is None else chosen_tool(measurement, tool)[0]
-    return known_zones(lines, named, cutter, elsewhere)
+
+def _frames(measurement: "Measurement", frame: str) -> "Measurement":
+    from chipglow.camera import Measurement
+
+    frames = chosen_frames(measurement, frame, None)
+    return measurement if frames is None else Measurement(measurement.data.isel(time=frames))
+
+
+def _with_tool(measurement: "Measurement", tool: str | None) -> "tuple[Measurement, Notes, float]":
+    """Return the measurement with the chosen tool, and its standard uncertainty in m if found."""
+    from chipglow.cli.tool_choice import chosen_tool
+    from chipglow.text import Notes
+
+    if tool is None:
+        return measurement, Notes(), 0.0
+    chosen, known, notes = chosen_tool(measurement, tool)
+    return measurement.with_tool(chosen), notes, 0.0 if known is None else known.across
+
+
+def _camera(measurement: "Measurement", psf: Path) -> "Camera":
+    """Return a camera with the measurement's band and pixels, and a function from a file."""
+    from chipglow.camera import Camera, MeasuredPSFFile
+
+    band = measurement.band
+    return Camera(
+        band=band,
+        pitch=measurement.raster.spacing,
+        fill_factor=float(measurement.data.attrs.get("fill_factor", 1.0)),
+        psf=MeasuredPSFFile(str(psf)).for_camera(band, None),
+    )
 
 
 def _corrected(
-    measurement: "Measurement", psf: Path, zones: "tuple[Zone, ...]", **settings: Any
+    measurement: "Measurement",
+    camera: "Camera",
+    regions: "tuple[Region, ...]",
+    known: "dict[str, Any]",
+    emissivity_uncertainty: float | None,
+    **settings: Any,
 ) -> "Correction":
-    """Correct a measurement with a point spread function from a file."""
-    from chipglow.camera import Camera, MeasuredPSFFile
-    from chipglow.correction import correct as correct_measurement
+    """Correct a measurement with emissivities of the laboratory."""
+    from chipglow.correction import correct_known, correct_mapped, known_parts
+    from chipglow.laboratory import emissivity as lab
 
-    band = measurement.band
-    camera = Camera(
-        band=band,
-        pitch=measurement.raster.spacing,
-        psf=MeasuredPSFFile(str(psf)).for_camera(band, None),
+    tool, file = measurement.tool, known["--map"] or known["--emissivity"]
+    if known["--reflected"] is not None or known["--reflected-uncertainty"] is not None:
+        settings["surroundings"] = lab.reflected_temperature(
+            known["--reflected"] or 293.0, known["--reflected-uncertainty"] or 0.0
+        )
+    if known["--map"] is not None:
+        shapes = regions if tool is None else (*regions, tool)
+        result = correct_mapped(
+            measurement, camera, lab.read_emissivity_map(file), shapes, **settings
+        )
+        return result.with_notes(doubts(lab.read_origin(file), [measurement]))
+    lines = emissivities_of(file, emissivity_uncertainty)
+    parts = known_parts(lines, regions, tool, known["--elsewhere"])
+    result = correct_known(measurement, camera, parts, **settings)
+    origin = lab.read_origin(file) if isinstance(lines, dict) else None
+    return result.with_notes(doubts(origin, [measurement]))
+
+
+def _doubts(result: "Correction") -> "Notes":
+    """Warn of frames that the zones and the point spread function do not explain."""
+    from chipglow.text import Notes
+
+    worst = float(result.data["misfit"].max())
+    if worst <= _LARGEST_MISFIT:
+        return Notes()
+    return Notes(
+        warnings=[
+            f"The corrected image differs from the measured one by {worst**0.5:.2g} times the "
+            "noise: an outline, an emissivity or the point spread function is wrong, or the noise "
+            "is larger than assumed. The intervals do not contain this."
+        ]
     )
-    return correct_measurement(measurement, camera, zones, **settings)
 
 
 def _print(result: "Correction", frame: "pd.DataFrame") -> None:
@@ -182,6 +262,8 @@ def _print(result: "Correction", frame: "pd.DataFrame") -> None:
         "U 95 % / K": "expanded_uncertainty_K",
         "largest contributions to u / K": "contributions",
     }
+    if result.data.sizes["time"] > 1:
+        columns = {"time / s": "time_s", **columns}
     shown = frame.assign(
         measured_degC=frame.measured_K - ZERO_CELSIUS,
         true_temperature_degC=frame.true_temperature_K - ZERO_CELSIUS,

@@ -71,7 +71,7 @@ def emissivity(
     named = lab.load_regions(regions)
     measurements = load_measurements(images, settings or ())
     names = list(map(str, images))
-    result = lab.determine_emissivities(measurements, heatings, named, names, metal)
+    result = lab.determineemissivities_of(measurements, heatings, named, names, metal)
     _print_tables(result)
     _print_study(result, out)
     whole = {row.name for row in result.rows[0] if row.whole}
@@ -186,7 +186,7 @@ def temperature(
     if reflected is not None or reflected_uncertainty is not None:
         surroundings = lab.reflected_temperature(reflected or 293.0, reflected_uncertainty or 0.0)
     fitted = None if calibration is None else load_calibration(calibration)
-    lines = _emissivities(emissivity, emissivity_uncertainty)
+    lines = emissivities_of(emissivity, emissivity_uncertainty)
     origin = lab.read_origin(emissivity) if isinstance(lines, dict) else None
 
     def found(
@@ -196,7 +196,7 @@ def temperature(
             measurements, named, lines, surroundings, fitted, drift, names, camera_uncertainty
         )
         notes = sum((one.notes for one in measurements), result.notes)
-        return result, notes + _doubts(origin, measurements)
+        return result, notes + doubts(origin, measurements)
 
     if each:
         results = for_each(
@@ -214,7 +214,7 @@ def temperature(
     finish(notes, (table, partial(write_frame, frame)))
 
 
-def _doubts(origin: "Origin | None", measurements: "list[Measurement]") -> "Notes":
+def doubts(origin: "Origin | None", measurements: "list[Measurement]") -> "Notes":
     """Warn if emissivities are of another band or metal than the measurements."""
     from chipglow.text import Notes
 
@@ -297,9 +297,10 @@ def _correct(
     return notes.about(str(study))
 
 
-def _emissivities(
+def emissivities_of(
     text: str, uncertainty: float | None
 ) -> "lab.EmissivityLine | dict[str, lab.EmissivityLine]":
+    """Return the emissivities of an option: a file's by their names, or one number for all."""
     from chipglow.laboratory import emissivity as lab
 
     try:

@@ -11,7 +11,11 @@ from chipglow.correction.file import (
     read_correction as read_correction,
     write_correction as write_correction,
 )
-from chipglow.correction.known import known_zones as known_zones
+from chipglow.correction.known import KnownPart as KnownPart, known_parts as known_parts
+from chipglow.correction.known_object import (
+    correct_known as correct_known,
+    correct_mapped as correct_mapped,
+)
 from chipglow.correction.places import place_frame as place_frame, places_of as places_of
 from chipglow.correction.scene_object import observed_scene as observed_scene
 from chipglow.correction.zones import (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.special import stdtrit
 
-from chipglow.camera import Camera, Flag, Measurement
+from chipglow.camera import Camera, Flag, Measurement, check_camera
 from chipglow.correction.cells import Parts, cut_cells
 from chipglow.correction.correction import Correction, CorrectionFlag, joined
 from chipglow.correction.noise import noise_of
@@ -51,7 +51,6 @@ _BORDER: Final = 3
 """Width in pixels of the border whose values depend on what is beyond the image."""
 
 _LEVEL: Final = 0.95
-_LARGEST_PITCH_ERROR: Final = 1e-3
 
 
 def correct(
@@ -162,18 +161,7 @@ def _check(
     outline_uncertainty: float,
 ) -> None:
     """Raise a ValueError if the correction is not defined."""
-    seen, stated = measurement.band, camera.band
-    if not np.allclose([seen.lower, seen.upper], [stated.lower, stated.upper], rtol=1e-6):
-        raise ValueError(
-            f"correct: the camera's band is {_band(stated)}, but the measurement has the band "
-            f"{_band(seen)}"
-        )
-    pitch = measurement.raster.spacing
-    if abs(camera.pitch / pitch - 1) > _LARGEST_PITCH_ERROR:
-        raise ValueError(
-            f"correct: the camera's pitch is {1e6 * camera.pitch:.6g} um, but the "
-            f"measurement has {1e6 * pitch:.6g} um"
-        )
+    check_camera(measurement, camera)
     if camera.psf is None:
         raise ValueError("correct: the camera has no point spread function; state camera.psf")
     if all(zone.emissivity is None for zone in observed.zones):
@@ -184,10 +172,6 @@ def _check(
     ):
         if not (np.isfinite(value) and value >= 0):
             raise ValueError(f"correct: {name} is {value!r}, expected 0 or more")
-
-
-def _band(band: Band) -> str:
-    return f"{1e6 * band.lower:.4g} um to {1e6 * band.upper:.4g} um"
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,9 +30,9 @@ def draw_correction(correction: Correction, measurement: Measurement, frame: int
     heat = scales.ends(np.concatenate([measured, corrected]), 0.5, 99.5)
     widths = (0.0, float(np.nanpercentile(half_width, _LARGEST_PERCENTILE)))
     panels = (
-        ImagePanel("measured", "radiance temperature / °C", measured, heat, scales.HEAT),
-        ImagePanel("corrected", "true temperature / °C", corrected, heat, scales.HEAT),
-        ImagePanel("half-width (95 %)", "temperature / K", half_width, widths),
+        ImagePanel("measured", "°C", measured, heat, scales.HEAT),
+        ImagePanel("corrected", "°C", corrected, heat, scales.HEAT),
+        ImagePanel("half-width (95 %)", "K", half_width, widths),
     )
     with drawing.style():
         figure = image_figure(raster, _PANEL_WIDTH, rows=1)

@@ -1,6 +1,7 @@
-"""Zones from results of the laboratory: emissivities of regions, and a tool."""
+"""Parts of the image from results of the laboratory: emissivities of regions, and a tool."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 from chipglow.correction.zones import Zone
@@ -10,18 +11,58 @@ from chipglow.scene import Region, Tool
 TOOL: Final = "tool"
 """Name of the tool's emissivity and zone."""
 
+ELSEWHERE: Final = "elsewhere"
+"""Name of the rest of the image."""
+
 GRAIN: Final = 20e-6
 """Length in m over which emissivity changes if it is not known: the paper's grain."""
 
 
-def known_zones(
+@dataclass(frozen=True, eq=False)
+class KnownPart:
+    """A part of the image, and its emissivity over the temperature.
+
+    Parameters
+    ----------
+    name : str
+        Name of the zone.
+    line : EmissivityLine or None
+        None: not known, so that no temperature is determined there.
+    shape : Region, Tool or None
+        Where it is, in the measurement's coordinates; None: the rest of the image.
+    """
+
+    name: str
+    line: EmissivityLine | None
+    shape: Region | Tool | None = None
+
+    def zone(self, kelvins: float) -> Zone:
+        """Return the zone with its emissivity at a temperature in K."""
+        if self.line is None:
+            return Zone(self.name, None, self.shape)
+        value = self.line.at(kelvins)
+        if not 0 < float(value.values) <= 1:
+            raise ValueError(
+                f"emissivity: that of {self.name!r} is {float(value.values):.3g} at "
+                f"{kelvins - 273.15:.0f} °C by its line over the temperature, expected over 0 to 1"
+            )
+        return Zone(
+            self.name,
+            float(value.values),
+            self.shape,
+            float(value.standard_uncertainty),
+            self.line.standard_deviation,
+            GRAIN,
+        )
+
+
+def known_parts(
     emissivities: Mapping[str, EmissivityLine] | EmissivityLine,
     regions: Sequence[Region] = (),
     tool: Tool | None = None,
     elsewhere: str | None = None,
-    grain: float = GRAIN,
-) -> tuple[Zone, ...]:
-    """Return the zones of an image.
+) -> tuple[KnownPart, ...]:
+    """Return the parts of an image with their emissivities.
 
     Parameters
     ----------
@@ -34,8 +75,6 @@ def known_zones(
         The tool in the measurement's coordinates; its emissivity has the name ``tool``.
     elsewhere : str, optional
         Name of the emissivity outside all regions. By default nothing is determined there.
-    grain : float
-        Length in m over which the emissivity changes within a region.
 
     Raises
     ------
@@ -44,8 +83,8 @@ def known_zones(
     """
     if isinstance(emissivities, EmissivityLine):
         names = {name for region in regions for name in (region.name, region.feature)}
-        named = dict.fromkeys({*names, TOOL, ""}, emissivities)
-        elsewhere = "" if elsewhere is None else elsewhere
+        named = dict.fromkeys({*names, TOOL, ELSEWHERE}, emissivities)
+        elsewhere = ELSEWHERE if elsewhere is None else elsewhere
     else:
         named = dict(emissivities)
     if elsewhere is not None and elsewhere not in named:
@@ -57,27 +96,10 @@ def known_zones(
             f"emissivity: none of {', '.join(named)} is named {TOOL!r}, but the measurement has a "
             "tool; determine its emissivity too"
         )
-    outside = None if elsewhere is None else named[elsewhere]
-    zones = [_zone(elsewhere or "elsewhere", outside, None, grain)]
+    parts = [KnownPart(elsewhere or ELSEWHERE, named.get(elsewhere or ELSEWHERE))]
     for region in regions:
         line = named.get(region.name, named.get(region.feature))
-        zones.append(_zone(region.name, line, region, grain))
+        parts.append(KnownPart(region.name, line, region))
     if tool is not None:
-        zones.append(_zone(TOOL, named[TOOL], tool, grain))
-    return tuple(zones)
-
-
-def _zone(
-    name: str, line: EmissivityLine | None, shape: Region | Tool | None, grain: float
-) -> Zone:
-    if line is None:
-        return Zone(name, None, shape)
-    value = line.at(line.middle)
-    return Zone(
-        name,
-        float(value.values),
-        shape,
-        float(value.standard_uncertainty),
-        line.standard_deviation,
-        grain,
-    )
+        parts.append(KnownPart(TOOL, named[TOOL], tool))
+    return tuple(parts)

@@ -9,7 +9,7 @@ from chipglow.camera import Camera
 from chipglow.correction.zones import NOTHING, SampledObject, Zone
 from chipglow.quantities import Array
 from chipglow.scene import Material, Scene
-from chipglow.surface import FeatureSurface, ModifiedSurface, Surface, UniformSurface
+from chipglow.surface import FeatureSurface, Surface, UniformSurface, bare_surface
 
 METAL, TOOL = "chip and workpiece", "tool"
 """Zones of a scene."""
@@ -39,7 +39,7 @@ def observed_scene(
             None,
             uncertainty,
             deviation,
-            getattr(_bare(surface), "grain", _GRAIN),
+            getattr(bare_surface(surface), "grain", _GRAIN),
         )
         for number, (name, deviation) in enumerate(zip((METAL, TOOL), deviations, strict=True))
     )
@@ -50,13 +50,9 @@ def _mean_of(values: Array) -> float | None:
     return float(values.mean()) if values.size else None
 
 
-def _bare(surface: Surface) -> Surface:
-    return surface.bare if isinstance(surface, ModifiedSurface) else surface
-
-
 def _texture(surface: Surface) -> tuple[float, float]:
     """Return the standard deviations of the emissivity of chip and tool."""
-    bare = _bare(surface)
+    bare = bare_surface(surface)
     if not isinstance(bare, FeatureSurface):
         return 0.0, 0.0
     return bare.chip.standard_deviation, bare.tool.standard_deviation

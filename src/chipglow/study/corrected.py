@@ -9,11 +9,18 @@ from typing import Any, Final
 import numpy as np
 
 from chipglow.analysis.single import MEASURED, NOISE
-from chipglow.camera import Measurement, OpticalElement
+from chipglow.camera import (
+    Measurement,
+    OpticalElement,
+    alike,
+    check_camera,
+    check_value,
+    difference_text,
+)
 from chipglow.laboratory.emissivity import RegionTemperatures, TrueTemperature
 from chipglow.laboratory.emissivity.observations import UNIFORMITY
 from chipglow.quantities import Array, changed
-from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, Quantity
+from chipglow.quantities.units import FREQUENCY, TEMPERATURE, TIME, Quantity
 from chipglow.radiometry import Band
 from chipglow.study.budgets import first_order_errors, reader, readings_of
 from chipglow.study.running import Progress, fitted_study, silent
@@ -24,7 +31,8 @@ from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, Input, Inputs, MonteCarlo, monte_carlo, propagate
 
 _ALIKE: Final = 0.01
-"""Relative difference between measurement and study that is accepted."""
+"""Relative difference of the radiance that is accepted, and of an emissivity without uncertainty.
+"""
 
 _COVERAGE: Final = 2.0
 """Standard uncertainties within which two values agree."""
@@ -34,9 +42,8 @@ _DRAWS: Final = 64
 
 _SEED: Final = 2010
 
-_MUST_AGREE: Final[dict[str, Quantity | None]] = {
+_MUST_AGREE: Final[dict[str, Quantity]] = {
     "integration_time": TIME,
-    "fill_factor": None,
     "line_time": TIME,
     "time_constant": TIME,
 }
@@ -183,26 +190,24 @@ def _simulated(study: Study, at: tuple[str, ...], tell: Progress) -> Array:
 def _compared(measured: RegionTemperatures, image: Measurement, study: Study) -> Notes:
     """Compare what measurement and study both state; raise ValueError if they differ."""
     camera, attributes = study.camera.build(study.seed), image.data.attrs
-    _check("lower limit of the band", image.band.lower, camera.band.lower, LENGTH)
-    _check("upper limit of the band", image.band.upper, camera.band.upper, LENGTH)
-    _check("pitch", image.raster.spacing, camera.pitch, LENGTH)
+    check_camera(image, camera)
     for name, quantity in _MUST_AGREE.items():
         ours = getattr(camera, name)
         if name in attributes and ours is not None:
-            _check(name, float(attributes[name]), ours, quantity)
+            check_value(name, float(attributes[name]), ours, quantity)
     elements = [one for one in camera.optics if isinstance(one, OpticalElement)]
     stated = _TRANSMITTANCE.search(str(attributes.get("object_parameters", "")))
     if elements and stated is not None:
         ours = float(np.prod([one.transmittance for one in elements]))
-        _check("transmittance", float(stated[1]), ours)
+        check_value("transmittance", float(stated[1]), ours)
     for row in measured.rows:
         _check_emissivity(row, study)
         _check_reflected(row, image.band, camera.reflected)
     warnings = []
     for name, quantity in _MAY_DIFFER.items():
         theirs, ours = _stated(image, name), getattr(camera, name)
-        if theirs is not None and ours is not None and not _alike(theirs, ours):
-            warnings.append(f"{_difference(name, theirs, ours, quantity)}.")
+        if theirs is not None and ours is not None and not alike(theirs, ours):
+            warnings.append(f"{difference_text(name, theirs, ours, quantity)}.")
     return Notes(warnings=warnings)
 
 
@@ -213,21 +218,6 @@ def _stated(image: Measurement, name: str) -> float | None:
     if name == "frame_rate" and len(image.times) > 1:
         return float(1 / np.median(np.diff(image.times)))
     return None
-
-
-def _alike(one: float, other: float) -> bool:
-    return abs(one - other) <= _ALIKE * abs(other)
-
-
-def _difference(name: str, image: float, study: float, quantity: Quantity | None = None) -> str:
-    values = image, study
-    texts = (f"{one:.4g}" if quantity is None else quantity.text(one) for one in values)
-    return "{}: {} in the image, {} in the study".format(name, *texts)
-
-
-def _check(name: str, image: float, study: float, quantity: Quantity | None = None) -> None:
-    if not _alike(image, study):
-        raise ValueError(_difference(name, image, study, quantity))
 
 
 def _check_emissivity(row: TrueTemperature, study: Study) -> None:

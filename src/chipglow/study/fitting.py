@@ -18,6 +18,7 @@ from chipglow.surface import (
     ModifiedSurface,
     Surface,
     TrendSurface,
+    bare_surface,
 )
 from chipglow.text import Notes
 from chipglow.text.template import yaml_line
@@ -95,14 +96,10 @@ def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
     return surface
 
 
-def _bare(surface: Surface) -> Surface:
-    return surface.bare if isinstance(surface, ModifiedSurface) else surface
-
-
 def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
     for name, surface in surfaces.items():
         trends: list[EmissivityTrend] = []
-        if isinstance(bare := _bare(surface), TrendSurface):
+        if isinstance(bare := bare_surface(surface), TrendSurface):
             trends.append(bare.trend)
         for one in surface.modifiers if isinstance(surface, ModifiedSurface) else ():
             if isinstance(one, FeatureTrends):
@@ -135,7 +132,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
     """Yield a sentence on each part of the scene outside of the emissivity maps."""
     for name, outer in surfaces.items():
-        surface = _bare(outer)
+        surface = bare_surface(outer)
         if not isinstance(surface, MapSurface):
             continue
         fraction = surface.known_fraction(scene)

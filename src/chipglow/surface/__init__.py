@@ -47,6 +47,7 @@ from chipglow.surface.surface import (
     Modifier as Modifier,
     Origin as Origin,
     Surface as Surface,
+    bare_surface as bare_surface,
 )
 from chipglow.surface.temperature import (
     EmissivityTrend as EmissivityTrend,

@@ -146,6 +146,11 @@ class Modifier(Part, ABC):
         return self
 
 
+def bare_surface(surface: Surface) -> Surface:
+    """Return a surface without its modifiers."""
+    return surface.bare if isinstance(surface, ModifiedSurface) else surface
+
+
 @dataclass(frozen=True)
 class ModifiedSurface(Surface):
     """A surface under modifiers, the first next to it; made by `Surface.modified`."""
