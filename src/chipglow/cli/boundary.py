@@ -66,7 +66,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _complete(group: TyperGroup, option: Any) -> None:
-    """Add the program's option and the check of its outputs to every command of a group."""
+    """Add the program's option and the check of its files to every command of a group."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
             _complete(command, option)
@@ -77,7 +77,7 @@ def _complete(group: TyperGroup, option: Any) -> None:
 
 def _checked(run: Any) -> Callable[..., Any]:
     def checked(**values: Any) -> Any:
-        opt.check_outputs(run, values)
-        return run(**values)
+        with opt.checked_files(run, values):
+            return run(**values)
 
     return checked

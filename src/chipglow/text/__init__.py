@@ -17,6 +17,7 @@ from chipglow.text.named_table import (
 from chipglow.text.notebook import result_html as result_html
 from chipglow.text.notes import Notes as Notes
 from chipglow.text.own_data import check_own_data as check_own_data
+from chipglow.text.regular_file import check_regular as check_regular
 from chipglow.text.template import commented_yaml as commented_yaml, json_schema as json_schema
 from chipglow.text.yaml_file import (
     DescriptionError as DescriptionError,
