@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from errno import ELOOP
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, Final
@@ -30,7 +31,7 @@ def named_files(values: Iterable[Any]) -> list[Path]:
     Raises
     ------
     ValueError
-        If a file is a pipe, a socket or a device.
+        If a file is a pipe, a socket, a device or a loop of links.
     """
     found: dict[Path, None] = {}
     waiting = [path for text in _texts(list(values)) for path in _typed(text)]
@@ -85,8 +86,16 @@ def _is_number(text: str) -> bool:
 
 
 def _existing(folder: Path, name: str) -> Iterator[Path]:
-    with suppress(OSError, ValueError):  # text that cannot be a name
-        if name and (folder / name).exists():
-            yield folder / name
-        elif has_magic(name):
-            yield from map(Path, glob(str(folder / name)))  # noqa: PTH207  the name may be a path
+    path = folder / name
+    try:
+        path.stat()
+    except OSError as error:
+        if error.errno == ELOOP:
+            raise ValueError(f"{path}: is a loop of links, expected a file") from None
+        if has_magic(name):
+            yield from map(Path, glob(str(path)))  # noqa: PTH207  the folder may have a pattern
+    except ValueError:  # text that cannot be a name
+        pass
+    else:
+        if name:
+            yield path

@@ -148,6 +148,8 @@ def written_files(folder: Path) -> set[str]:
 
 def _checked_target(path: Path) -> Path:
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if target.is_symlink():
+        raise OSError(f"{path}: is a loop of links, expected the name of a file or folder")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{path}: there is no folder {target.parent}")
     _check_writable(path, target.parent)
