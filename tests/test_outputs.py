@@ -142,6 +142,13 @@ def inputs(tmp_path, monkeypatch):
     (tmp_path / "study.yaml").write_text("scene: scene.nc\n")
     (tmp_path / "list.yaml").write_text("frames: [frames.npy]\n")
     np.save("frames.npy", np.zeros((2, 3, 4)))
+    (tmp_path / "study-of-list.yaml").write_text("calibration: list.yaml\n")
+    (tmp_path / "points.csv").write_text("temperature_degC,file\n400,frames.npy\n")
+    (tmp_path / "series.pvd").write_text('<DataSet timestep="0" file="chip_0.vtu"/>\n')
+    for name in ("chip_0.vtu", "frames_0.tif", "frames_1.tif", "calibration.yaml"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "several").mkdir()
+    (tmp_path / "several" / "frames_0.nc").write_text("")
     for name in ("linked.nc", "linked.gif"):
         (tmp_path / name).hardlink_to("scene.nc")
     return tmp_path
@@ -161,14 +168,73 @@ def inputs(tmp_path, monkeypatch):
         ("run study.yaml --out .", ".: holds "),
         ("error scene.nc --out study.yaml", "is a file"),
         ("cut study.yaml --out nowhere/new.nc", "nowhere/new.nc: there is no folder nowhere"),
+        (
+            "convert frames.npy --set calibration=calibration.yaml --out calibration.yaml",
+            "calibration.yaml: is also an input (calibration.yaml)",
+        ),
+        ("convert frames.npy --set bad_pixels=frames_0.tif --out frames_0.tif", "also an input"),
+        ("convert frames.npy --set flat_field={low:frames_0.tif} --out frames_0.tif", "an input"),
+        ("convert frames_*.tif --out frames_1.tif", "frames_1.tif: is also an input"),
+        ("convert study-of-list.yaml --out frames.npy", "frames.npy: is also an input"),
+        (
+            "convert frames_0.tif frames_1.tif --set a=several/frames_0.nc --out several --force",
+            "several/frames_0.nc: is also an input",
+        ),
+        ("import series.pvd --out chip_0.vtu", "chip_0.vtu: is also an input (chip_0.vtu)"),
+        (
+            "calibrate points.csv --band 3-5um --out frames.npy",
+            "frames.npy: is also an input (frames.npy)",
+        ),
+        (
+            "calibrate points.csv --band 3-5um --out new.png --plot ./new.png",
+            "--plot: new.png is also the output of --out, expected another name",
+        ),
+        (
+            "compare scene.nc linked.nc --out new --plot new/plot.png",
+            "--plot: new/plot.png is also the output of --out",
+        ),
     ],
 )
 def test_outputs_are_checked_before_a_command_begins(inputs, command, refused):
-    before = {path: path.read_bytes() for path in inputs.iterdir()}
+    before = {path: path.read_bytes() for path in inputs.rglob("*") if path.is_file()}
     result = CliRunner().invoke(app, command.split())
     assert result.exit_code == 2, result.output
     assert refused in " ".join(re.sub("[│╭╮╰╯─]", "", result.stderr).split())
-    assert {path: path.read_bytes() for path in inputs.iterdir()} == before
+    after = {path: path.read_bytes() for path in inputs.rglob("*") if path.is_file()}
+    assert after == before
+
+
+@posix
+@pytest.mark.parametrize(
+    "command",
+    [
+        "run pipe.yaml --out new",
+        "run of-pipe.yaml --out new",
+        "error pipe.nc --out new",
+        "show pipe.nc",
+        "app pipe.nc",
+        "convert frames.npy --set calibration=pipe.yaml",
+        "convert pipe.*",
+        "import pipe.nc",
+    ],
+)
+def test_a_pipe_is_refused_by_name_before_it_is_opened(inputs, command):
+    os.mkfifo("pipe.nc")
+    os.mkfifo("pipe.yaml")
+    Path("of-pipe.yaml").write_text("scene: pipe.nc\n")
+    result = CliRunner().invoke(app, command.split())
+    assert result.exit_code == 2, result.output
+    assert re.search(
+        r"chipglow: pipe\.(nc|yaml): is a pipe, expected a regular file", result.stderr
+    )
+
+
+@posix
+def test_a_device_is_refused_by_name(inputs):
+    result = CliRunner().invoke(app, ["run", "/dev/zero", "--out", "new"])
+    assert (result.exit_code, result.stderr) == (
+        2, "chipglow: /dev/zero: is a device, expected a regular file\n"
+    )  # fmt: skip
 
 
 WAITS = """

@@ -2,9 +2,7 @@
 
 import gc
 import signal
-import sys
 from collections.abc import Callable
-from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,6 +20,7 @@ from chipglow.cli.materials import materials
 from chipglow.cli.register import register
 from chipglow.cli.screen import current
 from chipglow.cli.sources import convert, import_source
+from chipglow.cli.streams import tolerate_failures
 from chipglow.cli.studies import cut, error, measure, reproduce, run, wavelengths
 from chipglow.cli.sweep import design, sweep
 
@@ -69,10 +68,7 @@ def main() -> None:
     """Run the command ``chipglow``."""
     # Imported modules stay: collecting garbage among them takes a tenth of a short command.
     gc.set_threshold(10_000)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            # A terminal without µ or − shows a question mark instead of ending the command.
-            stream.reconfigure(errors="replace")
+    tolerate_failures()
     # A terminated job cleans up as after Ctrl-C, unless nohup keeps it running.
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, signal.SIGTERM)

@@ -5,8 +5,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from chipglow.cli import options as opt
-
 if TYPE_CHECKING:
     from chipglow.camera import Measurement
     from chipglow.text import Notes
@@ -67,7 +65,7 @@ def for_each(files: Sequence[Path], make: Callable[[Path], Made]) -> dict[Path, 
 
 
 def output_files(
-    sources: Sequence[Path], folder: Path, ending: str, inputs: Iterable[Path], force: bool
+    sources: Sequence[Path], folder: Path, ending: str, force: bool
 ) -> dict[Path, Path]:
     """Return a file in a folder for each source, named after it, and create the folder.
 
@@ -87,11 +85,9 @@ def output_files(
         raise ValueError(f"{folder / twice}: is the output of several files, rename one of them")
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder}: is not a folder, expected one for several files")
-    known = list(inputs)
     folder.mkdir(exist_ok=True)
     for target in targets.values():
         check_output(target)
-        opt.check_file(target, known)
         if target.exists() and not force:
             raise FileExistsError(f"{target}: already exists; choose another folder or --force")
     return targets

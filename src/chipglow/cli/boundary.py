@@ -1,5 +1,6 @@
 """Conversion of errors to one line and an exit code."""
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Any, Final
@@ -7,11 +8,15 @@ from typing import Any, Final
 import typer
 from typer.core import TyperGroup
 
-from chipglow.cli import options as opt, screen
+from chipglow.cli import options as opt, screen, streams
 
 BAD_INPUT: Final = 2
 FAILED: Final = 1
 INTERRUPTED: Final = 130
+
+_NO_THREAD: Final = "can't start new thread"
+_FEWER: Final = "end other programs, raise the limit (ulimit -u), or set OMP_NUM_THREADS=1"
+_SMALLER: Final = "choose fewer or coarser samples, or end other programs"
 
 
 class Boundary(TyperGroup):
@@ -26,12 +31,21 @@ class Boundary(TyperGroup):
         screen.begin()
         return super().parse_args(ctx, args)
 
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run a command; what it could not print is an error at the end."""
+        try:
+            return super().main(*args, **kwargs)
+        finally:
+            if error := streams.failure():
+                print(f"chipglow: standard output: {error.strerror}", file=sys.stderr)
+                sys.exit(FAILED)
+
     def invoke(self, ctx: Any) -> Any:
         try:
             done = super().invoke(ctx)
             screen.current().close()
             return done
-        except (BrokenPipeError, typer.Exit):
+        except typer.Exit:
             raise
         except typer.BadParameter as error:
             if error.param is None or not error.message:  # a missing value
@@ -45,9 +59,18 @@ class Boundary(TyperGroup):
                 f"{error}: --resume continues from there" if str(error) else "nothing was written"
             )
             raise _ended(f"interrupted, {kept}", INTERRUPTED) from None
+        except MemoryError as error:
+            raise _ended(
+                ": ".join(filter(None, ("not enough memory", _one_line(error)))) + f"; {_SMALLER}",
+                FAILED,
+            ) from None
         except RuntimeError as error:
             from chipglow.cutting import SolverError
 
+            if str(error) == _NO_THREAD:
+                raise _ended(
+                    f"the system starts no more threads or processes; {_FEWER}", FAILED
+                ) from None
             if not isinstance(error, SolverError):
                 raise
             raise _ended(_one_line(error), FAILED) from None
@@ -66,7 +89,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _complete(group: TyperGroup, option: Any) -> None:
-    """Add the program's option and the check of its outputs to every command of a group."""
+    """Add the program's option and the check of its files to every command of a group."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
             _complete(command, option)
@@ -77,7 +100,9 @@ def _complete(group: TyperGroup, option: Any) -> None:
 
 def _checked(run: Any) -> Callable[..., Any]:
     def checked(**values: Any) -> Any:
-        opt.check_outputs(run, values)
-        return run(**values)
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+            raise ValueError("NUMBA_DISABLE_JIT is set, but chipglow needs compiled code: unset it")
+        with opt.checked_files(run, values):
+            return run(**values)
 
     return checked

@@ -1,9 +1,11 @@
-"""Arguments and options of several commands, and the check of output files."""
+"""Arguments and options of several commands, and the check of the files of a command."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from inspect import signature
+from itertools import permutations
+from os.path import realpath
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, get_args
 
@@ -132,17 +134,35 @@ def folder(text: str) -> Any:
     return typer.Option(metavar="DIR", help=text, file_okay=False, writable=True)
 
 
-def check_outputs(command: Callable[..., Any], values: Mapping[str, Any]) -> None:
-    """Check everything that a command writes before it does anything."""
+@contextmanager
+def checked_files(command: Callable[..., Any], values: Mapping[str, Any]) -> Iterator[None]:
+    """Check what a command reads and writes before it does anything.
+
+    While the block runs, no output replaces a file that the command reads.
+    """
+    from chipglow.cli.named_files import named_files
+    from chipglow.io.atomic import check_output, check_output_folder, preserved
+
     outputs = _outputs(command)
-    inputs = list(inputs_of([value for name, value in values.items() if name not in outputs]))
-    for name, option in outputs.items():
-        if values[name] is None:
-            continue
-        if option.file_okay:
-            check_file(Path(values[name]), inputs)
-        else:
-            _check_folder(Path(values[name]), inputs, values.get("force", False))
+    written = {name: Path(values[name]) for name in outputs if values[name] is not None}
+    _check_different(written)
+    with preserved(named_files(one for name, one in values.items() if name not in outputs)):
+        for name, path in written.items():
+            if outputs[name].file_okay:
+                check_output(path)
+            else:
+                check_output_folder(path, values.get("force", False))
+        yield
+
+
+def _check_different(outputs: Mapping[str, Path]) -> None:
+    """Refuse one name for two outputs, and an output in a folder that is another."""
+    places = {name: Path(realpath(path)) for name, path in outputs.items()}
+    for name, other in permutations(places, 2):
+        if places[other].is_relative_to(places[name]):
+            raise ValueError(
+                f"--{other}: {outputs[other]} is also the output of --{name}, expected another name"
+            )
 
 
 def _outputs(command: Callable[..., Any]) -> dict[str, Any]:
@@ -152,49 +172,3 @@ def _outputs(command: Callable[..., Any]) -> dict[str, Any]:
         for option in get_args(parameter.annotation)[1:]
         if getattr(option, "writable", False)
     }
-
-
-def inputs_of(value: Any) -> Iterator[Path]:
-    """Existing files that values of parameters name, and those that these name if they are YAML."""
-    from chipglow.text import read_yaml
-
-    for path in _existing(value, Path()):
-        yield path
-        if path.suffix.lower() in (".yaml", ".yml"):
-            with suppress(OSError, ValueError):  # the command refuses it
-                yield from _existing(read_yaml(path), path.parent)
-
-
-def _existing(value: Any, folder: Path) -> Iterator[Path]:
-    if isinstance(value, dict):
-        value = list(value.values())
-    if isinstance(value, list | tuple):
-        for one in value:
-            yield from _existing(one, folder)
-    elif isinstance(value, str | Path):
-        # A setting such as flat_field.low=low.tif names a file too.
-        for name in (value, str(value).partition("=")[2]):
-            with suppress(OSError, ValueError):  # text that cannot be a name
-                if name and (folder / name).exists():
-                    yield folder / name
-
-
-def check_file(path: Path, inputs: Iterable[Path]) -> None:
-    """Check that a file can be written and is none of the inputs."""
-    from chipglow.io.atomic import check_output
-
-    target = check_output(path)
-    for other in inputs:
-        if target.exists() and target.samefile(other):
-            raise ValueError(f"{path}: is also an input ({other}), expected another file")
-
-
-def _check_folder(path: Path, inputs: Iterable[Path], force: bool) -> None:
-    from chipglow.io.atomic import check_output_folder, written_files
-
-    target = check_output_folder(path, force).resolve()
-    ours = {target / name for name in written_files(target)}
-    for other in inputs:
-        place = other.resolve()
-        if place.is_relative_to(target) and place not in ours:
-            raise ValueError(f"{path}: holds the input {other}, expected another folder")

@@ -62,7 +62,7 @@ class Screen:
     def heading(self, text: str = "", stream: TextIO | None = None) -> None:
         """Print a line that the JSON object omits, by default on stdout."""
         if not self.json:
-            _write(text, stream)
+            print(text, file=stream, flush=True)
 
     def say(
         self, sentence: str, values: Mapping[str, Any] | None = None, stream: TextIO | None = None
@@ -96,7 +96,7 @@ class Screen:
             from importlib.metadata import version
 
             result = {"chipglow": version("chipglow")} | _plain(self._record)
-            _write(json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1))
+            print(json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1), flush=True)
             self._record = {}
 
     def _print(self, table: "Table") -> None:
@@ -170,14 +170,6 @@ def figure(draw: "Callable[..., Figure]", *arguments: Any) -> Callable[[Path], N
             drawn.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
 
     return write
-
-
-def _write(text: str, stream: TextIO | None = None) -> None:
-    """Print a text; when the reader of a pipe ends, the command continues and writes its files."""
-    try:
-        print(text, file=stream, flush=True)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
 
 
 def _plain(value: Any) -> Any:

@@ -100,9 +100,8 @@ def _scene_facts(scene: StoredScene, path: Path) -> _Rows:
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
     if "force_time" in data:
-        span = data["force_time"].values
         energies = ", with energies" if set(ENERGY_UNITS) <= set(data) else ""
-        yield "forces", f"{span.size} records{energies}"
+        yield "forces", f"{data.sizes['force_time']} records{energies}"
     size = path.stat().st_size
     each = size / (len(times) * raster.rows * raster.columns)
     yield "file", f"{size / 1e6:,.1f} MB, {each:.2g} bytes a sample ({scene.compression})"

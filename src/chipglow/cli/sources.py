@@ -30,12 +30,13 @@ def convert(
     ] = False,
 ) -> None:
     """Convert camera files to measurements."""
-    inputs = list(opt.inputs_of([sources, settings]))
+    from chipglow.io.atomic import check_output
+
     if len(sources) > 1:
-        _convert_many(sources, out, settings or [], inputs, force)
+        _convert_many(sources, out, settings or [], force)
         return
     if out is not None:
-        opt.check_file(out, inputs)
+        check_output(out)
     _convert_one(sources[0], out, settings or [])
 
 
@@ -66,9 +67,7 @@ def _convert_one(source: Path, out: Path | None, settings: list[str]) -> None:
     finish(measurement.notes, (out, partial(write_measurement, measurement)))
 
 
-def _convert_many(
-    sources: list[Path], out: Path | None, settings: list[str], inputs: list[Path], force: bool
-) -> None:
+def _convert_many(sources: list[Path], out: Path | None, settings: list[str], force: bool) -> None:
     import numpy as np
     import pandas as pd
 
@@ -76,7 +75,7 @@ def _convert_many(
     from chipglow.io import is_measurement, write_measurement
     from chipglow.laboratory.recordings import load_measurement
 
-    targets = {} if out is None else output_files(sources, out, ".nc", inputs, force)
+    targets = {} if out is None else output_files(sources, out, ".nc", force)
     notes = {}
 
     def converted(source: Path) -> dict[str, object]:

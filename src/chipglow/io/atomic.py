@@ -7,11 +7,13 @@ import secrets
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from glob import escape
 from pathlib import Path
 from threading import current_thread, main_thread
+from types import MappingProxyType
 from typing import Final
 
 MANIFEST: Final = ".chipglow-files"
@@ -24,6 +26,22 @@ _OF_THE_SYSTEM: Final = {MANIFEST, ".DS_Store", "Thumbs.db", "desktop.ini"}
 _NO_ROOM: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _AT_FDCWD: Final = -100
 _RENAME_EXCHANGE: Final = 2
+
+_INPUTS: ContextVar[Mapping[tuple[int, int], Path]] = ContextVar(
+    "inputs", default=MappingProxyType({})
+)
+"""Files that no output replaces, by device and inode."""
+
+
+@contextmanager
+def preserved(inputs: Iterable[Path]) -> Iterator[None]:
+    """Refuse each output that would replace one of these files while the block runs."""
+    known = {(status.st_dev, status.st_ino): path for path in inputs if (status := path.stat())}
+    token = _INPUTS.set(known)
+    try:
+        yield
+    finally:
+        _INPUTS.reset(token)
 
 
 @contextmanager
@@ -88,6 +106,10 @@ def check_output(path: Path) -> Path:
         raise IsADirectoryError(f"{path}: is a folder, expected the name of a file")
     if target.exists() and not target.is_file():
         raise OSError(f"{path}: is a device or another special file, expected a regular file")
+    if target.exists():
+        status = target.stat()
+        if other := _INPUTS.get().get((status.st_dev, status.st_ino)):
+            raise ValueError(f"{path}: is also an input ({other}), expected another file")
     return target
 
 
@@ -99,7 +121,14 @@ def check_output_folder(path: Path, force: bool = False) -> Path:
     if not target.is_dir():
         raise NotADirectoryError(f"{path}: is not a folder")
     _check_writable(path, target)
-    foreign = sorted(_files(target) - written_files(target))
+    ours = written_files(target)
+    place = Path(os.path.realpath(target))
+    replaceable = {place / name for name in ours}
+    for other in _INPUTS.get().values():
+        inside = Path(os.path.realpath(other))
+        if inside.is_relative_to(place) and inside not in replaceable:
+            raise ValueError(f"{path}: holds the input {other}, expected another folder")
+    foreign = sorted(_files(target) - ours)
     if foreign and not force:
         raise FileExistsError(
             f"{path}: holds {foreign[0]}, which chipglow did not write; choose a new or empty "
@@ -119,6 +148,8 @@ def written_files(folder: Path) -> set[str]:
 
 def _checked_target(path: Path) -> Path:
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if target.is_symlink():
+        raise OSError(f"{path}: is a loop of links, expected the name of a file or folder")
     if not target.parent.is_dir():
         raise FileNotFoundError(f"{path}: there is no folder {target.parent}")
     _check_writable(path, target.parent)

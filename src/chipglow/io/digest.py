@@ -16,7 +16,8 @@ import numpy as np
 from chipglow.io.atomic import atomic_path, uninterrupted
 from chipglow.io.sandbox import Sandbox
 from chipglow.io.sources import SourceError
-from chipglow.text import check_own_data
+from chipglow.io.sources.source import naming
+from chipglow.text import HDF5_ERRORS, check_bounds, check_own_data
 
 PATIENCE: Final = 30.0
 """Time limit of HDF5 for the smallest file in s; it takes 0.2 s."""
@@ -97,30 +98,37 @@ def is_intact(path: Path) -> bool | None:
     return end == _MARK + sha256(content[:size].data).digest()
 
 
-def check_file(path: Path) -> None:
-    """Refuse an HDF5 file that is damaged or takes data from other files.
+def check_file(path: Path, by_frame: bool = False) -> None:
+    """Refuse an HDF5 file that is damaged, takes data from other files or exceeds the memory.
 
     A file without a digest, or with one that does not match, is examined in a subprocess, as HDF5
     can loop for ever at a damaged file.
     """
     intact = is_intact(path)
-    if not intact and h5py.is_hdf5(path):
+    if not h5py.is_hdf5(path):
+        if intact is False:
+            raise ValueError("the file is damaged: its digest does not match")
+        return
+    if not intact:
         patience = PATIENCE + PATIENCE_PER_BYTE * path.stat().st_size
-        Sandbox("HDF5", patience).answer(partial(_read_all, str(path), intact is False))
+        Sandbox("HDF5", patience).answer(partial(_read_all, str(path), intact is False, by_frame))
     if intact is False:
         raise ValueError("the file is damaged: its digest does not match")
     check_own_data(path)
+    check_bounds(path, by_frame)
 
 
-def _read_all(path: str, whole: bool) -> None:
+def _read_all(path: str, whole: bool, by_frame: bool) -> None:
     """Read all attributes and places of the data of a file and, if `whole`, its data."""
+    with naming("HDF5"):
+        check_bounds(Path(path), by_frame)
     with h5py.File(path, "r") as file:
         names = ["/"]
         file.visit(names.append)
         for name in names:
             try:
                 _read(file[name], whole)
-            except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+            except HDF5_ERRORS as error:
                 raise SourceError(f"{name!r} is damaged: {error}") from None
 
 

@@ -13,6 +13,7 @@ from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.digest import check_file, is_intact, write_hdf5
 from chipglow.io.packing import COMPRESSION
+from chipglow.text import HDF5_ERRORS, MemoryLimitError
 
 Made = TypeVar("Made")
 
@@ -68,7 +69,9 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
         check_file(path)
         data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         return made_of(data)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+    except MemoryLimitError as error:
+        raise ValueError(f"{path}: {error}") from None
+    except HDF5_ERRORS as error:
         reason = str(error).split("\n", 1)[0]
         raise ValueError(f"{path}: not {what}, or truncated, expected {kind}: {reason}") from error
 
@@ -86,5 +89,5 @@ def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
     try:
         with h5py.File(path, "r") as file:
             return set(names) <= set(file)
-    except OSError:
+    except HDF5_ERRORS:
         return False

@@ -38,6 +38,7 @@ from chipglow.scene import (
 from chipglow.scene.scene import FORCE_UNITS, OVERVIEW_FIELDS, check_frame, raster_coordinates
 from chipglow.scene.splines import Lattice, SplineFrame, SplineSamples
 from chipglow.scene.tool_outline import tool_attributes
+from chipglow.text import HDF5_ERRORS, MemoryLimitError
 
 SCENE_FORMAT: Final = 6
 """Changes when the same scene is written to a file in another way."""
@@ -373,11 +374,11 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected a scene")
     try:
-        check_file(path)
+        check_file(path, by_frame=True)
         return StoredScene(path)
-    except SceneError as error:
+    except (SceneError, MemoryLimitError) as error:
         raise SceneError(f"{path}: {error}") from error
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+    except HDF5_ERRORS as error:
         raise SceneError(
             f"{path}: not a scene, or truncated, expected a NetCDF-4 file: {_first_line(error)}"
         ) from error

@@ -1,7 +1,21 @@
-"""HDF5 files whose data lie in the file itself."""
+"""HDF5 files whose data lie in the file itself and fit into memory."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+from chipglow.text.memory import MemoryLimitError, check_memory
+
+HDF5_ERRORS: Final = (OSError, ValueError, LookupError, RuntimeError, TypeError, SystemError)
+"""What h5py and xarray raise at a damaged file."""
+
+_MOST_OBJECTS: Final = 10_000
+"""Groups and datasets of a file that chipglow reads as a whole; its own have about thirty."""
+
+_COPIES: Final = 4
+"""Copies of the data that reading and conversion hold at a time."""
+
+_SAMPLE_BYTES: Final = 36
+"""Size of a sample of a scene: nine fields in single precision."""
 
 
 def check_own_data(path: Path) -> None:
@@ -23,3 +37,42 @@ def check_own_data(path: Path) -> None:
 
         if name := file.visititems_links(elsewhere):
             raise ValueError(f"{name!r} is in another file, expected all data in the file itself")
+
+
+def check_bounds(path: Path, by_frame: bool = False) -> None:
+    """Refuse an HDF5 file that does not fit into memory, by the sizes that its datasets declare.
+
+    Of a scene, which is read by frame, only one frame counts.
+    """
+    import h5py
+
+    sizes: list[float] = []
+    with h5py.File(path, "r") as file:
+
+        def count(name: str, item: Any) -> None:
+            is_data = isinstance(item, h5py.Dataset)
+            sizes.append(_size(name, item, by_frame) if is_data else 0.0)
+            if len(sizes) > _MOST_OBJECTS:
+                raise MemoryLimitError(
+                    f"has over {_MOST_OBJECTS} groups and variables, expected a scene or a result"
+                )
+
+        file.visititems(count)
+        if by_frame:
+            rows, columns = (float(file[axis].size) if axis in file else 0.0 for axis in "yx")
+            sizes.append(_SAMPLE_BYTES * rows * columns)
+    check_memory("the file", _COPIES * sum(sizes))
+
+
+def _size(name: str, dataset: Any, by_frame: bool) -> float:
+    import h5py
+
+    if dataset.dtype.kind == "O" and h5py.check_string_dtype(dataset.dtype) is None:
+        raise ValueError(f"{name!r} has values of another kind, expected numbers or text")
+    lengths = dataset.shape or ()
+    # Fields over time, y and x, and splines over time, are read frame by frame.
+    kept = lengths[1:] if by_frame and len(lengths) > 2 else lengths
+    size = float(dataset.dtype.itemsize)
+    for length in kept:
+        size *= length
+    return size

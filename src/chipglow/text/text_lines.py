@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from chipglow.text.cells import NumberFormat, TableError
+from chipglow.text.regular_file import check_regular
 
 _LARGEST_FILE: Final = 250_000_000
 """In bytes; the lines of such a table take about 1 GB of memory."""
@@ -41,6 +42,7 @@ class TextLines:
 
 def read_lines(path: Path) -> TextLines:
     """Read the lines of a text file in UTF-8, UTF-16 or Windows-1252."""
+    check_regular(path)
     size = path.stat().st_size
     if size > _LARGEST_FILE:
         raise TableError(f"{path}: has {size} bytes, expected up to {_LARGEST_FILE}")

@@ -6,6 +6,8 @@ from typing import Any, Final
 
 import yaml
 
+from chipglow.text.regular_file import check_regular
+
 _WHOLE: Final = "tag:yaml.org,2002:int"
 _FRACTION: Final = "tag:yaml.org,2002:float"
 
@@ -20,6 +22,7 @@ class DescriptionError(ValueError):
 
 def read_small_text(path: Path) -> str:
     """Read a text file in UTF-8, with or without a byte order mark."""
+    check_regular(path)
     if path.stat().st_size > _LARGEST_FILE:
         most = f"{_LARGEST_FILE // 1000} kB"
         raise DescriptionError(f"{path}: is too large, expected a text of up to {most}")

@@ -26,7 +26,7 @@ from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Array, Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
 from chipglow.radiometry import Band
-from chipglow.text import check_own_data, read_matrix
+from chipglow.text import HDF5_ERRORS, check_bounds, check_own_data, read_matrix
 from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
@@ -456,9 +456,12 @@ def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
         check_own_data(path)
+        check_bounds(path)
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())
             return from_xarray(data, "kernel"), float(kernel["spacing"]), stated
-    except OSError as error:
+    except ValueError:
+        raise
+    except HDF5_ERRORS as error:
         raise ValueError(f"truncated, or not a NetCDF-4 file: {error}") from error

@@ -1,0 +1,156 @@
+"""Files that declare more than fits, or that are damaged: one line, at once."""
+
+import os
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from command import refused
+from test_io import a_file
+
+from chipglow.io import open_scene, read_measurement
+from chipglow.text import MemoryLimitError, check_bounds, check_memory
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX")
+
+BILLION = 10**9
+
+
+def bomb(path, **shapes):
+    """A file of some kB that declares variables of these shapes, of which nothing is stored."""
+    with h5py.File(path, "w") as file:
+        for name, shape in shapes.items():
+            file.create_dataset(name, shape, np.float32, chunks=True, compression="gzip")
+    return path
+
+
+@pytest.mark.parametrize(
+    "shapes",
+    [
+        {"temperature": (2, 50_000, 50_000)},
+        {"temperature": (2, 4, 4), "force_time": (BILLION,)},
+        {"temperature": (2, 4, 4), "time": (BILLION,)},
+        {"temperature": (2, 4, 4), "x": (100_000,), "y": (100_000,)},
+    ],
+)
+@pytest.mark.parametrize("command", ["show", "error"])
+def test_a_scene_that_declares_more_than_the_memory_is_refused(
+    tmp_path, monkeypatch, shapes, command
+):
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "8 GB")
+    path = bomb(tmp_path / "scene.nc", **shapes)
+    options = ["--out", tmp_path / "out"] if command == "error" else []
+    refused([command, path, *options], "scene.nc", "GB of memory, the limit is 8 GB")
+
+
+def test_a_measurement_counts_as_a_whole_and_a_scene_by_frame(tmp_path, monkeypatch):
+    # 40 frames of 1 MB in four copies are 160 MB; a frame of the scene is 4 MB.
+    path = bomb(tmp_path / "images.nc", radiance=(40, 500, 500))
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "100 MB")
+    check_bounds(path, by_frame=True)
+    with pytest.raises(MemoryLimitError, match=r"0\.16 GB of memory, the limit is 0\.1 GB"):
+        check_bounds(path)
+    with pytest.raises(ValueError, match=r"images\.nc: .*the limit is 0\.1 GB"):
+        read_measurement(path)
+
+
+def test_the_limit_is_the_memory_available_unless_stated(monkeypatch):
+    monkeypatch.delenv("CHIPGLOW_MEMORY", raising=False)
+    check_memory("a number", 8.0)
+    with pytest.raises(MemoryLimitError, match="all: needs about"):
+        check_memory("all", 1e18)
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "2000000 TB")
+    check_memory("all", 1e18)
+    monkeypatch.setenv("CHIPGLOW_MEMORY", "much")
+    with pytest.raises(ValueError, match="CHIPGLOW_MEMORY: 'much', expected a size such as 64 GB"):
+        check_memory("a number", 8.0)
+
+
+def test_very_many_variables_deep_groups_and_references_are_refused(tmp_path):
+    with h5py.File(tmp_path / "many.nc", "w") as file:
+        for number in range(10_001):
+            file.create_group(f"g{number}")
+    with h5py.File(tmp_path / "references.nc", "w") as file:
+        file["temperature"] = np.zeros((2, 3, 4), np.float32)
+        file["time"] = np.array([file["temperature"].ref] * 2, h5py.ref_dtype)
+    refused(["show", tmp_path / "references.nc"], "'time' has values of another kind")
+    with pytest.raises(ValueError, match="has over 10000 groups and variables"):
+        open_scene(tmp_path / "many.nc")
+
+
+# The last bytes are the digest, the splines or fields, and the metadata of HDF5.
+@pytest.mark.parametrize("zeroed", [20, 300, 1000, 4000])
+def test_a_file_whose_end_is_zeroed_is_refused(tmp_path, zeroed):
+    path = a_file(tmp_path)
+    content = path.read_bytes()
+    path.write_bytes(content[:-zeroed] + bytes(zeroed))
+    refused(["show", path], str(path))
+    with pytest.raises(ValueError, match=path.name):
+        read_measurement(path)
+
+
+def started(*arguments, prefix="", **environment):
+    """Exit code, standard output and standard error of the command in a shell."""
+    command = f"{sys.executable} -m chipglow {' '.join(arguments)} {prefix}"
+    done = subprocess.run(
+        command, shell=True, capture_output=True, text=True, env={**os.environ, **environment}
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@posix
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")  # noqa: PTH110
+@pytest.mark.parametrize("arguments", ["--help", "--version", "materials --json"])
+def test_a_full_standard_output_is_one_line(arguments):
+    assert started(arguments, prefix="> /dev/full") == (
+        1, "", "chipglow: standard output: No space left on device\n"
+    )  # fmt: skip
+
+
+@posix
+@pytest.mark.parametrize("arguments", ["--version", "materials"])
+def test_a_closed_standard_output_discards_what_is_printed(arguments):
+    assert started(arguments, prefix=">&-") == (0, "", "")
+
+
+@posix
+def test_a_command_whose_output_cannot_be_printed_still_writes_its_file(tmp_path):
+    code, _, _ = started("init", str(tmp_path / "study.yaml"), prefix="> /dev/full 2> /dev/full")
+    assert code == 1
+    assert (tmp_path / "study.yaml").stat().st_size > 1000
+
+
+def test_without_compiled_code_no_command_begins(monkeypatch):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    refused(["materials"], "NUMBA_DISABLE_JIT is set")
+
+
+@posix
+@pytest.mark.parametrize(
+    "command",
+    ["run loop.yaml --out new", "show loop.nc", "error loop.nc --out new", "convert loop/a.tif"],
+)
+def test_a_loop_of_links_is_refused_by_name(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    for name in ("loop.yaml", "loop.nc", "loop"):
+        (tmp_path / name).symlink_to(name)
+    refused(command.split(), "loop", "is a loop of links")
+    refused(["init", "loop.yaml", "--force"], "loop.yaml: is a loop of links")
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (MemoryError("Unable to allocate 298. GiB"), "not enough memory: Unable to allocate 298"),
+        (MemoryError(), "not enough memory; choose fewer or coarser samples"),
+        (RuntimeError("can't start new thread"), "the system starts no more threads"),
+    ],
+)
+def test_a_lack_of_memory_or_threads_is_one_line_with_a_hint(tmp_path, monkeypatch, error, text):
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr("chipglow.study.study_text", fails)
+    refused(["init", tmp_path / "study.yaml"], text, code=1)
