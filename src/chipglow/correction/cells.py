@@ -79,7 +79,9 @@ class Parts:
             weights += [weight, -weight]
         rows = np.tile(part, len(columns))
         entries = np.concatenate(weights), (rows, np.concatenate(columns))
-        return sparse.csr_array(entries, shape=(self.size, self.size))
+        interpolation = sparse.csr_array(entries, shape=(self.size, self.size))
+        interpolation.eliminate_zeros()
+        return interpolation
 
     @cached_property
     def slopes(self) -> tuple[Any, Any]:
