@@ -23,7 +23,9 @@ _LARGEST_STEP: Final = 0.7
 _CONVERGED: Final = 3e-3
 """Change of the logarithm of radiance, 0.3 %, below which the steps end: 0.2 K at 1000 K."""
 
-_MOST_STEPS: Final = 8
+_STEPS: Final = 2
+"""Steps for each estimate of the weights, which a following one improves."""
+
 _STEP_TOLERANCE: Final = 3e-2
 _DRAW_TOLERANCE: Final = 1e-2
 _CHANGE_TOLERANCE: Final = 1e-3
@@ -88,12 +90,11 @@ class Problem:
 
     def __post_init__(self) -> None:
         self.curvature = Curvature.of(self.parts)
-        self._weigh(_START_CURVATURE**2)
+        self._weigh(np.full(self.curvature.part.size, _START_CURVATURE**2))
 
-    def _weigh(self, squares: Array | float) -> None:
-        """Set the weights of the prior by mean squares of the curvatures."""
-        self.weights = self.curvature.weights(squares, self.parts)
-        matrix = self.curvature.matrix
+    def _weigh(self, variances: Array) -> None:
+        """Set the weights of the prior by the variances of the curvatures."""
+        self.weights, matrix = 1 / variances, self.curvature.matrix
         self.bending = sparse.csr_array(matrix.T @ sparse.diags_array(self.weights) @ matrix)
 
     @cached_property
@@ -105,20 +106,32 @@ class Problem:
         """Return the mean blackbody radiance of the parts in W/(m² sr)."""
         return np.asarray(np.exp(self.parts.at_centroids @ x))
 
-    def solve(self, generator: np.random.Generator, check: Callable[[], None]) -> "Posterior":
+    def solve(
+        self,
+        generator: np.random.Generator,
+        check: Callable[[], None],
+        former: "Posterior | None" = None,
+    ) -> "Posterior":
         """Return the solution, with weights of the prior that follow from the data.
 
         The variance of the curvatures is their mean square around each place, which includes their
-        uncertainty (expectation maximisation of the evidence, with a few draws for it).
+        uncertainty (expectation maximisation of the evidence, with a few draws for it). The
+        solution of a `former` problem with other outlines is a start that needs fewer rounds.
         """
-        x = self._start()
-        posterior = self._maximum(x, _MOST_STEPS, check)
-        for _ in range(_ROUNDS):
+        if former is None:
+            x, rounds = self._start(), _ROUNDS
+        else:
+            x, rounds = former.problem.parts.continued(former.x, self.parts), 1
+            variances = former.problem.parts.continued(former.variances, self.parts)
+            self._weigh(variances[self.curvature.part])
+        posterior = self._maximum(x, check)
+        for _ in range(rounds):
             draws = posterior.draws(generator, _DRAWS_PER_ROUND)
             check()
             uncertain = ((self.curvature.matrix @ draws.T) ** 2).mean(axis=1)
-            self._weigh((self.curvature.matrix @ posterior.x) ** 2 + uncertain)
-            posterior = self._maximum(posterior.x, 2, check)
+            squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
+            self._weigh(self.curvature.variances(squares, self.parts))
+            posterior = self._maximum(posterior.x, check)
         return posterior
 
     def _start(self) -> Array:
@@ -131,11 +144,11 @@ class Problem:
         least = 1e-3 * np.abs(np.median(radiance))
         return np.asarray(np.log(np.maximum(radiance, least)))
 
-    def _maximum(self, x: Array, steps: int, check: Callable[[], None]) -> "Posterior":
-        """Return the most probable solution with the present weights of the prior."""
+    def _maximum(self, x: Array, check: Callable[[], None]) -> "Posterior":
+        """Return the most probable solution with the present weights of the prior, nearly."""
         posterior = Posterior(self, x)
         factor = posterior.factor()
-        for _ in range(steps):
+        for _ in range(_STEPS):
             check()
             posterior.preconditioner = factor
             change = posterior.solved(posterior.gradient, _STEP_TOLERANCE)
@@ -168,6 +181,14 @@ class Posterior:
     def residual(self) -> Array:
         """Measured minus predicted radiance, (y, x)."""
         return np.asarray(self.problem.image.radiance - self.predicted)
+
+    @property
+    def variances(self) -> Array:
+        """Mean variance of the curvatures around each part, (part,)."""
+        part, size = self.problem.curvature.part, self.x.size
+        count = np.bincount(part, minlength=size)
+        sums = np.bincount(part, 1 / self.prior_weights, size)
+        return np.where(count > 0, sums / np.maximum(count, 1), sums.sum() / part.size)
 
     @property
     def misfit(self) -> float:
@@ -262,9 +283,7 @@ class Posterior:
         for number, column in enumerate(light.T):
             image = self.pixel_weights * formation.forward(column.reshape(shape))
             light[:, number] = formation.adjoint(image).ravel()
-        return np.asarray(
-            self.light_change.T @ light + self.bending @ changes + _RIDGE * changes
-        )
+        return np.asarray(self.light_change.T @ light + self.bending @ changes + _RIDGE * changes)
 
     def factor(self) -> Any:
         """Return factors of the Hessian without blur, which couples the parts of a pixel only."""

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import gaussian_filter
 
 from chipglow.camera import ImageFormation, MeasuredPSF, Measurement, PointSpreadFunction
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA
@@ -285,17 +285,6 @@ def _image_of_moved(posterior: Posterior, observed: ObservedObject) -> Array:
     """Return the image of moved zones whose fields stay and continue into new cells."""
     problem = posterior.problem
     parts = cut_cells(observed, problem.parts.pixels)
-    x = np.empty(parts.size)
-    for number in np.unique(parts.zone):
-        own = parts.zone == number
-        x[own] = _continued(posterior.x, problem.parts.index, int(number))[parts.cell[own]]
+    x = problem.parts.continued(posterior.x, parts)
     light = parts.spread(x) @ (parts.area * parts.emissivity * np.exp(parts.at_centroids @ x))
     return problem.formation.forward(light.reshape(parts.cells.shape))
-
-
-def _continued(x: Array, index: NDArray[np.intp], zone: int) -> Array:
-    """Return the values of a zone at all cells, those of the nearest cell beyond the zone."""
-    if zone >= len(index) or (index[zone] < 0).all():
-        return np.full(index[0].size, float(np.median(x)))
-    nearest = distance_transform_edt(index[zone] < 0, return_distances=False, return_indices=True)
-    return np.asarray(x[index[zone][tuple(nearest)]]).ravel()
