@@ -1,14 +1,16 @@
 """The unknowns: parts of square cells that the outlines of the zones cut."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
 
-from chipglow.correction.zones import ObservedObject
+from chipglow.correction.zones import NOTHING, ObservedObject
 from chipglow.quantities import Array
 from chipglow.scene import Raster
 
@@ -16,7 +18,10 @@ CELLS_PER_PIXEL: Final = 2
 """Cells along the side of a pixel: the finest detail of which a pixel image contains data."""
 
 _POINTS: Final = 8
-"""Points along the side of a cell at which zones are looked up: an outline cuts a cell to 1/64."""
+"""Points along the side of a cell that an outline may cut: it is cut to 1/64."""
+
+_FEW_POINTS: Final = 4
+"""Points along the side of the cells at which outlines are searched."""
 
 _LEAST_AREA: Final = 1e-9
 
@@ -79,7 +84,9 @@ class Parts:
             weights += [weight, -weight]
         rows = np.tile(part, len(columns))
         entries = np.concatenate(weights), (rows, np.concatenate(columns))
-        return sparse.csr_array(entries, shape=(self.size, self.size))
+        interpolation = sparse.csr_array(entries, shape=(self.size, self.size))
+        interpolation.eliminate_zeros()
+        return interpolation
 
     @cached_property
     def slopes(self) -> tuple[Any, Any]:
@@ -124,6 +131,18 @@ class Parts:
         )
         return sparse.csr_array(entries, shape=(self.cells.rows * self.cells.columns, self.size))
 
+    def continued(self, values: Array, others: "Parts") -> Array:
+        """Return values of parts at the parts of other outlines, from the nearest of each zone."""
+        found = np.full(others.size, float(np.median(values)))
+        for zone, index in enumerate(self.index):
+            own = others.zone == zone
+            if (index >= 0).any():
+                nearest = distance_transform_edt(
+                    index < 0, return_distances=False, return_indices=True
+                )
+                found[own] = values[index[tuple(nearest)]].ravel()[others.cell[own]]
+        return found
+
     @cached_property
     def pixel(self) -> NDArray[np.intp]:
         """Index of each part's pixel, in rows from the top."""
@@ -136,8 +155,8 @@ def cut_cells(observed: ObservedObject, pixels: Raster) -> Parts:
     """Cut the cells of an image by the outlines of zones."""
     rows, columns = (CELLS_PER_PIXEL * count for count in pixels.shape)
     cells = Raster(pixels.left, pixels.top, pixels.spacing / CELLS_PER_PIXEL, rows, columns)
-    points = _Points.looked_up(observed, cells)
-    found = [points.of_zone(number) for number in range(len(observed.zones))]
+    points = _looked_up(observed, cells)
+    found = [_zone_parts(number, points) for number in range(len(observed.zones))]
     zone = np.repeat(np.arange(len(found)), [one["cell"].size for one in found])
     joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
     if not zone.size:
@@ -160,41 +179,66 @@ class _Points:
     Places are to the right of and below a cell's centre, in widths of a cell.
     """
 
+    cell: NDArray[np.intp]
     labels: NDArray[np.int16]
+    """Index of the zone; `NOTHING` for points that do not emit."""
     emissivity: Array
     right: Array
     down: Array
 
     @classmethod
-    def looked_up(cls, observed: ObservedObject, cells: Raster) -> "_Points":
-        offset = (np.arange(_POINTS) + 0.5) / _POINTS - 0.5
+    def looked_up(
+        cls, observed: ObservedObject, cells: Raster, cell: NDArray[np.intp], count: int
+    ) -> "_Points":
+        """Look up `count` points along the side of each of the cells."""
+        offset = (np.arange(count) + 0.5) / count - 0.5
         down, right = (grid.ravel() for grid in np.meshgrid(offset, offset, indexing="ij"))
-        centres = cells.centres.reshape(-1, 2)
-        x = centres[:, :1] + cells.spacing * right
-        y = centres[:, 1:] - cells.spacing * down
+        row, column = np.divmod(cell[:, None], cells.columns)
+        x = cells.left + cells.spacing * (column + 0.5 + right)
+        y = cells.top - cells.spacing * (row + 0.5 + down)
         labels, emissivity = observed.look_up(x, y)
-        return cls(labels, emissivity, right, down)
+        return cls(cell, np.where(emissivity > 0, labels, NOTHING), emissivity, right, down)
+
+    def chosen(self, mask: NDArray[np.bool_]) -> "_Points":
+        """Return some of the cells."""
+        labels, emissivity = self.labels[mask], self.emissivity[mask]
+        return replace(self, cell=self.cell[mask], labels=labels, emissivity=emissivity)
 
     def of_zone(self, number: int) -> dict[str, Array]:
         """Return area, emissivity, centroid and second moments of a zone's part of each cell."""
-        # Points without emission, such as those of emissivity 0, belong to no part.
-        within = ((self.labels == number) & (self.emissivity > 0)).astype(np.float64)
+        within = (self.labels == number).astype(np.float64)
         area = within.mean(axis=1)
-        cell = np.flatnonzero(area > _LEAST_AREA)
-        within = within[cell] / within[cell].sum(axis=1, keepdims=True)
+        lit = np.flatnonzero(area > _LEAST_AREA)
+        within = within[lit] / within[lit].sum(axis=1, keepdims=True)
         right, down = within @ self.right, within @ self.down
-        own = 1 / (12 * _POINTS**2)
+        own = 1 / (12 * self.right.size)
         """Second moment of the square that each point stands for."""
         return {
-            "cell": cell.astype(np.float64),
-            "area": area[cell],
-            "emissivity": (within * self.emissivity[cell]).sum(axis=1),
+            "cell": self.cell[lit].astype(np.float64),
+            "area": area[lit],
+            "emissivity": (within * self.emissivity[lit]).sum(axis=1),
             "right": right,
             "down": down,
             "across": within @ self.right**2 + own - right**2,
             "along": within @ self.down**2 + own - down**2,
             "mixed": within @ (self.right * self.down) - right * down,
         }
+
+
+def _looked_up(observed: ObservedObject, cells: Raster) -> tuple[_Points, _Points]:
+    """Return points in the cells within a zone, and closer ones in those at outlines."""
+    few = _Points.looked_up(observed, cells, np.arange(cells.rows * cells.columns), _FEW_POINTS)
+    least, most = (end(few.labels, axis=1).reshape(cells.shape) for end in (np.min, np.max))
+    whole = (minimum_filter(least, 3) == maximum_filter(most, 3)).ravel()
+    return few.chosen(whole), _Points.looked_up(observed, cells, few.cell[~whole], _POINTS)
+
+
+def _zone_parts(number: int, points: Sequence[_Points]) -> dict[str, Array]:
+    """Return the parts of a zone in the order of their cells."""
+    found = [some.of_zone(number) for some in points]
+    joined = {name: np.concatenate([one[name] for one in found]) for name in found[0]}
+    order = np.argsort(joined["cell"])
+    return {name: values[order] for name, values in joined.items()}
 
 
 def _three_weights(centroid: Array, variance: Array) -> tuple[Array, Array, Array]:

@@ -210,7 +210,7 @@ def _corrected(
             break
         observed = known.observed.moved(_added(known.observed.motion, fit.motion))
         known = replace(known, observed=observed)
-        posterior = _solution(image, camera, known, pixels, generator, progress)
+        posterior = _solution(image, camera, known, pixels, generator, progress, posterior)
         fit = fit_outline(posterior, known)
     progress(0.5)
     bias = posterior.bias()
@@ -283,6 +283,7 @@ def _solution(
     pixels: Raster,
     generator: np.random.Generator,
     progress: Callable[[float], None],
+    former: Posterior | None = None,
 ) -> Posterior:
     parts = cut_cells(known.observed, pixels)
     formation = camera.image_formation(parts.cells, pixels=pixels)
@@ -290,7 +291,8 @@ def _solution(
     cells = parts.cells.rows * parts.cells.columns
     mirrored = np.bincount(parts.cell, parts.area * (1 - parts.emissivity), cells)
     reflected = room * formation.forward(mirrored.reshape(parts.cells.shape))
-    return Problem(image, parts, formation, reflected).solve(generator, lambda: progress(0.0))
+    problem = Problem(image, parts, formation, reflected)
+    return problem.solve(generator, lambda: progress(0.0), former)
 
 
 def _correction_of(

@@ -1,16 +1,16 @@
 """The most probable radiance of the parts, and draws from its distribution (Gauss-Newton, CG)."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.sparse.linalg import splu
 
 from chipglow.camera import ImageFormation
 from chipglow.correction.cells import CELLS_PER_PIXEL, Parts
@@ -23,11 +23,18 @@ _LARGEST_STEP: Final = 0.7
 _CONVERGED: Final = 3e-3
 """Change of the logarithm of radiance, 0.3 %, below which the steps end: 0.2 K at 1000 K."""
 
-_MOST_STEPS: Final = 8
+_STEPS: Final = 2
+"""Steps for each estimate of the weights, which a following one improves."""
+
 _STEP_TOLERANCE: Final = 3e-2
 _DRAW_TOLERANCE: Final = 1e-2
 _CHANGE_TOLERANCE: Final = 1e-3
 """Relative residuals of steps, which are repeated, of draws, and of changes by single errors."""
+
+_MOST_ITERATIONS: Final = 200
+
+_BLURRED_WEIGHT: Final = 0.5
+"""Weight of the data in the preconditioner, which has no blur: blur halves about this part."""
 
 _RIDGE: Final = 1e-8
 """Weak weight of all values, so that parts without data and without neighbours are determined."""
@@ -78,10 +85,17 @@ class Problem:
     curvature: Curvature = field(init=False)
     weights: Array = field(init=False)
     """Weights w of the curvatures."""
+    bending: Any = field(init=False)
+    """Sparse array Dᵀ w D, (part, part)."""
 
     def __post_init__(self) -> None:
         self.curvature = Curvature.of(self.parts)
-        self.weights = self.curvature.weights(_START_CURVATURE**2, self.parts)
+        self._weigh(np.full(self.curvature.part.size, _START_CURVATURE**2))
+
+    def _weigh(self, variances: Array) -> None:
+        """Set the weights of the prior by the variances of the curvatures."""
+        self.weights, matrix = 1 / variances, self.curvature.matrix
+        self.bending = sparse.csr_array(matrix.T @ sparse.diags_array(self.weights) @ matrix)
 
     @cached_property
     def shine(self) -> Array:
@@ -92,22 +106,32 @@ class Problem:
         """Return the mean blackbody radiance of the parts in W/(m² sr)."""
         return np.asarray(np.exp(self.parts.at_centroids @ x))
 
-    def solve(self, generator: np.random.Generator, check: Callable[[], None]) -> "Posterior":
+    def solve(
+        self,
+        generator: np.random.Generator,
+        check: Callable[[], None],
+        former: "Posterior | None" = None,
+    ) -> "Posterior":
         """Return the solution, with weights of the prior that follow from the data.
 
         The variance of the curvatures is their mean square around each place, which includes their
-        uncertainty (expectation maximisation of the evidence, with a few draws for it).
+        uncertainty (expectation maximisation of the evidence, with a few draws for it). The
+        solution of a `former` problem with other outlines is a start that needs fewer rounds.
         """
-        x = self._start()
-        posterior = self._maximum(x, _MOST_STEPS, check)
-        for _ in range(_ROUNDS):
+        if former is None:
+            x, rounds = self._start(), _ROUNDS
+        else:
+            x, rounds = former.problem.parts.continued(former.x, self.parts), 1
+            variances = former.problem.parts.continued(former.variances, self.parts)
+            self._weigh(variances[self.curvature.part])
+        posterior = self._maximum(x, check)
+        for _ in range(rounds):
             draws = posterior.draws(generator, _DRAWS_PER_ROUND)
             check()
-            values = (self.curvature.matrix @ draw for draw in draws)
-            uncertain = sum(value**2 for value in values) / _DRAWS_PER_ROUND
+            uncertain = ((self.curvature.matrix @ draws.T) ** 2).mean(axis=1)
             squares = (self.curvature.matrix @ posterior.x) ** 2 + uncertain
-            self.weights = self.curvature.weights(squares, self.parts)
-            posterior = self._maximum(posterior.x, 2, check)
+            self._weigh(self.curvature.variances(squares, self.parts))
+            posterior = self._maximum(posterior.x, check)
         return posterior
 
     def _start(self) -> Array:
@@ -120,11 +144,11 @@ class Problem:
         least = 1e-3 * np.abs(np.median(radiance))
         return np.asarray(np.log(np.maximum(radiance, least)))
 
-    def _maximum(self, x: Array, steps: int, check: Callable[[], None]) -> "Posterior":
-        """Return the most probable solution with the present weights of the prior."""
+    def _maximum(self, x: Array, check: Callable[[], None]) -> "Posterior":
+        """Return the most probable solution with the present weights of the prior, nearly."""
         posterior = Posterior(self, x)
         factor = posterior.factor()
-        for _ in range(steps):
+        for _ in range(_STEPS):
             check()
             posterior.preconditioner = factor
             change = posterior.solved(posterior.gradient, _STEP_TOLERANCE)
@@ -143,11 +167,13 @@ class Posterior:
         self.problem, self.x = problem, x
         self.sent = problem.shine * problem.radiance(x)
         """Radiance that the parts send, and its change with its logarithm."""
-        self.centroids = problem.parts.at_centroids
         self.spread = problem.parts.spread(x)
         self.predicted = self.seen(self.sent) + problem.reflected
         self.pixel_weights = problem.image.weights(self.predicted)
-        self.prior_weights = problem.weights
+        self.prior_weights, self.bending = problem.weights, problem.bending
+        sent = sparse.diags_array(self.sent) @ problem.parts.at_centroids
+        self.light_change = sparse.csr_array(self.spread @ sent)
+        """Sparse array (cell, part): the change of the cells' light with the solution."""
         self.preconditioner: Any = None
         """Factors of a similar Hessian by `factor`, which serve several steps."""
 
@@ -155,6 +181,14 @@ class Posterior:
     def residual(self) -> Array:
         """Measured minus predicted radiance, (y, x)."""
         return np.asarray(self.problem.image.radiance - self.predicted)
+
+    @property
+    def variances(self) -> Array:
+        """Mean variance of the curvatures around each part, (part,)."""
+        part, size = self.problem.curvature.part, self.x.size
+        count = np.bincount(part, minlength=size)
+        sums = np.bincount(part, 1 / self.prior_weights, size)
+        return np.where(count > 0, sums / np.maximum(count, 1), sums.sum() / part.size)
 
     @property
     def misfit(self) -> float:
@@ -165,21 +199,24 @@ class Posterior:
 
     @property
     def gradient(self) -> Array:
-        matrix = self.problem.curvature.matrix
-        prior = matrix.T @ (self.prior_weights * (matrix @ self.x))
-        return np.asarray(self.response(self.residual) - prior)
+        return np.asarray(self.response(self.residual) - self.bending @ self.x)
 
     def response(self, image: Array) -> Array:
         """Return the right side of `solved` for a change of the measured radiance."""
         return self._sent_back(self.pixel_weights * image)
 
+    def seen_change(self, change: Array) -> Array:
+        """Return the change of the image, (y, x), with a change of the solution."""
+        light = self.light_change @ change
+        return self.problem.formation.forward(light.reshape(self.problem.parts.cells.shape))
+
     def solved(self, right: Array, tolerance: float) -> Array:
-        """Solve with the Hessian by preconditioned conjugate gradients."""
-        size = self.x.size
-        hessian = LinearOperator((size, size), self._product)
-        preconditioner = LinearOperator((size, size), self.preconditioner.solve)
-        solution, _ = cg(hessian, right, rtol=tolerance, maxiter=200, M=preconditioner)
-        return np.asarray(solution, np.float64)
+        """Solve with the Hessian to a relative residual; `right` is (part,) or (part, error)."""
+        columns = right.reshape(self.x.size, -1)
+        solution = _conjugate_gradients(
+            self._product, self.preconditioner.solve, columns, tolerance
+        )
+        return solution.reshape(right.shape)
 
     def noise_response(self, generator: np.random.Generator) -> Array:
         """Return the right side of `solved` for a draw of the noise."""
@@ -192,25 +229,28 @@ class Posterior:
         matrix = self.problem.curvature.matrix
         return np.asarray(matrix.T @ (np.sqrt(self.prior_weights) * curvatures))
 
-    def draws(self, generator: np.random.Generator, count: int) -> list[Array]:
-        """Return draws of the solution's error (perturbation of data and prior), (part,) each."""
+    def draws(self, generator: np.random.Generator, count: int) -> Array:
+        """Return draws of the solution's error (perturbation of data and prior), (draw, part)."""
         responses = [
             self.noise_response(generator) + self.prior_response(generator) for _ in range(count)
         ]
         return self.drawn_all(responses)
 
-    def drawn_all(self, right_sides: Iterable[Array]) -> list[Array]:
-        """Return the changes of the solution for drawn right sides."""
+    def drawn_all(self, right_sides: Sequence[Array]) -> Array:
+        """Return the changes of the solution for drawn right sides, (draw, part)."""
         return self._solved_all(right_sides, _DRAW_TOLERANCE)
 
-    def changed_all(self, images: Iterable[Array]) -> list[Array]:
+    def changed_all(self, images: Iterable[Array]) -> Array:
         """Return the changes of the solution with changes of the measured radiance."""
         return self._solved_all([self.response(image) for image in images], _CHANGE_TOLERANCE)
 
-    def _solved_all(self, right_sides: Iterable[Array], tolerance: float) -> list[Array]:
-        """Solve for right sides, several at a time."""
-        with ThreadPoolExecutor(get_num_threads()) as pool:
-            return list(pool.map(lambda right: self.solved(right, tolerance), right_sides))
+    def _solved_all(self, right_sides: Sequence[Array], tolerance: float) -> Array:
+        """Solve for right sides together, a part of them in each thread."""
+        columns = np.stack(right_sides, axis=1)
+        blocks = np.array_split(columns, min(get_num_threads(), columns.shape[1]), axis=1)
+        with ThreadPoolExecutor(len(blocks)) as pool:
+            solved = pool.map(lambda block: self.solved(block, tolerance), blocks)
+            return np.concatenate(list(solved), axis=1).T
 
     def bias(self) -> Array:
         """Return the decrease of the solution by the prior, estimated from the solution, (part,).
@@ -218,13 +258,11 @@ class Posterior:
         Added once, it halves the order of the bias (iterated regularisation; Engl, Hanke and
         Neubauer, Regularization of Inverse Problems, 5.1).
         """
-        matrix = self.problem.curvature.matrix
-        return self.solved(matrix.T @ (self.prior_weights * (matrix @ self.x)), _STEP_TOLERANCE)
+        return self.solved(self.bending @ self.x, _STEP_TOLERANCE)
 
     def _sent_back(self, image: Array) -> Array:
-        """Return the adjoint of the linearised image."""
-        returned = self.spread.T @ self.problem.formation.adjoint(image).ravel()
-        return np.asarray(self.centroids.T @ (self.sent * returned))
+        """Return the adjoint of `seen_change`."""
+        return np.asarray(self.light_change.T @ self.problem.formation.adjoint(image).ravel())
 
     def seen(self, sent: Array) -> Array:
         """Return the image of the radiance that the parts send."""
@@ -238,23 +276,24 @@ class Posterior:
     def _light(self, sent: Array) -> Array:
         return np.asarray(self.spread @ sent).reshape(self.problem.parts.cells.shape)
 
-    def _product(self, change: Array) -> Array:
-        matrix = self.problem.curvature.matrix
-        data = self.response(self.seen(self.sent * (self.centroids @ change)))
-        prior = matrix.T @ (self.prior_weights * (matrix @ change))
-        return np.asarray(data + prior + _RIDGE * change)
+    def _product(self, changes: Array) -> Array:
+        """Return the Hessian times changes of the solution, (part, error)."""
+        formation, shape = self.problem.formation, self.problem.parts.cells.shape
+        light = self.light_change @ changes
+        for number, column in enumerate(light.T):
+            image = self.pixel_weights * formation.forward(column.reshape(shape))
+            light[:, number] = formation.adjoint(image).ravel()
+        return np.asarray(self.light_change.T @ light + self.bending @ changes + _RIDGE * changes)
 
     def factor(self) -> Any:
-        """Return factors of the Hessian with a narrow blur, which couples close parts only."""
-        matrix, parts = self.problem.curvature.matrix, self.problem.parts
-        cells = parts.cells.rows * parts.cells.columns
-        sent = sparse.csr_array(
-            (self.sent, (parts.cell, np.arange(parts.size))), (cells, parts.size)
-        )
-        image = _narrow_image(*parts.pixels.shape) @ sent
-        data = image.T @ sparse.diags_array(self.pixel_weights.ravel()) @ image
-        prior = matrix.T @ sparse.diags_array(self.prior_weights) @ matrix
-        whole = sparse.csc_array(prior + data + _RIDGE * sparse.eye_array(parts.size))
+        """Return factors of the Hessian without blur, which couples the parts of a pixel only."""
+        parts = self.problem.parts
+        sent = self.sent / CELLS_PER_PIXEL**2
+        entries = sent, (parts.pixel, np.arange(parts.size))
+        image = sparse.csr_array(entries, shape=(self.pixel_weights.size, parts.size))
+        weights = _BLURRED_WEIGHT * self.pixel_weights.ravel()
+        data = image.T @ sparse.diags_array(weights) @ image
+        whole = sparse.csc_array(self.bending + data + _RIDGE * sparse.eye_array(parts.size))
         return splu(
             whole,
             permc_spec="MMD_AT_PLUS_A",
@@ -263,19 +302,27 @@ class Posterior:
         )
 
 
-@lru_cache(maxsize=2)
-def _narrow_image(rows: int, columns: int) -> Any:
-    """Return the sparse array (pixel, cell) of an image with a blur of two cells' width."""
-    down, across = (_narrow_line(count) for count in (rows, columns))
-    return sparse.csr_array(sparse.kron(down, across))
-
-
-def _narrow_line(pixels: int) -> Any:
-    """Return the weights (pixel, cell) of cells along a line, blurred by 1/4, 1/2, 1/4."""
-    cells = CELLS_PER_PIXEL * pixels
-    beside = np.full(cells - 1, 0.25)
-    middle = np.full(cells, 0.5)
-    middle[[0, -1]] = 0.75  # the edge continues
-    blur = sparse.diags_array([beside, middle, beside], offsets=[-1, 0, 1])
-    mean = sparse.kron(sparse.eye_array(pixels), np.full((1, CELLS_PER_PIXEL), 1 / CELLS_PER_PIXEL))
-    return mean @ blur
+def _conjugate_gradients(
+    product: Callable[[Array], Array],
+    precondition: Callable[[Array], Array],
+    right: Array,
+    tolerance: float,
+) -> Array:
+    """Solve for the columns of `right` in step, each to its relative residual."""
+    solution, residual = np.zeros_like(right), right.copy()
+    target = tolerance * np.linalg.norm(right, axis=0)
+    active = np.flatnonzero(target > 0)
+    direction, before = np.zeros((len(right), active.size)), np.ones(active.size)
+    for _ in range(_MOST_ITERATIONS):
+        if not active.size:
+            break
+        preconditioned = precondition(residual[:, active])
+        squares = (residual[:, active] * preconditioned).sum(axis=0)
+        direction = preconditioned + direction * (squares / before)
+        image = product(direction)
+        step = squares / (direction * image).sum(axis=0)
+        solution[:, active] += step * direction
+        residual[:, active] -= step * image
+        remains = np.linalg.norm(residual[:, active], axis=0) > target[active]
+        active, before, direction = active[remains], squares[remains], direction[:, remains]
+    return solution

@@ -52,13 +52,12 @@ class Curvature:
         middle = np.concatenate([members[0] for members, _ in rows])
         return cls(sparse.vstack(blocks).tocsr(), middle)
 
-    def weights(self, squares: Array | float, parts: Parts) -> Array:
-        """Return the inverse of the mean squares around each difference, within its zone.
+    def variances(self, squares: Array, parts: Parts) -> Array:
+        """Return the mean squares around each difference, within its zone.
 
         In the smoother half of each zone, the median of the zone counts: where there is no detail,
         the data cannot show that there is less than that.
         """
-        squares = np.broadcast_to(squares, self.part.shape)
         variance = np.empty(self.part.size)
         zones = parts.zone[self.part]
         for zone in range(len(parts.index)):
@@ -66,7 +65,7 @@ class Curvature:
             if own.size:
                 around = local_mean(squares[own], parts.cell[self.part[own]], parts.cells.shape)
                 variance[own] = np.maximum(around, np.median(around))
-        return np.asarray(1 / np.maximum(variance, _LEAST_VARIANCE))
+        return np.maximum(variance, _LEAST_VARIANCE)
 
 
 def _known(members: NDArray[np.intp], weights: tuple[float, ...]) -> tuple[NDArray[np.intp], Array]:

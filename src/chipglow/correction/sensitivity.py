@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import gaussian_filter
 
 from chipglow.camera import ImageFormation, MeasuredPSF, Measurement, PointSpreadFunction
 from chipglow.camera.optics.psf import FWHM_PER_SIGMA
@@ -86,7 +86,7 @@ def smoothing_effect(posterior: Posterior, generator: np.random.Generator) -> Ef
 
 
 def _drawn(source: str, posterior: Posterior, right_sides: list[Array]) -> Effect:
-    changes = np.stack(posterior.drawn_all(right_sides))
+    changes = posterior.drawn_all(right_sides)
     return Effect(source, changes / np.sqrt(len(right_sides)), len(right_sides))
 
 
@@ -104,7 +104,7 @@ def systematic_effects(
     }
     for source, changes in images.items():
         if changes:
-            yield Effect(source, np.stack(posterior.changed_all(changes)))
+            yield Effect(source, posterior.changed_all(changes))
 
 
 def texture_effect(
@@ -124,7 +124,7 @@ def texture_effect(
                 field = _grainy_field(zone.grain, parts, generator)
                 relative[own] = zone.texture * field[parts.cell[own]] / parts.emissivity[own]
         images.append(posterior.seen(posterior.sent * relative))
-    changes = np.stack(posterior.changed_all(images))
+    changes = posterior.changed_all(images)
     yield Effect("texture", changes / np.sqrt(DRAWS), DRAWS)
 
 
@@ -246,7 +246,7 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     weights = posterior.pixel_weights
     information = np.eye(3) / known.outline_uncertainty**2
     unexplained = [
-        image - posterior.seen(posterior.sent * (parts.at_centroids @ response))
+        image - posterior.seen_change(response)
         for image, response in zip(images, responses, strict=True)
     ]
     information += [[(weights * one * other).sum() for other in unexplained] for one in images]
@@ -258,7 +258,7 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     motion = np.linalg.solve(information, slope)
     root = np.linalg.cholesky(np.linalg.inv(information))
     spread = np.sqrt(np.diag(np.linalg.inv(information))) * scale
-    changes = -root.T @ np.stack(responses)
+    changes = -root.T @ responses
     return OutlineFit(Motion(*(motion * scale)), changes, Motion(*spread))
 
 
@@ -285,17 +285,6 @@ def _image_of_moved(posterior: Posterior, observed: ObservedObject) -> Array:
     """Return the image of moved zones whose fields stay and continue into new cells."""
     problem = posterior.problem
     parts = cut_cells(observed, problem.parts.pixels)
-    x = np.empty(parts.size)
-    for number in np.unique(parts.zone):
-        own = parts.zone == number
-        x[own] = _continued(posterior.x, problem.parts.index, int(number))[parts.cell[own]]
+    x = problem.parts.continued(posterior.x, parts)
     light = parts.spread(x) @ (parts.area * parts.emissivity * np.exp(parts.at_centroids @ x))
     return problem.formation.forward(light.reshape(parts.cells.shape))
-
-
-def _continued(x: Array, index: NDArray[np.intp], zone: int) -> Array:
-    """Return the values of a zone at all cells, those of the nearest cell beyond the zone."""
-    if zone >= len(index) or (index[zone] < 0).all():
-        return np.full(index[0].size, float(np.median(x)))
-    nearest = distance_transform_edt(index[zone] < 0, return_distances=False, return_indices=True)
-    return np.asarray(x[index[zone][tuple(nearest)]]).ravel()
