@@ -222,7 +222,7 @@ def _corrected(
             known["--reflected"] or 293.0, known["--reflected-uncertainty"] or 0.0
         )
     if known["--map"] is not None:
-        shapes = regions if tool is None else (*regions, tool)
+        shapes: tuple[Any, ...] = regions if tool is None else (*regions, tool)
         result = correct_mapped(
             measurement, camera, lab.read_emissivity_map(file), shapes, **settings
         )

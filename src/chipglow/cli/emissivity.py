@@ -71,7 +71,7 @@ def emissivity(
     named = lab.load_regions(regions)
     measurements = load_measurements(images, settings or ())
     names = list(map(str, images))
-    result = lab.determineemissivities_of(measurements, heatings, named, names, metal)
+    result = lab.determine_emissivities(measurements, heatings, named, names, metal)
     _print_tables(result)
     _print_study(result, out)
     whole = {row.name for row in result.rows[0] if row.whole}

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from chipglow.camera import Camera, Flag, Measurement
@@ -256,7 +257,7 @@ class _Frames:
             emissivity = np.clip(value + slope * (found - at), _LEAST, 1.0)
             own = (seen - (1 - emissivity) * reflected) / emissivity
             found = np.asarray(image.band.temperature(np.maximum(own, reflected)))
-        return found
+        return np.asarray(found, np.float64)
 
 
 def _sharpened(
@@ -316,7 +317,7 @@ def _relative_spread(found: Any, band: Band) -> Array:
     return np.asarray(kelvins * band.slope(temperature) / band.radiance(temperature))
 
 
-def _continued(values: Array, own: Array) -> Array:
+def _continued(values: Array, own: NDArray[np.bool_]) -> Array:
     """Return the values of a zone's cells, continued beyond it by those of the nearest cells."""
     if not own.any():
         return np.ones_like(values)
