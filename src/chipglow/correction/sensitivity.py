@@ -6,7 +6,6 @@ from math import inf, sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from chipglow.camera import ImageFormation, MeasuredPSF, Measurement, PointSpreadFunction
