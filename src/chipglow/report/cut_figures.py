@@ -1,23 +1,22 @@
 """Figures of a cut: heated chips and tool, rake face, dual spectrum, shear band, forces, chip."""
 
-from typing import Any, Final
+from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import Analysis, HeatedObject
+from chipglow.analysis import Analysis
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import RakeGrid, rake_grid
+from chipglow.laboratory.chip.figure import draw_rake_profiles
+from chipglow.laboratory.emissivity.figure import draw_heated
 from chipglow.report.facts import Facts
 from chipglow.scene import Frame, Material, Raster
-from chipglow.scene.figures import draw_chip, draw_tool, image_figure, show_image
+from chipglow.scene.figures import draw_chip, image_figure, show_image
 from chipglow.surface import Emissivity, Texture
-
-_COLOURS: Final = (BLUE, VERMILLION)
 
 _GRAIN, _SEED, _STEEL = 9e-6, 8, Emissivity(0.62, 0.07)
 _VOID, _SHEARED, _DARKEST = 0.28, (1.5, 5.0), 0.45
@@ -32,9 +31,9 @@ def heated_chips(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(2.6)
     panels = figure.subplots(1, len(chips), squeeze=False)[0]
     for letter, axes, heated in zip("abcdefgh", panels, chips, strict=False):
-        _draw_heated(figure, axes, heated)
         truth = heated.map.heating.reference - KELVIN
-        axes.set_title(f"{letter}) {heated.name}, at {truth:.0f} °C")
+        title = f"{letter}) {heated.name}, at {truth:.0f} °C"
+        draw_heated(figure, axes, heated.map, heated.regions, title)
     drawing.legend(figure, 2)
     return figure
 
@@ -47,11 +46,8 @@ def heated_tool(facts: Facts) -> Figure | None:
     found, raster, tool = tools[0], tools[0].map.raster, facts.cut.segments[0].tool
     figure = drawing.new_figure(2.9)
     left, right = figure.subplots(1, 2)
-    _draw_heated(figure, left, found)
-    limits = left.get_xlim(), left.get_ylim()
-    draw_tool(left, tool)
-    left.set(xlim=limits[0], ylim=limits[1])
-    left.set_title(f"a) tool, at {found.map.heating.reference - KELVIN:.0f} °C")
+    title = f"a) tool, at {found.map.heating.reference - KELVIN:.0f} °C"
+    draw_heated(figure, left, found.map, (), title, tool)
     inside = tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
     right.hist(found.map.emissivity[inside], bins=40, color=BLUE, density=True)
     row = found.rows[0]
@@ -70,23 +66,10 @@ def rake_profiles(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(3.6)
     panels = figure.subplots(1, len(grids), sharex=True, sharey=True, squeeze=False)[0]
     for axes, (name, grid) in zip(panels, grids.items(), strict=True):
-        colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
-        for row, colour in enumerate(colours):
-            axes.errorbar(
-                grid.along * 1e6,
-                grid.frame_mean[row] - KELVIN,
-                yerr=grid.frame_standard_deviation[row],
-                errorevery=(row, grid.depth.size),  # the bars of the depths would overlap
-                color=colour,
-                linewidth=1.4,
-                elinewidth=0.8,
-                capsize=1.5,
-                marker=".",
-                label=f"{grid.depth[row] * 1e6:.0f} µm",
-            )
-        axes.set(title=name, xlabel="distance along the rake face / µm")
-    panels[0].set_ylabel("radiance temperature / °C")
-    drawing.legend(figure, 5, panels[:1], "depth")
+        draw_rake_profiles(axes, grid)
+        axes.set_title(name)
+        axes.label_outer()
+    drawing.legend(figure, 5, panels[:1], "depth into the chip")
     return figure
 
 
@@ -219,16 +202,6 @@ def chip_thickness(facts: Facts) -> Figure | None:
             right.annotate(f"{label} {level * 1e6:.0f}", (1.02, level * 1e6), **place)
     right.set(xlabel="time / µs", ylabel="thickness / µm", title="b) the chip passing the line")
     return figure
-
-
-def _draw_heated(figure: Figure, axes: Axes, heated: HeatedObject) -> None:
-    temperature, raster = heated.map.radiance_temperature - KELVIN, heated.map.raster
-    low, high = scales.ends(temperature[heated.map.emissivity > 0.1], 1.0, 99.9)
-    picture = show_image(axes, temperature, raster, None, scales.HEAT, (low - 10.0, high))
-    drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
-    for colour, region in zip(_COLOURS, heated.regions, strict=False):
-        outline = region.outline(raster)
-        drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour, region.feature)
 
 
 def _visible_picture(frame: Frame, raster: Raster) -> NDArray[np.float64]:

@@ -26,7 +26,15 @@ from chipglow.report.facts import Facts
 from chipglow.report.paper import PAPER
 from chipglow.report.rows import MAIN, main_readings
 from chipglow.scene import Material
-from chipglow.scene.figures import ImagePanel, image_figure, image_panels, length_unit, show_image
+from chipglow.scene.figures import (
+    SPEED,
+    ImagePanel,
+    field_panels,
+    image_figure,
+    image_panels,
+    length_unit,
+    show_image,
+)
 
 Array = NDArray[Any]
 
@@ -83,25 +91,15 @@ def point_spread(facts: Facts) -> Figure | None:
 
 def scene(facts: Facts) -> Figure:
     """Draw the fields of the scene in the shown exposure, and the emissivity of every surface."""
-    data = facts.data
-    there, solid = data.material != Material.VOID, data.material == Material.WORKPIECE
-    celsius = (data.temperature.astype(float) - KELVIN).where(there).values
-    low, high = scales.ends(celsius, 0.0, 99.9, 1.0)
-    heat = (0.0, scales.round_limit(celsius, 99.9, 50.0)) if facts.analysis.cut else (low, high)
-    panels = [ImagePanel("temperature", "temperature / °C", celsius, heat, scales.HEAT)]
-    for name, label, scale, highest in (
-        ("plastic_strain", "plastic strain", 1.0, 4.0),
-        ("plastic_strain_rate", "strain rate / (10³ 1/s)", 1e-3, 60.0),
-    ):
-        if name in data:
-            image = scale * data[name].where(solid).values
-            panels.append(ImagePanel(name.replace("_", " "), label, image, (0.0, highest)))
+    frame, tool = facts.analysis.frame, facts.analysis.tool
+    there = frame.material != Material.VOID
+    panels = [panel for panel in field_panels(frame) if panel.title != SPEED]
     for name in facts.read_surfaces:
-        image = data.emissivity.sel(surface=name).where(there).values
+        image = np.where(there, facts.data.emissivity.sel(surface=name), np.nan)
         panels.append(
             ImagePanel(of_surface(facts, "emissivity", name), "emissivity", image, (0.0, 1.0))
         )
-    return image_panels(panels, facts.analysis.raster, facts.analysis.tool)
+    return image_panels(panels, facts.analysis.raster, tool)
 
 
 def measurement(facts: Facts) -> Figure:

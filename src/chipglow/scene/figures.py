@@ -13,16 +13,20 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing
-from chipglow.drawing.scales import GREEN, HEAT, PLAIN, VOID, round_limit
+from chipglow.drawing.scales import GREEN, HEAT, PLAIN, RATE, VOID, ends
 from chipglow.quantities import ZERO_CELSIUS
-from chipglow.scene.frame import Material
+from chipglow.scene.frame import Frame, Material
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
 
 if TYPE_CHECKING:
     from chipglow.scene.scene import Scene
 
+SPEED: Final = "speed"
+"""Title of the panel of the speed."""
 _LARGEST_IN_MICRONS: Final = 5e-3
+_DECADES: Final = 3
+"""Decades of a scale of strain rates."""
 
 
 def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
@@ -126,22 +130,49 @@ def image_panels(panels: Sequence[ImagePanel], raster: Raster, tool: Tool | None
     return figure
 
 
+def field_panels(frame: Frame) -> list[ImagePanel]:
+    """Return panels of temperature and, if available, strain, strain rate and speed."""
+    there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
+    temperature = np.where(there, frame.temperature.astype(np.float64) - ZERO_CELSIUS, np.nan)
+    heat = ends(temperature, 0.1, 99.9)
+    panels = [ImagePanel("temperature", "temperature / °C", temperature, heat, HEAT)]
+    if frame.plastic_strain is not None:
+        strain = np.where(solid, frame.plastic_strain, np.nan)
+        limits = (0.0, ends(strain, 0.0, 98.0)[1])
+        panels.append(ImagePanel("plastic strain", "plastic strain", strain, limits))
+    if frame.plastic_strain_rate is not None:
+        rate = np.where(solid, frame.plastic_strain_rate, np.nan)
+        decades = _decades(rate)
+        panels.append(
+            ImagePanel(
+                "plastic strain rate",
+                "strain rate / (1/s)",
+                np.maximum(rate, decades[0]),
+                decades,
+                RATE,
+                log=True,
+            )
+        )
+    if frame.velocity_x is not None and frame.velocity_y is not None:
+        speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
+        panels.append(ImagePanel(SPEED, "speed / (m/s)", speed, (0.0, ends(speed, 0.0, 99.9)[1])))
+    return panels
+
+
+def _decades(rate: NDArray[Any]) -> tuple[float, float]:
+    fastest = ends(rate, 0.0, 99.9)[1]
+    top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
+    return 10.0 ** (top - _DECADES), 10.0**top
+
+
 def draw_chip(overview: "Scene", view: Raster, tool: Tool | None) -> Figure:
     """Return a figure of the whole chip with the border of a view."""
-    frame, raster = overview.frame(0), overview.raster
-    void, solid = frame.material == Material.VOID, frame.material == Material.WORKPIECE
-    celsius = np.where(void, np.nan, frame.temperature - ZERO_CELSIUS)
-    strain = np.where(solid, frame.needed("plastic_strain"), np.nan)
-    rate = np.where(solid, 1e-3 * frame.needed("plastic_strain_rate"), np.nan)
-    heat = (0.0, round_limit(celsius, 99.9, 50.0))
-    panels = (
-        ImagePanel("temperature", "temperature / °C", celsius, heat, HEAT),
-        ImagePanel("plastic strain", "plastic strain", strain, (0.0, 4.0)),
-        ImagePanel("strain rate", "strain rate / (10³ 1/s)", rate, (0.0, 60.0)),
-    )
+    raster = overview.raster
+    panels = field_panels(overview.frame(0))[:3]
     figure = image_figure(raster, 2.2, rows=1)
     factor, _ = length_unit(raster)
-    for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
+    grid = figure.subplots(1, len(panels), sharey=True)
+    for axes, panel in zip(grid, panels, strict=True):
         panel.draw(figure, axes, raster, tool, "bottom")
         drawing.draw_line(axes, view.border, GREEN, factor=factor)
         axes.label_outer()

@@ -10,20 +10,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing, scales
-from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION, VOID, shown_frame
-from chipglow.scene.figures import ImagePanel, leave_out, show_image, veil
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID, shown_frame
+from chipglow.scene.figures import SPEED, ImagePanel, field_panels, leave_out, show_image, veil
 from chipglow.scene.frame import FILLED, Frame, Material
 from chipglow.scene.raster import Raster
 from chipglow.scene.scene import Scene
 from chipglow.scene.tool import Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
-_SPEED: Final = "speed / (m/s)"
 _PANEL_WIDTH: Final = 2.6
 _PANEL_HEIGHTS: Final = (1.0, 3.4)
 _AROUND: Final = 0.46
 _HISTOGRAM: Final = 1.8
-_DECADES: Final = 4
 _BINS: Final = 60
 _ARROWS: Final = 14
 
@@ -31,7 +29,7 @@ _ARROWS: Final = 14
 def draw_scene(scene: Scene, time: float | None = None) -> Figure:
     """Draw the fields of the frame nearest to a time in s, and histograms over the workpiece."""
     frame = scene.frame(shown_frame(scene.times, time, "scene"))
-    raster, tool, panels = scene.raster, scene.tool, _panels(frame)
+    raster, tool, panels = scene.raster, scene.tool, field_panels(frame)
     has_quality = frame.quality is not None and bool(
         frame.quality[frame.material != Material.VOID].any()
     )
@@ -54,7 +52,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
             axes = next(places)
             panel.draw(top, axes, raster, tool)
             axes.label_outer()
-            if panel.label == _SPEED:
+            if panel.title == SPEED:
                 _draw_arrows(axes, frame, raster)
         if has_kinds:
             _draw_material(top, next(places), frame, raster, tool)
@@ -71,41 +69,6 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         whose = " of the workpiece's samples" if histogram_rows > 1 else ""
         bottom.supylabel(f"fraction{whose} / %", fontsize=9.5)
     return figure
-
-
-def _panels(frame: Frame) -> list[ImagePanel]:
-    """Return panels of temperature and, if available, strain, strain rate and speed."""
-    there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
-    temperature = np.where(there, frame.temperature.astype(np.float64) - KELVIN, np.nan)
-    heat = scales.ends(temperature, 0.1, 99.9)
-    panels = [ImagePanel("temperature", "temperature / °C", temperature, heat, scales.HEAT)]
-    if frame.plastic_strain is not None:
-        strain = np.where(solid, frame.plastic_strain, np.nan)
-        ends = (0.0, scales.ends(strain, 0.0, 99.9)[1])
-        panels.append(ImagePanel("plastic strain", "plastic strain", strain, ends))
-    if frame.plastic_strain_rate is not None:
-        rate = np.where(solid, frame.plastic_strain_rate, np.nan)
-        decades = _decades(rate)
-        panels.append(
-            ImagePanel(
-                "plastic strain rate",
-                "strain rate / (1/s)",
-                np.maximum(rate, decades[0]),
-                decades,
-                scales.RATE,
-                log=True,
-            )
-        )
-    if frame.velocity_x is not None and frame.velocity_y is not None:
-        speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
-        panels.append(ImagePanel("speed", _SPEED, speed, (0.0, scales.ends(speed, 0.0, 99.9)[1])))
-    return panels
-
-
-def _decades(rate: NDArray[Any]) -> tuple[float, float]:
-    fastest = scales.ends(rate, 0.0, 99.9)[1]
-    top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
-    return 10.0 ** (top - _DECADES), 10.0**top
 
 
 def _panel_height(raster: Raster) -> float:

@@ -22,6 +22,8 @@ _HEIGHT: Final = 3.8
 _BAND_HEIGHT: Final = 4.2
 _AROUND: Final = 60e-6
 _ASIDE: Final = 0.08
+_MOST_BARS: Final = 20
+"""Squares along the face up to which each has a bar."""
 _MARKERS: Final = "osD^vP*X"
 _LEGEND_COLUMNS: Final = 3
 _MOST_NAMES: Final = 12
@@ -42,7 +44,7 @@ def draw_rake_grid(measurement: Measurement, grid: "RakeGrid") -> Figure:
         figure = drawing.new_figure(_HEIGHT)
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _draw_grid(figure, left, measurement, grid)
-        _draw_profiles(right, grid)
+        draw_rake_profiles(right, grid)
         right.set_title(f"b) profiles\n{_bars(grid)}")
         figure.legend(loc="outside lower right", ncols=grid.depth.size, title=_depths(grid))
     return figure
@@ -52,7 +54,7 @@ def plot_rake_grid(grid: "RakeGrid", ax: Axes | None) -> Axes:
     """Draw the profiles of a grid along the rake face."""
     with drawing.style():
         axes = drawing.axes_or_new(ax)
-        _draw_profiles(axes, grid)
+        draw_rake_profiles(axes, grid)
         axes.set_title(_bars(grid))
         axes.legend(title=_depths(grid), ncols=2)
     return axes
@@ -70,10 +72,13 @@ def _draw_grid(figure: Figure, axes: Axes, measurement: Measurement, grid: "Rake
     crop(axes, grid.corners(), measurement.raster, _AROUND)
 
 
-def _draw_profiles(axes: Axes, grid: "RakeGrid") -> None:
+def draw_rake_profiles(axes: Axes, grid: "RakeGrid") -> None:
+    """Draw the profiles of a grid on axes, without their legend."""
     mean, bars = grid.frame_mean - ZERO_CELSIUS, grid.bars
     uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
+    # Many bars would hide each other: those of the depths take turns.
+    turns = grid.depth.size if grid.along.size > _MOST_BARS else 1
     for m, depth in enumerate(grid.depth):
         if not grid.usable[:, m].any():
             continue
@@ -84,6 +89,7 @@ def _draw_profiles(axes: Axes, grid: "RakeGrid") -> None:
             along,
             mean[m],
             np.nan_to_num(bars[m]),
+            errorevery=(m % turns, turns),
             color=colours[m],
             marker=marker,
             markersize=4,

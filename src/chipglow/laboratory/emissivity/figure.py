@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.patheffects import withStroke
 
 from chipglow.drawing import drawing, scales
 from chipglow.quantities import ZERO_CELSIUS
-from chipglow.scene import Raster, Region
+from chipglow.scene import Raster, Region, Tool
 from chipglow.scene.figures import ImagePanel
 
 if TYPE_CHECKING:
@@ -25,6 +25,10 @@ _LINES: Final = 2.6
 _SLENDER: Final = 3.0
 _BESIDE: Final = 0.2
 """Margin beside the first and the last region, in widths of the axes."""
+_BACKGROUND: Final = 0.1
+"""Emissivity up to which a pixel is taken for background: hardly a surface has less."""
+_DARKER: Final = 10.0
+"""Range in K below the object's pixels, so that all of them differ from the background."""
 
 
 def draw_emissivity(
@@ -32,24 +36,41 @@ def draw_emissivity(
 ) -> Figure:
     """Draw the radiance temperature with the regions, and the emissivity."""
     raster = found.raster
-    temperature = found.radiance_temperature - ZERO_CELSIUS
-    heat = scales.ends(temperature, 0.5, 99.5)
-    panels = (
-        ImagePanel("radiance temperature", "°C", temperature, heat, scales.HEAT),
-        _emissivity_panel(found),
-    )
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
     with drawing.style():
         figure = drawing.new_figure(height + (_LINES if lines else 0.0))
         parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
-        for axes, panel in zip(parts[0].subplots(1, 2, sharey=True), panels, strict=True):
-            panel.draw(parts[0], axes, raster)
-            axes.label_outer()
-            _draw_regions(axes, regions, raster, named=panel is panels[0])
+        left, right = parts[0].subplots(1, 2, sharey=True)
+        draw_heated(parts[0], left, found, regions, "heated object", named=True)
+        _emissivity_panel(found).draw(parts[0], right, raster)
+        _draw_regions(right, regions, raster, named=False)
+        right.label_outer()
         if lines:
             colours = _colours(regions)
             _draw_lines(parts[1].subplots(), lines, [colours[line.feature] for line in lines])
     return figure
+
+
+def draw_heated(
+    figure: FigureBase,
+    axes: Axes,
+    found: "EmissivityMap",
+    regions: Sequence[Region],
+    title: str,
+    tool: Tool | None = None,
+    named: bool = False,
+) -> None:
+    """Draw the radiance temperature of a heated object, with the regions that are read.
+
+    A region has its name beside it, or its feature as the label of a legend.
+    """
+    temperature = found.radiance_temperature - ZERO_CELSIUS
+    low, high = scales.ends(temperature[found.emissivity > _BACKGROUND], 1.0, 99.9)
+    limits = (low - _DARKER, high)
+    label = "radiance temperature / °C"
+    panel = ImagePanel(title, label, temperature, limits, scales.HEAT)
+    panel.draw(figure, axes, found.raster, tool)
+    _draw_regions(axes, regions, found.raster, named)
 
 
 def plot_emissivity_map(found: "EmissivityMap", ax: Axes | None) -> Axes:
@@ -115,7 +136,7 @@ def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: 
     for region in regions:
         outline = region.outline(raster)
         colour = colours[region.feature]
-        drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour)
+        drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour, region.feature)
         if named:
             # At its centre, upright where the region is slender.
             width, height = np.ptp(outline, axis=0)
