@@ -23,3 +23,9 @@ def test_what_a_page_uses_is_in_the_package_itself(page):
     names = {name.strip() for line in used for name in line.split(",")}
     names |= set(re.findall(r"\bchipglow\.(\w+)", code))
     assert names <= set(chipglow.__all__)
+
+
+def test_the_rooms_are_found_by_name():
+    rooms = {"analysis", "camera", "chip", "correction", "cutting", "io", "laboratory", "study"}
+    assert rooms < set(dir(chipglow))
+    assert {"sweep", "design", "study_budget"} < set(dir(chipglow))

@@ -5,7 +5,6 @@ used, so that the command line starts at once.
 """
 
 import os
-from pathlib import Path
 
 import lazy_loader
 
@@ -15,8 +14,4 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 __version__ = "0.1.0"
 
-__getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
-
-
-def __dir__() -> list[str]:
-    return [name for name in __all__ if not Path(__file__).with_name(name).is_dir()]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,6 +7,7 @@ from . import (
     cutting as cutting,
     io as io,
     laboratory as laboratory,
+    quantities as quantities,
     radiometry as radiometry,
     report as report,
     scene as scene,
@@ -34,6 +35,7 @@ from .camera import (
     Detector as Detector,
     Effect as Effect,
     EnergyResponse as EnergyResponse,
+    Exposure as Exposure,
     GaussianPSF as GaussianPSF,
     Jitter as Jitter,
     MeasuredPSF as MeasuredPSF,
@@ -47,7 +49,7 @@ from .camera import (
 from .correction import Correction as Correction, Zone as Zone, correct as correct
 from .cutting import (
     AISI_1045 as AISI_1045,
-    FLOW_LAWS as FLOW_LAWS,
+    CuttingConditions as CuttingConditions,
     CuttingSimulation as CuttingSimulation,
     FlowStress as FlowStress,
 )
@@ -61,7 +63,7 @@ from .io import (
     write_measurement as write_measurement,
     write_scene as write_scene,
 )
-from .io.cameras import read_recording as read_recording, write_hcc as write_hcc
+from .io.cameras import read_recording as read_recording
 from .laboratory.chip import (
     band_profile as band_profile,
     find_tool as find_tool,
@@ -88,15 +90,16 @@ from .laboratory.registration import (
     load_registration as load_registration,
     simultaneous_frames as simultaneous_frames,
 )
-from .quantities import Parameter as Parameter, Quantity as Quantity
 from .radiometry import Band as Band, RatioThermometer as RatioThermometer
 from .report import write_report as write_report
 from .scene import Raster as Raster, Scene as Scene, ToolGeometry as ToolGeometry, areas as areas
 from .study import (
     Study as Study,
     cut as cut,
+    design as design,
     load_study as load_study,
     run as run,
+    study_budget as study_budget,
     sweep as sweep,
     wavelengths as wavelengths,
 )

@@ -237,7 +237,7 @@ def fit_outline(posterior: Posterior, known: Knowledge) -> OutlineFit:
     The image shows the position where the radiance changes across an outline. Where it does not,
     the stated uncertainty remains.
     """
-    parts, turn_radius = posterior.problem.parts, _turn_radius(posterior.problem.parts)
+    turn_radius = _turn_radius(posterior.problem.parts)
     images = [
         _motion_image(posterior, known.observed, direction, turn_radius) for direction in np.eye(3)
     ]
