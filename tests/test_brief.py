@@ -51,7 +51,7 @@ def test_objects_of_the_library_are_lines_not_pages():
         "Area": Area("a", "b", np.ones((90, 100), bool), True),
         "Distribution": Distribution(np.ones((3, 5, 81)), ("segment", "texture", "pixel phase")),
         "Estimate": Estimate(np.zeros((200, 200))),
-        "Frame": scene.frame(0),
+        "SplineSamples": scene.frame(0),
     }
     for name, one in objects.items():
         assert repr(one).startswith(f"{name}("), name

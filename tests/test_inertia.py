@@ -7,8 +7,8 @@ import pytest
 from analytic_chip import AnalyticChip
 
 from chipglow.chip import Inertia, inertia
+from chipglow.cli.progress import say_of_cut
 from chipglow.cli.screen import begin
-from chipglow.cli.studies import say_of_cut
 from chipglow.cutting import AISI_1045, CuttingConditions, CuttingSimulation, Numerics
 from chipglow.scene import ENERGY_UNITS, Scene
 from chipglow.scene.scene import FORCE_UNITS

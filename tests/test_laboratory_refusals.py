@@ -307,7 +307,7 @@ COMMANDS = {
     f"{COMPARE} bare.nc bare.nc": "bare.nc: is given twice",
     f"{COMPARE} --reference '1 s'": "--reference: 1000000 us is not in the measurement, expected",
     "compare chip.nc curve.csv": "curve.csv: curve: unit: is missing",
-    f"{COMPARE} --curve curve.csv --out .": "which chipglow did not write",
+    f"{COMPARE} --curve curve.csv --out .": "holds the input",
     "psf edge.nc --model lorentz": "'lorentz' was not fitted",
     "psf edge.nc --set 'band=3-5 um'": "--set",
     "psf edge.nc --region 5:35": "expected rows and columns such as 10:70,20:90",

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 
-import chipglow
 from chipglow.camera import Camera, Flag, Measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene, ToolGeometry
@@ -76,13 +75,6 @@ def test_a_notebook_shows_the_data_the_budget_and_the_study():
     assert "0.42" in shown and "thermometer" in shown and "0.01" in shown
     study = Study(camera={"pitch": "5 um"})._repr_html_()
     assert "pitch: 5 um" in study and "<details>" in study
-
-
-def test_the_names_of_chipglow_are_not_its_packages():
-    names = dir(chipglow)
-    assert {"Scene", "Camera", "Study", "analyse"} <= set(names)
-    assert not {"analysis", "camera", "io", "laboratory"} & set(names)
-    assert chipglow.camera.Camera is Camera
 
 
 def test_degrees_celsius_of_a_frame():

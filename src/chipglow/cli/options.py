@@ -7,9 +7,11 @@ from inspect import signature
 from itertools import permutations
 from os.path import realpath
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, get_args
+from typing import Annotated, Any, Final, TypeAlias, get_args
 
 import typer
+
+_FILE_OR_FOLDER: Final = "FILE|DIR"
 
 
 def argument(metavar: str, text: str, **settings: Any) -> Any:
@@ -126,7 +128,7 @@ def table(text: str) -> Any:
 
 def file_or_folder(text: str) -> Any:
     """Return the option of a file to write, or of a folder for the results of several files."""
-    return typer.Option(metavar="FILE|DIR", help=text)
+    return typer.Option(metavar=_FILE_OR_FOLDER, help=text, writable=True)
 
 
 def folder(text: str) -> Any:
@@ -148,10 +150,10 @@ def checked_files(command: Callable[..., Any], values: Mapping[str, Any]) -> Ite
     _check_different(written)
     with preserved(named_files(one for name, one in values.items() if name not in outputs)):
         for name, path in written.items():
-            if outputs[name].file_okay:
-                check_output(path)
-            else:
+            if not outputs[name].file_okay:
                 check_output_folder(path, values.get("force", False))
+            elif outputs[name].metavar != _FILE_OR_FOLDER or path.is_file():
+                check_output(path)
         yield
 
 
