@@ -173,7 +173,7 @@ def inputs(tmp_path, monkeypatch):
             "calibration.yaml: is also an input (calibration.yaml)",
         ),
         ("convert frames.npy --set bad_pixels=frames_0.tif --out frames_0.tif", "also an input"),
-        ("convert frames.npy --set flat_field={low:frames_0.tif} --out frames_0.tif", "an input"),
+        ("convert frames.npy --set flat_field.low=frames_0.tif --out frames_0.tif", "an input"),
         ("convert frames_*.tif --out frames_1.tif", "frames_1.tif: is also an input"),
         ("convert study-of-list.yaml --out frames.npy", "frames.npy: is also an input"),
         (
