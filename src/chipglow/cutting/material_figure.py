@@ -13,8 +13,16 @@ from chipglow.drawing.drawing import new_figure, style
 from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
 
 _TEMPERATURES: Final = ((20.0, BLUE), (400.0, GREEN), (800.0, VERMILLION))
+"""Temperatures of the curves in °C."""
+
 _RATES: Final = ((1.0, ":"), (1e3, "--"), (1e5, "-"))
+"""Plastic strain rates of the curves in 1/s."""
+
+_CURVE_POINTS: Final = 300
+"""Temperatures of a curve of a property."""
+
 _STRAINS: Final = np.linspace(0.0, 2.0, 81)
+"""Plastic strains of the curves."""
 
 
 def material_figure(material: MaterialFile) -> Figure:
@@ -51,7 +59,7 @@ def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> N
 
 def _temperature_panels(panels: Sequence[Axes], workpiece: WorkpieceMaterial) -> None:
     """Draw conductivity, heat capacity, elastic moduli and density over temperature."""
-    celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, 300)
+    celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, _CURVE_POINTS)
     kelvins = celsius + KELVIN
     left, middle, right, last = panels
     left.plot(celsius, workpiece.conductivity.at(kelvins), color=BLUE)
