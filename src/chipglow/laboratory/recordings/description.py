@@ -5,14 +5,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from math import isclose
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, ValidationInfo
 
 from chipglow.camera import Recording
+from chipglow.io.cameras.stacks import Stated
 from chipglow.io.column_file import read_response
-from chipglow.laboratory.recordings.radiometric_calibration import ImagePosition, Mirror, Pixels
-from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
+from chipglow.laboratory.recordings.radiometric_calibration import ImagePosition
+from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study, made_from
 from chipglow.quantities.units import LENGTH, TEMPERATURE, TIME, WAVELENGTHS
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes, commented_yaml, described_by
@@ -81,8 +82,8 @@ class FlatFieldSection(Part):
 
 
 @dataclass(frozen=True)
-class MeasurementDescription(Part):
-    """A measurement from a camera file: contents, position, and conversion."""
+class CameraFile(Part):
+    """Which frames of which file."""
 
     file: Annotated[
         FileBeside | None,
@@ -101,42 +102,21 @@ class MeasurementDescription(Part):
             allowed="none, 100:200, ::10",
         ),
     ] = None
-    dataset: Annotated[str | None, Parameter("Which array of the file, if it has several.")] = None
-    axes: Annotated[
-        tuple[str, ...] | None,
-        Parameter(
-            "Order of the array's axes; none: as the file says.", allowed="none, or [time, y, x]"
-        ),
-    ] = None
-    quantity: Annotated[
-        Literal["counts", "radiance", "temperature"] | None,
-        Parameter(
-            "Quantity of the numbers, for files that do not state it.",
-            allowed="none, counts, radiance, temperature",
-        ),
-    ] = None
-    unit: Annotated[
-        str | None,
-        Parameter(
-            "Their unit, instead of the one that the file states.",
-            allowed="none, counts, W/m2/sr, K, degC, degF, cK, 0.01 K, ...",
-        ),
-    ] = None
-    scale: Annotated[
-        float | None,
-        Parameter(
-            "Temperature or radiance is scale x number + offset in the unit; none: 1.",
-            over=0.0,
-            allowed="none, 0.04",
-        ),
-    ] = None
-    offset: Annotated[float | None, Parameter("See scale; none: 0.", allowed="none, -40")] = None
-    void_value: Annotated[
-        float | None, Parameter("Number in the file that stands for no value; NaN always does.")
-    ] = None
-    interval: Annotated[
-        float | None, Parameter("Time from frame to frame; none: as the file says.", TIME)
-    ] = None
+
+    def chosen_frames(self) -> slice | None:
+        """Return the frames to take."""
+        if self.frames is None:
+            return None
+        match = _FRAMES.fullmatch(self.frames)
+        if match is None or match[3] == "0":
+            raise ValueError(f"frames: {self.frames!r}, expected first:end such as 100:200")
+        return slice(*(int(number) if number else None for number in match.groups()))
+
+
+@dataclass(frozen=True)
+class MeasurementDescription(ImagePosition, Stated, CameraFile):
+    """A measurement from a camera file: contents, position, and conversion."""
+
     camera: Annotated[
         str | None, Parameter("Which camera, for readers; none: as the file says.")
     ] = None
@@ -161,9 +141,6 @@ class MeasurementDescription(Part):
             most=1.0,
         ),
     ] = None
-    quarter_turns: Annotated[int, ImagePosition.parameter("quarter_turns")] = 0
-    mirror: Annotated[Mirror, ImagePosition.parameter("mirror")] = "none"
-    tip: Annotated[Pixels | None, ImagePosition.parameter("tip")] = None
     integration_time: Annotated[
         float | None, Parameter("Integration time; none: as the file says.", TIME)
     ] = None
@@ -204,18 +181,9 @@ class MeasurementDescription(Part):
         default_factory=FlatFieldSection
     )
 
-    def chosen_frames(self) -> slice | None:
-        """Return the frames to take."""
-        if self.frames is None:
-            return None
-        match = _FRAMES.fullmatch(self.frames)
-        if match is None or match[3] == "0":
-            raise ValueError(f"frames: {self.frames!r}, expected first:end such as 100:200")
-        return slice(*(int(number) if number else None for number in match.groups()))
-
     def position(self) -> ImagePosition:
         """Return the position of the image in the coordinates of the cut."""
-        return ImagePosition(self.quarter_turns, self.mirror, self.tip)
+        return made_from(ImagePosition, self)
 
     def applied_to(self, recording: Recording) -> Recording:
         """Override a recording by this description."""
