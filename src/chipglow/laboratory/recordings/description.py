@@ -10,11 +10,12 @@ from typing import Annotated, Any, Final
 from pydantic import BeforeValidator, ValidationInfo
 
 from chipglow.camera import Recording
+from chipglow.camera.recording import RecordingSettings
 from chipglow.io.cameras.stacks import Stated
 from chipglow.io.column_file import read_response
 from chipglow.laboratory.recordings.radiometric_calibration import ImagePosition
 from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study, made_from
-from chipglow.quantities.units import LENGTH, TEMPERATURE, TIME, WAVELENGTHS
+from chipglow.quantities.units import TEMPERATURE, WAVELENGTHS
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import Notes, commented_yaml, described_by
 
@@ -114,12 +115,9 @@ class CameraFile(Part):
 
 
 @dataclass(frozen=True)
-class MeasurementDescription(ImagePosition, Stated, CameraFile):
+class MeasurementDescription(ImagePosition, RecordingSettings, Stated, CameraFile):
     """A measurement from a camera file: contents, position, and conversion."""
 
-    camera: Annotated[
-        str | None, Parameter("Which camera, for readers; none: as the file says.")
-    ] = None
     band: Annotated[
         BandText | None,
         Parameter(
@@ -127,29 +125,6 @@ class MeasurementDescription(ImagePosition, Stated, CameraFile):
             "wavelength_um,response); none: that of the calibration or the file.",
             allowed="none, 3.8-5.1 um, response.csv",
         ),
-    ] = None
-    pitch: Annotated[
-        float | None,
-        Parameter("Distance between pixels on the object; none: as the file says.", LENGTH),
-    ] = None
-    fill_factor: Annotated[
-        float | None,
-        Parameter(
-            "Portion of a pixel's square that takes light; none: not stated, 1 is assumed for an "
-            "edge.",
-            over=0.0,
-            most=1.0,
-        ),
-    ] = None
-    integration_time: Annotated[
-        float | None, Parameter("Integration time; none: as the file says.", TIME)
-    ] = None
-    range: Annotated[
-        str | None, Parameter("Measuring range of the camera by its name; none: not stated.")
-    ] = None
-    saturation: Annotated[
-        float | None,
-        Parameter("Largest number in the file that is not saturated; none: as the file says."),
     ] = None
     lower_limit: Annotated[
         float | None,
@@ -188,13 +163,8 @@ class MeasurementDescription(ImagePosition, Stated, CameraFile):
     def applied_to(self, recording: Recording) -> Recording:
         """Override a recording by this description."""
         said: dict[str, Any] = {
-            "camera": self.camera,
+            **{name: getattr(self, name) for name in RecordingSettings.declared()},
             "band": None if self.band is None else band_of(self.band),
-            "pitch": self.pitch,
-            "fill_factor": self.fill_factor,
-            "integration_time": self.integration_time,
-            "range_name": self.range,
-            "saturation": self.saturation,
             "object_parameters": self.object_parameters.applied_to(recording.object_parameters),
         }
         said = {name: value for name, value in said.items() if value is not None}
