@@ -49,13 +49,8 @@ def band_of(text: str) -> Band:
 
 
 @dataclass(frozen=True)
-class ObjectSection(Part):
+class ObjectSection(Part, overrides=ObjectParameters):
     """The camera's object parameters, if they are missing or wrong in the file."""
-
-    emissivity: Annotated[float | None, ObjectParameters.parameter("emissivity")] = None
-    reflected: Annotated[float | None, ObjectParameters.parameter("reflected")] = None
-    transmittance: Annotated[float | None, ObjectParameters.parameter("transmittance")] = None
-    atmosphere: Annotated[float | None, ObjectParameters.parameter("atmosphere")] = None
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
         """Override recorded object parameters by this section."""
