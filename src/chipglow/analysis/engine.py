@@ -30,6 +30,7 @@ from chipglow.analysis.reductions import (
 )
 from chipglow.camera import Camera, Flag, GaussianPSF, Measurement
 from chipglow.camera.exposure import sparse_frames, surroundings_radiance
+from chipglow.camera.measuring import measurement_of
 from chipglow.chip import (
     NoContactError,
     NoShearBandError,
@@ -277,7 +278,9 @@ def analyse(
     schedule, cut, missing = _schedule(task)
     readings = read(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
-        name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
+        name: measurement_of(
+            camera.redrawn(number), np.stack(images), schedule.starts, scene.raster
+        )
         for number, (name, images) in enumerate(readings.images.items())
     }
     middle = scene.frame_at(schedule.starts[schedule.shown] + task.duration / 2)
