@@ -11,11 +11,10 @@ from numba import get_num_threads
 from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import (
+    CutSettings,
     CuttingConditions,
-    Friction,
     Numerics,
     OutputWindow,
-    Surroundings,
     unresolved,
 )
 from chipglow.cutting.damage import Damage
@@ -163,7 +162,7 @@ class ForceHistory(Brief):
 
 
 @dataclass(frozen=True)
-class CuttingSimulation:
+class CuttingSimulation(CutSettings):
     """Thermo-mechanical simulation of an orthogonal cut in plane strain.
 
     Material points (MLS-MPM with affine velocities) carry stress, strain, temperature and their
@@ -180,12 +179,6 @@ class CuttingSimulation:
         The workpiece's material.
     tool_material : ToolMaterial
         The tool's material.
-    friction : Friction
-        Friction and heat in the contact.
-    numerics : Numerics
-        Cells, time steps and region.
-    surroundings : Surroundings
-        Surroundings to which free surfaces lose heat.
     tool_temperature : float or ToolBody, optional
         Initial temperature of the tool in K. A body: the steady-state temperature of a long cut,
         by conduction through this body. None: the temperature of the workpiece, as in the paper.
@@ -195,9 +188,6 @@ class CuttingSimulation:
     tool: Tool = field(default_factory=ToolGeometry)
     workpiece: WorkpieceMaterial = field(default_factory=partial(workpiece, "aisi-1045"))
     tool_material: ToolMaterial = field(default_factory=partial(tool_material, "carbide"))
-    friction: Friction = field(default_factory=Friction)
-    numerics: Numerics = field(default_factory=Numerics)
-    surroundings: Surroundings = field(default_factory=Surroundings)
     tool_temperature: float | ToolBody | None = None
 
     def run(

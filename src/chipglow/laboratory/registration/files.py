@@ -110,7 +110,7 @@ def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
     if path.suffix.lower() in PICTURE_SUFFIXES:
         frames = _frames(path)
         times = np.arange(len(frames), dtype=np.float64) * (1.0 if interval is None else interval)
-        return Recording(frames, "counts", times, f"picture {path.name}")
+        return Recording(frames, "counts", times, camera=f"picture {path.name}")
     if camera_formats()[find_format(path)].states_quantity:
         return read_recording(path, interval=interval)
     return read_recording(path, quantity="counts", unit="counts", interval=interval)
