@@ -20,8 +20,8 @@ from chipglow.app.opening import open_any, open_uploaded, scene_model
 from chipglow.app.session import Newest, Session, SupersededError
 from chipglow.app.view import View as PageView
 from chipglow.camera.reference import reference_temperature
-from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene, is_measurement
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.quantities.format import readable
 from chipglow.scene import sample
 from chipglow.scene.lines import nearest
@@ -92,7 +92,9 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
     )
     line = LinePlace("line", study.analysis.lines["across the rake face"])
     points = line.line(picture.raster.spacing).points
-    measured = sample(expected.measured.values, camera.pixels(exposure.raster), points) - KELVIN
+    measured = (
+        sample(expected.measured.values, camera.pixels(exposure.raster), points) - ZERO_CELSIUS
+    )
     np.testing.assert_array_equal(picture.lines["rake_line"]["measured"], measured)
 
 
@@ -320,7 +322,7 @@ def test_draws_are_those_of_other_pixels_and_textures(model):
     at_cursor = nearest(errors["case_1"].values, pixels, state.cursor)
     assert drawn.error.values[1, 1] == pytest.approx(at_cursor, abs=1e-9)
     points = state.line("band_line").line(pixels.spacing).points
-    measured = sample(errors["measured"].values, pixels, points) - KELVIN
+    measured = sample(errors["measured"].values, pixels, points) - ZERO_CELSIUS
     np.testing.assert_allclose(drawn.lines["band_line"][5], measured, rtol=1e-12)
 
 

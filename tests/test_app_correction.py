@@ -12,8 +12,8 @@ from chipglow.app.opening import open_any
 from chipglow.app.session import Session, SupersededError
 from chipglow.camera import Measurement
 from chipglow.correction import correct, observed_scene, surroundings_of
-from chipglow.drawing.scales import KELVIN
 from chipglow.io import example_scene
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.study import fit
 
 pytest.importorskip("panel", reason="needs the extra app")
@@ -73,7 +73,7 @@ def test_the_corrected_pixels_are_those_of_the_library(picture, state):
     assert found.raster == expected.raster
     temperature = found.data["temperature"][0].values
     np.testing.assert_array_equal(temperature, expected.data["temperature"][0].values)
-    np.testing.assert_array_equal(picture.panels["measured"].values, temperature - KELVIN)
+    np.testing.assert_array_equal(picture.panels["measured"].values, temperature - ZERO_CELSIUS)
     pixel = picture.corrected.at(state.cursor)
     budget = expected.budget(state.cursor)
     assert pixel.contributions == dict(zip(budget.cause, budget.standard_uncertainty, strict=True))
@@ -88,7 +88,7 @@ def test_the_third_image_is_half_width_truth_or_error(model, picture, state):
     true = picture.corrected.true
     expected = {
         "half-width": (data["upper"].values - data["lower"].values) / 2,
-        "true": np.where(np.isnan(data["temperature"].values), np.nan, true) - KELVIN,
+        "true": np.where(np.isnan(data["temperature"].values), np.nan, true) - ZERO_CELSIUS,
         "error": data["temperature"].values - true,
     }
     assert set(expected) == set(CORRECTION_IMAGES)

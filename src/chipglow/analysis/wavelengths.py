@@ -21,7 +21,7 @@ from chipglow.camera import Camera, Exposure, frame_weights
 from chipglow.camera.chain import Chain, ExposedChain, chains_in_bands, expose_chains
 from chipglow.camera.effect import EVERY, Effect
 from chipglow.camera.exposure import surroundings_radiance
-from chipglow.quantities import Array, Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.scene import Scene, sample
@@ -184,7 +184,7 @@ def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
     table = xr.Dataset(
         {
             "draws": data.truth.count("draw"),
-            "truth_degC": data.truth.mean("draw") - 273.15,
+            "truth_degC": data.truth.mean("draw") - ZERO_CELSIUS,
             "error_K": error.mean("draw"),
             **{f"{name}_K": data.step.sel(cause=name, drop=True).mean("draw") for name in STEPS},
             "standard_deviation_K": error.std("draw", ddof=1),

@@ -31,9 +31,9 @@ from chipglow.camera.chain import ExposedChain
 from chipglow.camera.exposure_kernels import Check
 from chipglow.camera.reference import TRUE
 from chipglow.correction import Correction, correct, observed_scene, scene_truth, surroundings_of
-from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.drawing.scales import HEAT, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.scene import Material, Raster, Scene, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import fit
@@ -146,7 +146,7 @@ class Picture(Brief):
     def lower_limit(self) -> float | None:
         """Lower range limit of the camera in °C."""
         limit = self.camera.lower_limit if self.camera else None
-        return None if limit is None else limit - KELVIN
+        return None if limit is None else limit - ZERO_CELSIUS
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -215,7 +215,7 @@ class SceneModel:
             limits = panels["scene"].limits
             if np.isfinite(panels["measured"].values).any():
                 (low, high), (least, most) = limits, panels["measured"].limits
-                low = low if camera.lower_limit is None else camera.lower_limit - KELVIN
+                low = low if camera.lower_limit is None else camera.lower_limit - ZERO_CELSIUS
                 limits = min(least, low), max(most, high)
             panels |= {name: replace(panels[name], limits=limits) for name in ("scene", "measured")}
         picture = Picture(
@@ -277,7 +277,7 @@ class SceneModel:
         calibration = camera.calibration(raster.shape)
         if calibration and np.isfinite(numbers["measured"]):
             numbers["uncertainty"] = calibration.netd(numbers["measured"])
-        numbers["sample temperature"] = sample_of("temperature") + KELVIN
+        numbers["sample temperature"] = sample_of("temperature") + ZERO_CELSIUS
         numbers["sample emissivity"] = sample_of("emissivity")
         return numbers
 
@@ -328,7 +328,7 @@ class SceneModel:
         reference, measured, _ = np.moveaxis(readings.values[0, 0], -1, 0)
         error = measured - reference
         lines = {
-            name: np.concatenate(readings.along[row, 0, :, :, 1]) - KELVIN
+            name: np.concatenate(readings.along[row, 0, :, :, 1]) - ZERO_CELSIUS
             for row, name in enumerate(LINES)
         }
         is_known = np.isfinite(error).all()
@@ -421,7 +421,7 @@ class SceneModel:
         def make() -> NDArray[np.float32]:
             values = self._values(state, name, scene, exposure, index).astype(np.float32)
             void = scene.field("material", index) == Material.VOID
-            zero = np.float32(KELVIN if SCENE_IMAGES[name][1] == "°C" else 0.0)
+            zero = np.float32(ZERO_CELSIUS if SCENE_IMAGES[name][1] == "°C" else 0.0)
             return np.where(void, np.float32(nan), values - zero)
 
         return self._kept(6, "field", (name, scene.raster.shape, index, surface), make)
@@ -519,7 +519,7 @@ def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
     shown, before = picture.state.study.correction_image, picture.panels
     raster = corrected.correction.raster if corrected else picture.raster
     unknown = np.full(raster.shape, nan)
-    temperature = corrected.image("corrected") - KELVIN if corrected else unknown
+    temperature = corrected.image("corrected") - ZERO_CELSIUS if corrected else unknown
     limits = before["measured"].limits
     if np.isfinite(temperature).any():
         limits = min(limits[0], np.nanmin(temperature)), max(limits[1], np.nanmax(temperature))
@@ -528,7 +528,7 @@ def _with_correction(picture: Picture, corrected: Corrected | None) -> Picture:
         unknown if corrected is None else corrected.image(shown),
     )
     if shown == "true":
-        last = Panel(title, "°C", third - KELVIN, raster, limits, HEAT)
+        last = Panel(title, "°C", third - ZERO_CELSIUS, raster, limits, HEAT)
     elif shown == "error":
         last = _error_panel(title, third, raster)
     else:
@@ -552,7 +552,7 @@ def _corrected_line(picture: Picture, corrected: Corrected | None, name: str) ->
     data = corrected.correction.data.isel(time=0).assign(true=(("y", "x"), corrected.true))
     line = picture.state.line(name).line(picture.raster.spacing)
     return {
-        key: sample(data[variable].values, corrected.correction.raster, line.points) - KELVIN
+        key: sample(data[variable].values, corrected.correction.raster, line.points) - ZERO_CELSIUS
         for key, variable in _LINE_OF.items()
     }
 
@@ -577,7 +577,7 @@ def _lines(state: State, raster: Raster, data: xr.Dataset) -> dict[str, dict[str
     for name in LINES:
         line = state.line(name).line(raster.spacing)
         lines[name] = {"along": 1e6 * line.distance} | {
-            key: sample(data[key].values, raster, line.points) - KELVIN
+            key: sample(data[key].values, raster, line.points) - ZERO_CELSIUS
             for key in ("measured", "reference")
             if key in data
         }
@@ -596,7 +596,7 @@ def _crossings(state: State, tool: Tool | None) -> dict[str, float]:
 
 
 def _measured_panel(data: xr.Dataset, raster: Raster) -> Panel:
-    values = _unflagged(data, data["measured"]) - KELVIN
+    values = _unflagged(data, data["measured"]) - ZERO_CELSIUS
     limits = ends(values, 0.0, 100.0, 10.0)
     return Panel("Measured radiance temperature", "°C", values, raster, limits, HEAT)
 

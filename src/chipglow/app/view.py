@@ -27,8 +27,7 @@ from chipglow.app.figures import TEXT, Figures
 from chipglow.app.opening import MOST_UPLOADED, OpenFiles
 from chipglow.app.pictures import Drawn, Model, Picture, SceneModel
 from chipglow.app.session import PHASES, TEXTURES, Newest, Session
-from chipglow.drawing.scales import KELVIN
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 from chipglow.quantities.format import quantity_text, readable, rounded_text, uncertain_decimals
 
 _FOLDER: Final = Path(__file__).parent
@@ -387,7 +386,7 @@ def _texts(numbers: Mapping[str, float]) -> dict[str, str]:
     is_known = isfinite(uncertainty) and uncertainty > 0
     decimals = uncertain_decimals(uncertainty) if is_known else 1
     celsius = {
-        name: round(numbers[name] - KELVIN, decimals)
+        name: round(numbers[name] - ZERO_CELSIUS, decimals)
         for name in ("measured", "reference")
         if name in numbers
     }
@@ -406,7 +405,7 @@ def _quantity(value: float, unit: str, decimals: int, sign: str = "") -> str:
 
 
 def _celsius(kelvins: float) -> str:
-    return _quantity(kelvins - KELVIN, "°C", 1)
+    return _quantity(kelvins - ZERO_CELSIUS, "°C", 1)
 
 
 def _kelvins(kelvins: float) -> str:

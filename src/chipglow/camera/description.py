@@ -19,7 +19,7 @@ from chipglow.camera.optics.blurs import BLURS
 from chipglow.camera.optics.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.optics.sampling import sensor_raster
 from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
-from chipglow.quantities import Array, Parameter, made_from
+from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, made_from
 from chipglow.quantities.units import LENGTH, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
@@ -155,8 +155,8 @@ class CameraDescription(CameraSettings):
         ):
             warn(
                 f"camera: lower_limit is {self.lower_limit:g} K, which is "
-                f"{self.lower_limit - 273.15:g} °C. If {self.lower_limit:g} °C is meant, write "
-                f"{self.lower_limit + 273.15:g} K.",
+                f"{self.lower_limit - ZERO_CELSIUS:g} °C. If {self.lower_limit:g} °C is meant, "
+                f"write {self.lower_limit + ZERO_CELSIUS:g} K.",
                 ChipglowWarning,
                 stacklevel=3,
             )

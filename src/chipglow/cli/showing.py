@@ -16,6 +16,7 @@ from chipglow.drawing.scales import shown_frame
 from chipglow.io import StoredScene, is_measurement, is_scene, open_scene, read_measurement
 from chipglow.io.measurement_file import holds
 from chipglow.laboratory.recordings import flag_fractions
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import ENERGY_UNITS, Raster, Tool, ToolGeometry
 from chipglow.text import Notes
 
@@ -200,10 +201,10 @@ def _measurement_facts(measurement: Measurement, time: float | None) -> _Rows:
     if "integration_time" in data.attrs:
         yield "integration time", microseconds(float(data.attrs["integration_time"]))
     if "lower_limit" in data.attrs:
-        yield "lower range limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
+        yield "lower range limit", f"{float(data.attrs['lower_limit']) - ZERO_CELSIUS:.4g} °C"
     if {"netd", "netd_temperature"} <= set(data.attrs):
         netd, at = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
-        yield "NETD", f"{1e3 * netd:.3g} mK at {at - 273.15:.4g} °C, half of the range filled"
+        yield "NETD", f"{1e3 * netd:.3g} mK at {at - ZERO_CELSIUS:.4g} °C, half of the range filled"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band, shape = measurement.band, ""
         if band.response is not None:
@@ -231,7 +232,7 @@ def _measurement_facts(measurement: Measurement, time: float | None) -> _Rows:
 
 
 def _celsius(kelvins: NDArray[np.float64]) -> str:
-    known = kelvins[np.isfinite(kelvins)] - 273.15
+    known = kelvins[np.isfinite(kelvins)] - ZERO_CELSIUS
     if known.size == 0:
         return "none: no pixel is usable"
     least, median, largest = (f"{one:.1f} °C" for one in np.quantile(known, (0.0, 0.5, 1.0)))

@@ -16,7 +16,7 @@ from chipglow.io.sources.meshes.vtk import OTHER_HDF
 from chipglow.io.sources.movies.movie import MovieSource
 from chipglow.io.sources.points.cloud import CloudSource
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import Family, FileBeside, Parameter, Part, adapter
+from chipglow.quantities import ZERO_CELSIUS, Family, FileBeside, Parameter, Part, adapter
 from chipglow.quantities.units import TIME
 from chipglow.text import commented_yaml, described_by, has_names_of_columns
 
@@ -129,7 +129,7 @@ class ImportDescription(Part):
         if self.tool is not None or self.movie.tool_colour is not None:
             assumptions["temperature"] = (
                 "Where the source has no temperature of the tool, it is "
-                f"{self.completion.surroundings - 273.15:g} °C (completion.surroundings)."
+                f"{self.completion.surroundings - ZERO_CELSIUS:g} °C (completion.surroundings)."
             )
         return assumptions
 

@@ -419,7 +419,7 @@ def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
         raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
     if name == "temperature" and not COLDEST <= lowest <= highest <= HOTTEST:
         wrong = lowest if lowest < COLDEST else highest
-        hint = "; it looks like °C, add 273.15" if -100.0 < wrong < COLDEST else ""
+        hint = f"; it looks like °C, add {ZERO_CELSIUS}" if -100.0 < wrong < COLDEST else ""
         raise SceneError(
             f"scene: temperature {wrong:.6g} at {time:.9g} s, expected kelvin of "
             f"{COLDEST:g} to {HOTTEST:g}{hint}"

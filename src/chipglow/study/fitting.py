@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
 from chipglow.analysis import Plan
-from chipglow.quantities import Part, own_settings
+from chipglow.quantities import ZERO_CELSIUS, Part, own_settings
 from chipglow.quantities.units import LENGTH
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
@@ -105,11 +105,11 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
             if isinstance(one, FeatureTrends):
                 trends.extend(one.trends.values())
         for low, high in dict.fromkeys(trend.measured for trend in trends):
-            text = f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C"
+            text = f"The emissivity of {name!r} was measured at {low - ZERO_CELSIUS:.0f} °C"
             if low == high:
                 yield f"{text}: it is taken to be the same at all temperatures."
             else:
-                yield f"{text} to {high - 273.15:.0f} °C: its straight line is extrapolated."
+                yield f"{text} to {high - ZERO_CELSIUS:.0f} °C: its straight line is extrapolated."
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:

@@ -18,6 +18,7 @@ from chipglow.cutting import CuttingSimulation
 from chipglow.drawing import drawing, scales
 from chipglow.io import movie_writer
 from chipglow.io.movie_file import PALETTE_SIZE
+from chipglow.quantities import ZERO_CELSIUS
 from chipglow.scene import Frame, Material, Raster
 from chipglow.scene.figures import show_image
 
@@ -47,7 +48,7 @@ class MovieScales:
         conditions = simulation.conditions
         start = conditions.initial_temperature
         hottest = start + _HOT * max(simulation.workpiece.melting_temperature - start, 0.0)
-        top = 50.0 * ceil((hottest - scales.KELVIN) / 50.0 + 1e-9) + scales.KELVIN
+        top = 50.0 * ceil((hottest - ZERO_CELSIUS) / 50.0 + 1e-9) + ZERO_CELSIUS
         decade = floor(log10(0.1 * conditions.speed / conditions.feed) + 1e-9)
         return cls(
             temperature=(start, top),
@@ -78,7 +79,7 @@ class CutPicture:
         rate = np.maximum(frame.needed("plastic_strain_rate"), self._slowest)
         for image, values, shown in zip(
             self._images,
-            (frame.temperature - np.float32(scales.KELVIN), frame.needed("plastic_strain"), rate),
+            (frame.temperature - np.float32(ZERO_CELSIUS), frame.needed("plastic_strain"), rate),
             (there, solid, solid),
             strict=True,
         ):
@@ -97,7 +98,7 @@ class CutPicture:
         self._canvas = cast(Any, FigureCanvasAgg(self._figure))  # untyped
         self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
         self._slowest = ends.rate[0]
-        low, top = (limit - scales.KELVIN for limit in ends.temperature)
+        low, top = (limit - ZERO_CELSIUS for limit in ends.temperature)
         looks: Any = (
             ("temperature", "temperature / °C", scales.HEAT, (low, top), "max"),
             ("plastic strain", "plastic strain", scales.PLAIN, ends.strain, "max"),

@@ -19,7 +19,7 @@ from chipglow.camera.detector.pixels import (
 )
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
-from chipglow.quantities import Array, Brief
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief
 from chipglow.quantities.units import COLDEST
 
 HALF: Final = 0.5
@@ -141,7 +141,7 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
         part * full if kelvins is None else float(band.radiance(kelvins))
         for kelvins, part in ((detector.cold, DARKER_SOURCE), (detector.hot, BRIGHTER_SOURCE))
     )
-    cold, hot = (float(band.temperature(one)) - 273.15 for one in (dark, bright))
+    cold, hot = (float(band.temperature(one)) - ZERO_CELSIUS for one in (dark, bright))
     if not dark < bright:
         raise ValueError(
             f"detector: the sources of the correction are of {cold:.4g} °C and {hot:.4g} °C, "
@@ -150,7 +150,7 @@ def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
     if not bright < full:
         raise ValueError(
             f"Detector.hot: {hot:.4g} °C fills the detector at its exposure, expected less than "
-            f"{float(band.temperature(full)) - 273.15:.4g} °C"
+            f"{float(band.temperature(full)) - ZERO_CELSIUS:.4g} °C"
         )
     return dark, bright
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from scipy.special import chdtrc, chdtri, stdtr, stdtrit
 
-from chipglow.quantities import Array
+from chipglow.quantities import ZERO_CELSIUS, Array
 
 _UNLIKELY: Final = 0.01
 _ALIKE: Final = 0.05
@@ -37,7 +37,7 @@ def residual_warnings(
         )
     if free >= 2 and (point := _outlier(residuals, design, stated)) is not None:
         yield (
-            f"The point at {kelvins[point] - 273.15:.5g} °C lies "
+            f"The point at {kelvins[point] - ZERO_CELSIUS:.5g} °C lies "
             f"{abs(residuals[point]):.3g} standard uncertainties from the others' curve; without "
             "it they agree far better. Check it."
         )

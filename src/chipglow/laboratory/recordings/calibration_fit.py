@@ -11,7 +11,7 @@ from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration import FittedCalibration
 from chipglow.laboratory.recordings.calibration_checks import alike, drift_shift, residual_warnings
-from chipglow.quantities import Array, Brief, Parameter, Part
+from chipglow.quantities import ZERO_CELSIUS, Array, Brief, Parameter, Part
 from chipglow.quantities.units import COLDEST, HOTTEST, TEMPERATURE
 from chipglow.radiometry import Band
 
@@ -218,11 +218,11 @@ def _check_points(kelvins: Array, counts: Array, parameters: int, stated: bool) 
     if impossible.size:
         raise ValueError(
             f"calibration: a blackbody is at {impossible[0]:g} K "
-            f"({impossible[0] - 273.15:g} °C), expected {COLDEST:g} to {HOTTEST:g} K"
+            f"({impossible[0] - ZERO_CELSIUS:g} °C), expected {COLDEST:g} to {HOTTEST:g} K"
         )
     largest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
     if largest.size > 1 and np.unique(counts).size > 1:
-        places = ", ".join(f"{kelvin - 273.15:.5g}" for kelvin in largest)
+        places = ", ".join(f"{kelvin - ZERO_CELSIUS:.5g}" for kelvin in largest)
         raise ValueError(
             f"calibration: the counts are {counts.max():.7g} at each of {places} °C and nowhere "
             "greater: the camera is saturated there, expected points without saturation"
