@@ -38,7 +38,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def state(model):
-    return model.controls.changed(model.controls.initial, MODE)
+    return model.controls.state_with(model.controls.initial, MODE)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ def test_the_third_image_is_half_width_truth_or_error(model, picture, state):
     }
     assert set(expected) == set(CORRECTION_IMAGES)
     for name, values in expected.items():
-        chosen = model.controls.changed(state, {"correction_image": name})
+        chosen = model.controls.state_with(state, {"correction_image": name})
         np.testing.assert_array_equal(model.picture(chosen).panels["error"].values, values)
 
 
@@ -110,9 +110,9 @@ def test_the_lines_show_the_corrected_and_the_true_temperature(picture):
 
 def test_a_move_of_the_cursor_nearby_keeps_the_correction(model, picture, state):
     x, y = (1e6 * value for value in state.cursor)
-    near = model.controls.changed(state, {"cursor": f"{x + 1},{y}"})
+    near = model.controls.state_with(state, {"cursor": f"{x + 1},{y}"})
     assert model.picture(near).corrected is picture.corrected
-    far = model.controls.changed(state, {"cursor": f"{x},{y - 150}"})
+    far = model.controls.state_with(state, {"cursor": f"{x},{y - 150}"})
     shown = model.picture(far)
     assert shown.corrected is None
     assert np.isnan(shown.panels["measured"].values).all()
@@ -126,7 +126,7 @@ def test_only_controls_with_an_effect_are_shown(model, state):
 
 
 def test_a_newer_state_ends_the_correction(model, state):
-    other = model.controls.changed(state, {"emissivity_uncertainty": "0.03"})
+    other = model.controls.state_with(state, {"emissivity_uncertainty": "0.03"})
     picture = model.picture(other)
 
     def check():
@@ -154,6 +154,6 @@ def test_a_session_says_that_it_corrects_and_sends_the_picture_again(model, pict
 
 
 def test_without_a_blur_the_page_says_why_there_is_no_correction(model, state):
-    ideal = model.controls.changed(state, {"camera.psf": "none"})
+    ideal = model.controls.state_with(state, {"camera.psf": "none"})
     with pytest.raises(ValueError, match=r"no point spread function; state camera\.psf"):
         model.corrected(model.picture(ideal), lambda: None)

@@ -96,11 +96,11 @@ class Session:
 
     def change(self, texts: Texts, final: bool = True) -> None:
         """Set controls; only a final state is one that `step` goes to."""
-        self._set(self.model.controls.changed(self.state, texts), final)
+        self._set(self.model.controls.state_with(self.state, texts), final)
 
     def restore(self, texts: Texts) -> None:
         """Set controls without a picture and without a step to undo, as `change` otherwise."""
-        self.state = self.model.controls.changed(self.state, texts)
+        self.state = self.model.controls.state_with(self.state, texts)
 
     def _set(self, state: State, final: bool) -> None:
         if final and state != self._settled[self._at]:

@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 
 class Page(JSComponent):  # type: ignore[misc]
-    """The page around the figures; it exchanges messages with `View`."""
+    """The page around the figures; it exchanges messages with `PageView`."""
 
     html = param.String()
     figures = Children()
@@ -56,7 +56,7 @@ class Page(JSComponent):  # type: ignore[misc]
         self.alone(lambda: super(Page, self)._on_msg(ref, manager, msg))
 
 
-class View:
+class PageView:
     """A page and its session; a link gives `texts` of controls and other parameters, `link`."""
 
     def __init__(

@@ -56,7 +56,7 @@ def surroundings_radiance(band: Band, reflected: float | None) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class SpectralView:
     """Emissivity of a scene in a band, with the temperature of the surroundings in K."""
 
     emissivity: EmissivityField
@@ -66,7 +66,7 @@ class View:
 
 def expose(
     scene: Scene,
-    views: Sequence[View],
+    views: Sequence[SpectralView],
     start: float,
     duration: float,
     delays: Array | None = None,

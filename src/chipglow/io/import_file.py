@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from chipglow.io.completion import Completion
-from chipglow.io.importing import Import, View
+from chipglow.io.importing import FieldOfView, Import
 from chipglow.io.measurement_file import holds
 from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import Placement, Units
@@ -60,7 +60,9 @@ class ImportDescription(Part):
     placement: Annotated[Placement, Parameter("How the source's axes lie in the scene.")] = field(
         default_factory=Placement
     )
-    field_of_view: Annotated[View, Parameter("Samples of the scene.")] = field(default_factory=View)
+    field_of_view: Annotated[FieldOfView, Parameter("Samples of the scene.")] = field(
+        default_factory=FieldOfView
+    )
     tool: Annotated[
         ToolSection | None,
         Parameter("The tool's outline with its tip at the origin: what is in it is tool."),

@@ -266,7 +266,7 @@ class EmissivityStack:
         if self.features is None:
             return np.stack([field.emissivity(frame) for field in self.fields])
         bare = self.features.emissivities(frame)
-        return np.stack([f.changed(one, frame) for f, one in zip(self.fields, bare, strict=True)])
+        return np.stack([f.modified(one, frame) for f, one in zip(self.fields, bare, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -300,7 +300,7 @@ class FeatureTrends(Modifier):
         drawn = drawn_trends(tuple(self.trends.values()), self.draw)
         lines = dict(zip(self.trends, drawn, strict=True))
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def at_temperature(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             result, fractions = emissivity.astype(np.float64), feature_fractions(frame)
             for name in FEATURES:
                 if name in lines:
@@ -308,7 +308,7 @@ class FeatureTrends(Modifier):
                     result += fractions[name] * away
             return np.clip(result, 0.0, 1.0)
 
-        return changed
+        return at_temperature
 
 
 def feature_fractions(frame: Frame) -> dict[str, NDArray[np.float64]]:

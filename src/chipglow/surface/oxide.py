@@ -56,10 +56,10 @@ class Oxide(Modifier):
     ) -> Change:
         history = OxideHistory.from_scene(scene, self)
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def oxidised(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             return self.of_thickness(emissivity, history.thickness(frame))
 
-        return changed
+        return oxidised
 
     def of_thickness(self, bare: ArrayLike, thickness: ArrayLike) -> NDArray[np.float64]:
         """Return the emissivity of material of a bare one under oxide of a thickness in m."""

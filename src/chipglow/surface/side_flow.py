@@ -197,7 +197,7 @@ class SideShape(Modifier):
         def black(frame: Frame, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
             return np.asarray(black_in_band(frame.temperature[rows, columns].astype(np.float64)))
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
+        def with_reflections(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float32]:
             chip = frame.material[sections.probes] == Material.WORKPIECE
             tool = frame.material[sections.rows, sections.columns] == Material.TOOL
             touching = chip.any(axis=1) & tool.any(axis=1)
@@ -234,7 +234,7 @@ class SideShape(Modifier):
             result[rows, columns] = np.maximum(effective, 0.0)
             return result
 
-        return changed
+        return with_reflections
 
     def effective_emissivity(
         self, chip: float, tool: float, tool_radiance: float = 1.0, surroundings: float = 0.0

@@ -176,12 +176,12 @@ class Dispersion(Modifier):
         here, there = (np.clip(one.columns[1], _LEAST, 1 - _LEAST) for one in (known, seen))
         temperatures, odds = seen.columns[0], there / (1 - there) * (1 - here) / here
 
-        def changed(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
+        def in_the_band(emissivity: NDArray[np.float32], frame: Frame) -> NDArray[np.float64]:
             values = np.asarray(emissivity, np.float64)
             factor = np.interp(frame.temperature, temperatures, odds)
             return np.asarray(values * factor / (1 - values + values * factor), np.float64)
 
-        return changed
+        return in_the_band
 
 
 def required_band(name: str, band: Band | None) -> Band:

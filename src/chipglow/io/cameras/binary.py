@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import Quantity
+from chipglow.camera.recording import SignalKind
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.grids.file_array import check_samples
 from chipglow.quantities import Array
@@ -102,7 +102,7 @@ class CameraFile(ABC):
     """Rows and columns of a picture."""
     complete: int
     """Number of whole frames."""
-    quantity: Quantity = "counts"
+    quantity: SignalKind = "counts"
     dtype: DTypeLike = np.uint16
 
     def __init__(self, binary: Binary, notes: Notes) -> None:

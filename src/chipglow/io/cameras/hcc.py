@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Recording
-from chipglow.camera.recording import Quantity
+from chipglow.camera.recording import SignalKind
 from chipglow.io import atomic_path
 from chipglow.io.cameras.binary import Binary, CameraFile, check_picture, layout
 from chipglow.io.sources import SourceError
@@ -38,7 +38,7 @@ _EXPOSURE: Final = 1e-8
 _RATE: Final = 1e-3
 _SUBSECOND: Final = 1e-7
 _WITH_TIME: Final = 10
-_MODES: Final[dict[int, tuple[str, Quantity | None]]] = {
+_MODES: Final[dict[int, tuple[str, SignalKind | None]]] = {
     0: ("raw", "counts"),
     255: ("raw", "counts"),
     1: ("corrected for non-uniformity", "counts"),

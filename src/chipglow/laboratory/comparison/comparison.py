@@ -20,7 +20,7 @@ from chipglow.laboratory.chip import (
     rake_grid,
 )
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
-from chipglow.laboratory.chip.frames import FRAMES, changed, frame_mean, frame_scatter
+from chipglow.laboratory.chip.frames import FRAMES, frame_mean, frame_scatter, linearly_changed
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.laboratory.comparison.coverage import COVERAGE
@@ -430,7 +430,7 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
         ends = {"left": np.nan, "right": np.nan}
         return np.stack([np.interp(distance, profile.distance, row, **ends) for row in field[used]])
 
-    frames = changed(profile.estimate.without(POSITION), read)
+    frames = linearly_changed(profile.estimate.without(POSITION), read)
     # The curve's place does not change from frame to frame: it is as uncertain in their mean.
     position = frame_mean(Estimate(read(profile.estimate.contribution(POSITION))))
     mean = frame_mean(frames)
