@@ -43,9 +43,16 @@ AGREEING: Final = "values_with_E_n_up_to_1"
 """Column of the number of values that agree."""
 
 _DRAWS: Final = 4000
+"""Draws of the errors from which the probability of each simulation follows."""
+
 _SEED: Final = 2010
-_FEW: Final = 3
+"""Seed of the draws, so that the same files give the same numbers."""
+
+_FEWEST_VALUES: Final = 3
+"""Fewest frames, and fewest places, that can be compared."""
+
 _SAME_ANGLE: Final = radians(0.1)
+"""Angle in rad between two rake faces that count as the same, if no uncertainty is stated."""
 
 
 def normalised_error(measured: Estimate, simulated: Estimate) -> Array:
@@ -304,7 +311,7 @@ def _compare_grid(
     except ValueError as error:
         notes.warnings.append(f"The rake face is left out: {error}.")
         return None
-    if grids[0].times.size < _FEW:
+    if grids[0].times.size < _FEWEST_VALUES:
         notes.warnings.append(_few_frames("measured", grids[0].times.size))
     columns = min(grid.along.size for grid in grids)
     base, *others = grids
@@ -422,7 +429,7 @@ def _along(name: str, profile: BandProfile, distance: Array, notes: Notes) -> Es
     if not used.any():
         notes.warnings.append(f"{name}: No frame has a band that is in place; all frames are used.")
         used = np.ones(used.size, np.bool_)
-    elif used.sum() < _FEW:
+    elif used.sum() < _FEWEST_VALUES:
         notes.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
 
     def read(field: Array) -> Array:

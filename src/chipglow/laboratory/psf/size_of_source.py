@@ -12,7 +12,10 @@ from chipglow.laboratory.psf.psf_fit import ApertureSignals
 from chipglow.quantities import Array, Brief
 
 _LEAST_APERTURES: Final = 3
+"""Fewest diameters of apertures."""
+
 _FEWEST_OUTSIDE: Final = 20
+"""Fewest pairs of pixels beyond an aperture that show the noise."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

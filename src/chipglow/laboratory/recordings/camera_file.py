@@ -34,7 +34,11 @@ WHOLE: Final = np.s_[:, :]
 """All rows and columns of an image."""
 
 _BLOCKS: Final = 4
-_CLEARLY: Final = 4.0
+"""Blocks along each side of an image whose medians are compared."""
+
+_DEVIATION_LIMIT: Final = 4.0
+"""Standard errors beyond which a block's median differs from the typical one."""
+
 _MOST_OUTSIDE: Final = 0.05
 """Fraction of a flat-field source's frames that may be outside the range, as bad pixels are."""
 
@@ -143,7 +147,7 @@ def _unevenness(image: Array) -> float:
     # The standard error of a median is 1.25 times that of the mean.
     errors = 1.25 * np.median(spreads) / np.sqrt([one.size for one in values])
     away = np.abs(medians - np.median(medians))
-    return float(np.max(away, where=away > _CLEARLY * errors, initial=0.0))
+    return float(np.max(away, where=away > _DEVIATION_LIMIT * errors, initial=0.0))
 
 
 def pixel_correction(
