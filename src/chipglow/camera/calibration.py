@@ -22,8 +22,11 @@ from chipglow.uncertainty.estimate import factor
 CALIBRATION: Final = "calibration"
 """Name of the component of uncertainty due to a calibration."""
 
-_CHECKED: Final = 101
-_NODES: Final = 513
+_CHECKED_TEMPERATURES: Final = 101
+"""Temperatures at which a calibration is checked to rise."""
+
+_INVERSE_NODES: Final = 513
+"""Nodes of the inverse of a calibration."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,7 +157,7 @@ class FittedCalibration(Calibration):
     @property
     def rises(self) -> bool:
         """Whether the counts rise with the temperature wherever it holds."""
-        kelvins = np.linspace(self.lowest, self.highest, _CHECKED)
+        kelvins = np.linspace(self.lowest, self.highest, _CHECKED_TEMPERATURES)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return bool((self.slope(kelvins) > 0).all())
 
@@ -169,7 +172,7 @@ class FittedCalibration(Calibration):
     def errors(self) -> CalibrationErrors:
         """Effects of its errors on the radiance, from the coldest to the hottest blackbody."""
         coldest, hottest = self.counts([self.lowest, self.highest]).tolist()
-        kelvins = self.temperature(np.linspace(coldest, hottest, _NODES))
+        kelvins = self.temperature(np.linspace(coldest, hottest, _INVERSE_NODES))
         radiance = np.asarray(self.band.radiance(kelvins), np.float64)
         return CalibrationErrors(radiance, self._effects(kelvins))
 

@@ -17,6 +17,8 @@ from chipglow.scene import Frame, Raster, Scene, is_gap
 from chipglow.surface import EmissivityField, EmissivityStack
 
 _ROUNDING: Final = 1e-6
+"""Part of a frame spacing or an exposure that counts as rounding of times."""
+
 _SPARSE: Final = 1e-3
 """Ratio of exposure to frame spacing below which a changing scene causes a warning."""
 

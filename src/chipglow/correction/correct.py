@@ -53,6 +53,7 @@ _BORDER: Final = 3
 """Width in pixels of the border whose values depend on what is beyond the image."""
 
 _LEVEL: Final = 0.95
+"""Probability of the expanded uncertainties."""
 
 
 def correct(

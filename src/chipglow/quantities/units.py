@@ -29,9 +29,15 @@ _QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_FRACTION}|{_NUMBER}))\s*({_UNI
 _RANGE: Final = re.compile(rf"\s*({_NUMBER})\s*[-–]\s*({_NUMBER})\s*({_UNIT})?\s*")
 _MULTIPLE: Final = re.compile(rf"({_NUMBER})\s*\*?\s*([A-Za-z°µμ].*)")
 _BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
+
 _MOST_DIGITS: Final = 21
+"""Digits up to which a rounded number is searched: more than a double has."""
+
 _LONGEST_NUMBER: Final = 12
+"""Characters of a number beyond which a fraction is tried instead."""
+
 _LARGEST_DENOMINATOR: Final = 99
+"""Largest denominator of such a fraction."""
 
 _SPELLINGS: Final = {
     "c": "degC",
@@ -243,6 +249,8 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 COLDEST: Final = 200.0
+"""Lowest temperature in K of fields, and of the tables of radiance."""
+
 HOTTEST: Final = 6000.0
 """Limits in K of the temperatures of scenes, black bodies and radiance tables."""
 

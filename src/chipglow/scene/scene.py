@@ -60,6 +60,7 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
 """Energy account on `force_time`, per width of cut and since the start: optional, all or none."""
 
 _LONGEST_STEP: Final = 2.0
+"""Time between frames, in the usual one, from which there is a gap."""
 
 
 def is_gap(steps: NDArray[np.float64], frame_spacing: float) -> NDArray[np.bool_]:

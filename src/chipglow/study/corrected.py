@@ -41,6 +41,7 @@ _DRAWS: Final = 64
 """Draws of a study's inputs for its image of a place; their standard deviation is known to 9 %."""
 
 _SEED: Final = 2010
+"""Seed of the draws, so that the same files give the same numbers."""
 
 _MUST_AGREE: Final[dict[str, Quantity]] = {
     "integration_time": TIME,

@@ -25,8 +25,11 @@ from chipglow.text.template import yaml_line
 
 Follow: TypeAlias = Literal["material", "mean", "none"]
 
-_FEW_FRAMES: Final = 5
-_FEW_CELLS: Final = 10
+_FRAMES_NEEDED: Final = 5
+"""Frames of a scene within an exposure below which it is a warning."""
+
+_CELLS_NEEDED: Final = 10
+"""Cells within the feed below which it is a warning."""
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
@@ -114,7 +117,7 @@ def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
     exposure, spacing = study.camera.integration_time, scene.frame_spacing
-    if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
+    if len(scene.times) > 1 and exposure < _FRAMES_NEEDED * spacing * (1 - 1e-9):
         yield (
             f"Each frame of the scene represents {spacing * 1e6:.3g} us of the exposure's "
             f"{exposure * 1e6:.3g} us: motion within that time is neglected. Use a scene with more "
@@ -122,10 +125,10 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
         )
     cutting = study.cutting
     cells = cutting.feed / cutting.numerics.cell
-    if study.scene is None and cells < _FEW_CELLS * (1 - 1e-9):
+    if study.scene is None and cells < _CELLS_NEEDED * (1 - 1e-9):
         yield (
             f"The feed is {cells:.3g} cells: too coarse for forces and shear bands; use "
-            f"{_FEW_CELLS} or more (cutting.numerics.cell)."
+            f"{_CELLS_NEEDED} or more (cutting.numerics.cell)."
         )
 
 

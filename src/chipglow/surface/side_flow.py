@@ -30,8 +30,14 @@ _INSIDE: Final = 0.75
 """Depth in samples at which the sample that holds a point lies wholly on one side of a face."""
 
 _RAKE_ELEMENTS: Final = 16
+"""Elements of the rake face, graded towards the contact."""
+
 _SIDE_ELEMENTS: Final = 24
+"""Elements of the bulged side of the chip, graded."""
+
 _FLAT_ELEMENTS: Final = 16
+"""Elements of the flat side of tool or chip, of that which is lower, graded."""
+
 _FLAT_REACH: Final = 8.0
 """Length of a flat side that is looked at, in heights of what stands out beside it."""
 

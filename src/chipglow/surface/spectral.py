@@ -29,8 +29,13 @@ SPECTRA: Final = Family("spectral")
 REFERENCE: Final = 293.15
 """Temperature in K at which resistivities are stated."""
 
-_STEP: Final = 5.0
-_NEAR: Final = 0.5
+_TEMPERATURE_STEP: Final = 5.0
+"""Step of the table in K."""
+
+_LEAST_CONTRAST: Final = 0.5
+"""Difference in K from the reflected temperature, within which the derivative at this distance is
+taken."""
+
 _LEAST: Final = 1e-6
 """An emissivity of a law of odds is at least this far from 0 and 1."""
 
@@ -53,11 +58,13 @@ class SpectralSurface(Surface):
 
     def in_band(self, band: Band, reflected: float | None) -> TemperatureSurface:
         """Return the emissivity by temperature that a camera of a band sees."""
-        temperature = np.arange(COLDEST, HOTTEST + _STEP / 2, _STEP)
+        temperature = np.arange(COLDEST, HOTTEST + _TEMPERATURE_STEP / 2, _TEMPERATURE_STEP)
         seen = temperature
         if reflected is not None:
             # The weights are a derivative where the surface is as warm as what it reflects.
-            seen = np.where(abs(seen - reflected) < _NEAR, reflected + _NEAR, seen)
+            seen = np.where(
+                abs(seen - reflected) < _LEAST_CONTRAST, reflected + _LEAST_CONTRAST, seen
+            )
         wavelength, weights = band.weights(seen)
         if reflected is not None:
             weights = weights - band.weights(reflected)[1]

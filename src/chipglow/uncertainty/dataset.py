@@ -20,6 +20,8 @@ from chipglow.uncertainty.component import Cause, Component, DistributionKind
 from chipglow.uncertainty.estimate import Estimate, factor
 
 _MOST_ERRORS: Final = 1000
+"""Most errors of a component that values share in a file."""
+
 _SHAPES: Final = {"normal": "gaussian"}
 _DISTRIBUTIONS: Final[Mapping[str, DistributionKind]] = {
     "gaussian": "normal",

@@ -32,6 +32,8 @@ _MARGIN: Final = 5.0
 """Standard deviations under the mean of saturated frames from which on a count is saturated."""
 
 _SATURATED_FRAMES: Final = 8
+"""Frames of a saturated source from whose scatter the limit of the counts follows."""
+
 _SMALL: Final = (32, 32)
 """Elements by which the lower range limit is found."""
 
@@ -39,7 +41,11 @@ _QUANTISATION: Final = 12**-0.5
 """Standard deviation of rounding to whole counts."""
 
 _FAINTEST: Final = 1e-9
+"""Smallest light, as a fraction of that which fills the capacity, of a source that is searched for.
+"""
+
 _STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
+"""Streams of random numbers, one for each source."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,6 +26,7 @@ LARGEST_CLUSTER: Final = 4
 """Pixels of the largest cluster, neighbours over corner included, that is replaced."""
 
 _FEWEST_NEIGHBOURS: Final = 3
+"""Fewest good pixels around a bad one that replace it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -30,7 +30,7 @@ _LEAST_TURN: Final = pi / 18
 """Smallest angle in rad between edges that count as of different orientation."""
 
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
-"""Widths from which the first fit starts, in widths that the model proposes."""
+"""Widths from which the fits start, in pixel pitches."""
 
 _SLOPE_STEP: Final = 1e-5
 """Step of a shape parameter for its slope, in its scale."""
