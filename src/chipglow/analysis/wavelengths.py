@@ -24,6 +24,7 @@ from chipglow.camera.exposure import surroundings_radiance
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, Part
 from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band, RatioThermometer
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
@@ -71,7 +72,7 @@ class WavelengthPlan(Part):
         Band(1.5e-6, 1.7e-6),
         Band(2.0e-6, 2.4e-6),
         Band(3.2e-6, 3.8e-6),
-        Band(3.8e-6, 5.1e-6),
+        Band(*PAPER_BAND),
         Band(8.0e-6, 9.5e-6),
         Band(10e-6, 14e-6),
     )

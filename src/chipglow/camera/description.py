@@ -22,6 +22,7 @@ from chipglow.camera.optics.terms import OPTICS_TERMS, OpticsTerm
 from chipglow.quantities import ZERO_CELSIUS, Array, Parameter, made_from
 from chipglow.quantities.units import LENGTH, TIME, Position
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Raster
 
 _SUSPECT_LIMIT: Final = 373.15
@@ -85,7 +86,7 @@ class CameraDescription(CameraSettings):
     """All that is stated of a camera; `Camera` is one that measures."""
 
     band: Annotated[Band, Parameter("Spectral band; the paper's by default.")] = field(
-        default_factory=lambda: Band(3.8e-6, 5.1e-6)
+        default_factory=lambda: Band(*PAPER_BAND)
     )
     _: KW_ONLY
     shape: Annotated[

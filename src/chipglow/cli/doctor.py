@@ -26,6 +26,8 @@ _LEFT_OUT: Final = ("test", "dev", "docs", "import", "all")
 """Extras for developers, and those that only name others."""
 
 _BAND: Final = (3.8e-6, 5.1e-6)
+"""Limits in m of the band in which the radiance is checked: the paper's."""
+
 _TEMPERATURES: Final = (600.0, 1000.0, 1500.0)
 _TOLERANCE: Final = 1e-6
 

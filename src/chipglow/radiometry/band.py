@@ -27,6 +27,9 @@ SECOND_RADIATION_CONSTANT: Final = 1.438776877503933e-2
 Response: TypeAlias = Callable[[Array], Array]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
 
+PAPER_BAND: Final = (3.8e-6, 5.1e-6)
+"""Limits in m of the spectral band of the paper's camera, the default of cameras and surfaces."""
+
 _NODES_PER_PANEL: Final = 16
 """Gauss nodes of each panel of an integral over wavelength."""
 

@@ -24,10 +24,9 @@ from chipglow.io.column_file import read_response
 from chipglow.quantities import FileBeside, Parameter, Part, made_from, unchecked
 from chipglow.quantities.units import COLDEST, LENGTH, POSITION, WAVELENGTHS, InSI, is_number
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Raster
 from chipglow.text import read_yaml
-
-PAPER_BAND: Final = 3.8e-6, 5.1e-6
 
 _FILE: Final = Path(__file__).with_name("cameras.yaml")
 CAMERAS: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(_FILE)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.raster import check_shape
 from chipglow.surface.blend import (
@@ -146,7 +147,7 @@ class FeatureSurface(FeatureSettings, Surface):
         return replace(self, **means)
 
 
-PAPER_ORIGIN: Final = Origin((3.8e-6, 5.1e-6), "AISI 1045")
+PAPER_ORIGIN: Final = Origin(PAPER_BAND, "AISI 1045")
 """Origin of the emissivities of the paper's Table 1."""
 
 CHIP_1: Final = FeatureSurface(

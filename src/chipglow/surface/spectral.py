@@ -19,6 +19,7 @@ from chipglow.quantities.units import (
     Wavelength,
 )
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import PAPER_BAND
 from chipglow.scene import Frame, Scene
 from chipglow.surface.surface import SURFACES, Change, EmissivityField, Modifier, Surface
 from chipglow.surface.temperature import TemperatureSurface
@@ -167,7 +168,7 @@ class Dispersion(Modifier):
     effect = "spectral"
     is_grey = False
     law: SpectralSurface
-    measured_in: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
+    measured_in: Band = field(default_factory=lambda: Band(*PAPER_BAND))
     """The band in which the emissivity holds; the paper's by default."""
 
     @property

@@ -19,6 +19,9 @@ HALF_WIDTHS: Final[Mapping[str, float]] = {
 }  # fmt: skip
 """Half-widths of the bounded distributions of unit variance."""
 
+MAD_FACTOR: Final = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
 _MOST: Final = 200_000_000
 """Numbers that the effects of one component may take: 1.6 GB."""
 

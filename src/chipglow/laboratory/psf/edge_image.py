@@ -18,6 +18,7 @@ from chipglow.quantities import Array, Brief
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.text import Notes
+from chipglow.uncertainty.component import MAD_FACTOR
 
 _LEAST_STEP: Final = 7.0
 """Smallest step of an edge in its standard uncertainties."""
@@ -305,7 +306,7 @@ def _chosen(pixels: EdgePixels, kept: NDArray[np.bool_]) -> EdgePixels:
 def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, list[str]]:
     """Return the pixels without those that lie far from all others as near to the edge."""
     left = pixels.radiance - quick.predicted(0, pixels)
-    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    spread = MAD_FACTOR * float(np.median(np.abs(left - np.median(left))))
     kept = np.abs(left) <= max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
     lost = int(np.count_nonzero(~kept))
     # More than a few are not dead pixels but an object that is not an edge.

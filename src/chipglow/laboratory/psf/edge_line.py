@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.quantities import Array
+from chipglow.uncertainty.component import MAD_FACTOR
 
 _LEAST_SIGNIFICANCE: Final = 50.0
 """Square of Student's t of a step that is taken for an edge; the best of noise reaches about 20."""
@@ -147,7 +148,7 @@ def _without_outliers(place: Array, centre: Array) -> NDArray[np.bool_]:
         if kept.sum() < 8:
             break
         residual = centre - np.polyval(np.polyfit(place[kept], centre[kept], 1), place)
-        spread = 1.4826 * float(np.median(np.abs(residual[kept])))
+        spread = MAD_FACTOR * float(np.median(np.abs(residual[kept])))
         kept = np.abs(residual) <= max(_OUTLIER * spread, 1e-12)
     return kept
 

@@ -29,6 +29,7 @@ from chipglow.laboratory.recordings.description import MeasurementDescription, l
 from chipglow.laboratory.recordings.radiometric_calibration import calibrate_recording
 from chipglow.quantities import Array
 from chipglow.text import DescriptionError
+from chipglow.uncertainty.component import MAD_FACTOR
 
 WHOLE: Final = np.s_[:, :]
 """All rows and columns of an image."""
@@ -143,7 +144,7 @@ def _unevenness(image: Array) -> float:
     blocks = [part for one in strips for part in np.array_split(one, _BLOCKS, axis=1)]
     values = [block[np.isfinite(block)] for block in blocks if np.isfinite(block).any()]
     medians = np.array([np.median(one) for one in values])
-    spreads = [1.4826 * np.median(np.abs(one - np.median(one))) for one in values]
+    spreads = [MAD_FACTOR * np.median(np.abs(one - np.median(one))) for one in values]
     # The standard error of a median is 1.25 times that of the mean.
     errors = 1.25 * np.median(spreads) / np.sqrt([one.size for one in values])
     away = np.abs(medians - np.median(medians))
