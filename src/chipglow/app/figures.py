@@ -26,6 +26,8 @@ from chipglow.quantities import Array
 from chipglow.scene import Raster, Tool
 
 MICRONS: Final = 1e6
+"""Micrometres in a metre: axes are in micrometres."""
+
 PALETTES: Final = {HEAT: Inferno256, PLAIN: Cividis256, SIGNED: interp_palette(RdBu11, 256)}
 """The colours of other figures; importing Matplotlib takes long."""
 
@@ -47,6 +49,8 @@ _REFERENCE: Final = "#7d858f"
 _CORRECTED: Final = "#c2571a"
 
 _BORDER: Final = 46
+"""Pixels on the left of a figure for its labels, the same for all, so that they are aligned."""
+
 _SIDE: Final = 180
 """Initial size of a frame in pixels; page.js fits the figures to the page."""
 

@@ -31,6 +31,7 @@ MOST_UPLOADED: Final = 512 * 1024**2
 """Maximum size of an uploaded file in bytes."""
 
 _MOST_OPEN: Final = 8
+"""Uploaded files that stay open; older ones are closed."""
 
 SHOWN: Final = (
     "start", "images", "scene_image", "error_image", "correction_image", "emissivity_uncertainty",

@@ -13,6 +13,8 @@ PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
 
 PHASES: Final = 3
+"""Pixel phases along each axis of the app's draws."""
+
 TEXTURES: Final = 5
 """Draws of "Draw phases and textures": nine positions of the pixels and five textures."""
 
@@ -20,6 +22,7 @@ _PAINT_TIMEOUT: Final = 0.5
 """Seconds to wait for the page to paint a picture before the next one is sent."""
 
 _UNDO_STEPS: Final = 200
+"""Settings that can be undone."""
 
 _log = logging.getLogger(__name__)
 _Job = TypeVar("_Job")

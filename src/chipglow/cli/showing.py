@@ -23,8 +23,12 @@ from chipglow.text import Notes
 if TYPE_CHECKING:
     from chipglow.scene import SceneSummary
 
-_LONGEST: Final = 800
-_MOST: Final = 8
+_LONGEST_TEXT: Final = 800
+"""Characters of a text that are shown."""
+
+_LONGEST_LIST: Final = 8
+"""Items of a list that are shown."""
+
 _FLAG_NAMES: Final = {
     Flag.UNDER_RANGE: "below the lower range limit or the calibration",
     Flag.SATURATED: "saturated or above the calibration",
@@ -181,12 +185,16 @@ def _attribute_text(value: Any) -> str:
         parsed = None
     if isinstance(parsed, dict):
         leaves = pd.json_normalize(parsed).to_dict("records")[0]
-        long = {name: isinstance(one, list) and len(one) > _MOST for name, one in leaves.items()}
+        long = {
+            name: isinstance(one, list) and len(one) > _LONGEST_LIST for name, one in leaves.items()
+        }
         text = ", ".join(
             f"{name} [{len(leaf)} values]" if long[name] else f"{name} {leaf}"
             for name, leaf in leaves.items()
         )
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} … ({len(text)} characters)"
+    return (
+        text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]} … ({len(text)} characters)"
+    )
 
 
 def microseconds(time: float) -> str:

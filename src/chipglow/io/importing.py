@@ -31,6 +31,8 @@ MOST_SAMPLES: Final = 100_000_000
 """Most samples of a frame."""
 
 _CHECKPOINT_INTERVAL: Final = 30.0
+"""Seconds between the times at which an import is kept."""
+
 _KEY: Final = "import"
 
 

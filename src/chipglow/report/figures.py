@@ -46,6 +46,8 @@ _ORDERS: Final = {
 _Series: TypeAlias = Callable[[xr.Dataset, str, str], Array]
 
 _MAX_CURVES: Final = 6
+"""Curves of a figure, beyond which they cannot be distinguished."""
+
 _LINE_TITLES: Final = {
     "rake": "across the rake face",
     "contact": "along the contact",

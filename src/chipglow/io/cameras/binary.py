@@ -20,6 +20,7 @@ from chipglow.radiometry import ObjectParameters
 from chipglow.text import Notes
 
 _TEN_YEARS: Final = 31_536_000.0 * 10
+"""Seconds of ten years: a camera's clock that shows less since 1970 was not set."""
 
 
 class CutShortError(SourceError):
