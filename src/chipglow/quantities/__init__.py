@@ -18,6 +18,7 @@ from chipglow.quantities.part import (
     made_from as made_from,
     of_other_packages as of_other_packages,
     problem as problem,
+    rederived as rederived,
     unchecked as unchecked,
 )
 from chipglow.quantities.quotient import quotient as quotient

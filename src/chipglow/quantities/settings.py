@@ -105,28 +105,23 @@ def value_text(value: object, quantity: Quantity | None) -> str:
     return quantity.text(value) if quantity and isinstance(value, float) else f"{value}"
 
 
-def changed(
-    part: PartType, changes: Mapping[str, object], stated: Mapping[str, Any] | None = None
-) -> PartType:
-    """Return a copy with other values by their paths, all checked; a ValueError if impossible.
-
-    `stated` are the stated settings of the part, by default its own.
-    """
+def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
+    """Return a copy with other values by their paths, all checked; a ValueError if impossible."""
     try:
-        made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes, stated))
+        made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes))
     except ValidationError as error:
         raise ValueError(problem(error)) from None
     return made
 
 
-def _with_changes(part: Any, changes: Mapping[str, object], stated: Any = None) -> Any:
+def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
     """Return what was stated of a part, a mapping or a list, with the changes."""
     if isinstance(part, Mapping):
         data = dict(part)
     elif isinstance(part, tuple):
         data = {str(number): one for number, one in enumerate(part)}
     else:
-        data = dict(stated) if isinstance(stated, Mapping) else part.stated()
+        data = part.stated()
     inner: dict[str, dict[str, object]] = {}
     for path, value in changes.items():
         name, dot, rest = path.partition(".")
@@ -135,5 +130,5 @@ def _with_changes(part: Any, changes: Mapping[str, object], stated: Any = None) 
         else:
             data[name] = value
     for name, one in inner.items():
-        data[name] = _with_changes(value_at(part, name), one, data.get(name))
+        data[name] = _with_changes(value_at(part, name), one)
     return tuple(data.values()) if isinstance(part, tuple) else data

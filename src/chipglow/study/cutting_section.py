@@ -19,7 +19,7 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
-from chipglow.quantities import Parameter, beside_the_study, made_from
+from chipglow.quantities import Parameter, Part, beside_the_study, made_from
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.scene import Raster
 
@@ -45,6 +45,18 @@ class FieldOfViewSection(Raster):
 
     def build(self) -> Raster:
         return made_from(Raster, self)
+
+
+@dataclass(frozen=True)
+class WindowSection(OutputWindow):
+    """The part of the cut that becomes the scene; the paper's by default."""
+
+    def __post_init__(self) -> None:
+        # `build` checks the order of the ends, when those that follow from others are known.
+        Part.__post_init__(self)
+
+    def build(self) -> OutputWindow:
+        return made_from(OutputWindow, self)
 
 
 @dataclass(frozen=True)
@@ -110,8 +122,8 @@ class WorkpieceAndTool(CuttingConditions):
 class CuttingSection(CutSettings, WorkpieceAndTool):
     """The cutting simulation; the paper's Table 2."""
 
-    window: Annotated[OutputWindow, Parameter("The part of the cut that becomes the scene.")] = (
-        field(default_factory=OutputWindow)
+    window: Annotated[WindowSection, Parameter("The part of the cut that becomes the scene.")] = (
+        field(default_factory=WindowSection)
     )
     field_of_view: Annotated[
         FieldOfViewSection,
@@ -120,12 +132,19 @@ class CuttingSection(CutSettings, WorkpieceAndTool):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self.material()
+
+    def check_window(self) -> None:
+        """Raise a ValueError unless the window is a part of the cut."""
+        try:
+            self.window.build()
+        except ValueError as error:
+            raise ValueError(f"window: {error}") from None
         if self.window.end > self.cutting_length * (1 + 1e-9):
             raise ValueError(
                 f"window.end: {self.window.end * 1e3:g} mm is beyond cutting_length, "
                 f"expected up to {self.cutting_length * 1e3:g} mm"
             )
-        self.material()
 
     def material(self) -> WorkpieceMaterial:
         """Return the workpiece's material, with the factors on its numbers."""
