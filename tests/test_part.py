@@ -22,6 +22,7 @@ from chipglow.quantities import (
     adapter,
     changed,
     made_from,
+    placed,
     problem,
     rederived,
 )
@@ -277,3 +278,21 @@ def test_a_part_that_overrides_another_has_its_fields_or_none():
     assert (made.width, made.boards) == (1.5, None)
     with pytest.raises(ValueError, match=r"Change.width: 0 m, expected more than 0 m"):
         Change(width=0.0)
+
+
+def test_a_path_sets_a_value_in_parts_and_in_what_a_file_holds():
+    assert placed(None, {"units.length": "mm"}) == {"units": {"length": "mm"}}
+    held = {"terms": [{"kind": "veil"}, {"kind": "lag"}], "bits": 12}
+    assert placed(held, {"terms.1.kind": "netd", "bits": 14, "terms.0.radius": 2}) == {
+        "terms": [{"kind": "veil", "radius": 2}, {"kind": "netd"}],
+        "bits": 14,
+    }
+    assert held["terms"][1] == {"kind": "lag"}
+    with pytest.raises(ValueError, match=r"5: expected a position in a list"):
+        placed(held, {"terms.5": {}})
+    study = changed(Study(), {"camera.psf": {"kind": "gaussian", "fwhm": 8e-6}})
+    assert changed(study, {"camera.psf.fwhm": 9e-6}).camera.psf == GaussianPSF(9e-6)
+    with pytest.raises(LookupError, match=r"camera\.lens"):
+        changed(study, {"camera.lens.focus": 1})
+    with pytest.raises(ValueError, match=r"camera\.detector\.response: is missing"):
+        changed(study, {"camera.detector.bits": 12})

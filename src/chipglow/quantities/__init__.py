@@ -26,6 +26,7 @@ from chipglow.quantities.settings import (
     Setting as Setting,
     changed as changed,
     own_settings as own_settings,
+    placed as placed,
     setting_at as setting_at,
     settings as settings,
     value_at as value_at,
