@@ -49,6 +49,9 @@ Class = TypeVar("Class", bound=type)
 PartType = TypeVar("PartType", bound="Part")
 
 
+# Not pydantic's own classes: a model takes no values by position, as Emissivity(0.4, 0.03), and its
+# copy keeps cached properties of other values; pydantic's dataclasses do not note what was given,
+# and call a field given by position 0 in errors.
 class Part:
     """A frozen dataclass whose fields declare their `Parameter`.
 
@@ -254,6 +257,7 @@ def rederived(part: PartType, **values: Any) -> PartType:
 
 
 def _copy(part: PartType, values: Mapping[str, Any]) -> PartType:
+    """Return a copy with other values, without cached properties."""
     made = object.__new__(type(part))
     kept = {one.name: getattr(part, one.name) for one in dataclass_fields(part)}
     for name, value in {**kept, **values}.items():

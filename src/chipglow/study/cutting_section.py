@@ -20,7 +20,7 @@ from chipglow.cutting import (
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
 from chipglow.quantities import Parameter, Part, beside_the_study, made_from
-from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.quantities.units import TEMPERATURE
 from chipglow.scene import Raster
 
 STEADY: Final = "steady"
@@ -33,13 +33,7 @@ class FieldOfViewSection(Raster):
 
     left: float = -650e-6
     top: float = 700e-6
-    spacing: Annotated[
-        float,
-        Parameter(
-            "Side of a sample. camera.pitch should be a whole multiple of it; the paper has 9.",
-            LENGTH,
-        ),
-    ] = 2 / 3e6
+    spacing: float = 2 / 3e6
     rows: int = 1170
     columns: int = 1035
 
@@ -127,7 +121,10 @@ class CuttingSection(CutSettings, WorkpieceAndTool):
     )
     field_of_view: Annotated[
         FieldOfViewSection,
-        Parameter("Samples of the scene: the tool's tip is near the origin, y points up."),
+        Parameter(
+            "Samples of the scene: the tool's tip is near the origin, y points up. camera.pitch "
+            "should be a whole multiple of spacing; the paper has 9."
+        ),
     ] = field(default_factory=FieldOfViewSection)
 
     def __post_init__(self) -> None:
